@@ -1,0 +1,50 @@
+#ifndef PLUMBLINE_CORE_DETECTOR_H_
+#define PLUMBLINE_CORE_DETECTOR_H_
+
+#include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/core/transaction.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// Where to look for structure.
+struct DetectionScope {
+  /// Features that a detector reads are of this level (virtual ones that it
+  /// extends are one level up).
+  int level = 0;
+  /// Ids, ascending, to look at; null for the whole graph. With a list, the
+  /// detector's cost must depend on the list and on the virtual features that
+  /// it could extend, not on the size of the graph.
+  const std::vector<FeatureId>* features = nullptr;
+  /// For detectors that draw random numbers; the same seed gives the same
+  /// proposal.
+  std::uint64_t seed = 1;
+};
+
+/// Reads the features of one level and proposes what is seen in them: virtual
+/// features one level up with constraints down to what supports them, or
+/// constraints between features of the level. It never changes the graph, and
+/// never proposes what is already there. Whether a hypothesis was broken
+/// before is not its business: the orchestrator filters.
+class StructureDetector {
+ public:
+  virtual ~StructureDetector() = default;
+
+  /// Name under which the type is registered.
+  virtual const std::string& name() const = 0;
+
+  /// Fewest live constraints from below that keep a virtual feature of this
+  /// detector alive.
+  virtual int minimum_support() const { return 1; }
+
+  virtual Transaction Detect(const Graph& graph, const Registry& registry,
+                             const DetectionScope& scope) const = 0;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_CORE_DETECTOR_H_

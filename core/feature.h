@@ -1,0 +1,64 @@
+#ifndef PLUMBLINE_CORE_FEATURE_H_
+#define PLUMBLINE_CORE_FEATURE_H_
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// Ids are handed out in order by the graph, from 0, and never reused.
+using FeatureId = std::int64_t;
+using ConstraintId = std::int64_t;
+
+constexpr std::int64_t kNoId = -1;
+
+/// Most parameters that a feature type may have.
+constexpr int kMaxFeatureSize = 6;
+
+struct FeatureType;  // core/registry.h
+
+/// A node of the graph: something with parameters to be estimated (method.md,
+/// section 3). Built-in types and the order of their parameters:
+///
+///   point        x, y              m
+///   pose         x, y, theta       m, m, rad
+///   segment      x, y, theta       m, m, rad
+///   line         d, alpha          m, rad; relative to `anchor`
+///   circle       x, y, R           m
+///   orientation  theta             rad
+struct Feature {
+  FeatureId id = kNoId;
+  /// Owned by the registry; never null in a graph.
+  const FeatureType* type = nullptr;
+  /// 0 for raw features; a detector puts what it finds one level up.
+  int level = 0;
+  /// Made by a detector and not by a sensor.
+  bool is_virtual = false;
+  /// Held constant in every solve: this is what fixes the gauge.
+  bool fixed = false;
+  /// The state; entries past type->size are zero. Its address is stable for
+  /// the life of the feature in the graph, solvers write to it.
+  std::array<double, kMaxFeatureSize> parameters{};
+  /// Reference point (m, map frame) of parameters that would lose accuracy far
+  /// from the origin (lines): constant.
+  std::array<double, 2> anchor{};
+  /// Where the visible part begins and ends along the direction of a segment
+  /// or line, m, relative to the feature's own position (a segment's (x, y), a
+  /// line's foot point seen from its anchor). An attribute for association and
+  /// drawing, not state.
+  double extent_begin = 0.0;
+  double extent_end = 0.0;
+  /// How many scans saw it (0 for virtual features).
+  int observations = 0;
+  /// Who put it there: "frontend", a reader, or a detector's name.
+  std::string source;
+
+  double* data() { return parameters.data(); }
+  const double* data() const { return parameters.data(); }
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_CORE_FEATURE_H_

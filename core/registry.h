@@ -1,0 +1,143 @@
+#ifndef PLUMBLINE_CORE_REGISTRY_H_
+#define PLUMBLINE_CORE_REGISTRY_H_
+
+#include <ceres/cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/manifold.h>
+#include <plumbline/core/constraint.h>
+#include <plumbline/core/feature.h>
+
+#include <Eigen/Core>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+class StructureDetector;  // core/detector.h
+
+/// Named numbers handed to a detector (flags, structure priors). Unknown names
+/// are refused by the detector's factory with an Error.
+using DetectorParameters = std::map<std::string, double>;
+
+/// A kind of node.
+struct FeatureType {
+  /// Name in files and flags: "segment".
+  std::string name;
+  /// Number of parameters, 1 to kMaxFeatureSize.
+  int size = 0;
+  /// Tag of the vertex in g2o text; a tag of our own starts with PLUMBLINE_.
+  std::string g2o_tag;
+  /// Names of the parameters with units, in order: {"x m", "y m", "theta rad"}.
+  std::vector<std::string> parameter_names;
+  std::string description;
+  /// Makes the manifold on which the parameters live; null when they are
+  /// Euclidean. One instance may serve every block of the type.
+  std::function<std::unique_ptr<ceres::Manifold>()> make_manifold;
+};
+
+/// What a relation's factory gets.
+struct RelationArguments {
+  /// Expected value u.
+  Eigen::VectorXd expected;
+  /// Square root of the information: r = sqrt_information * (f(x) (-) u).
+  Eigen::MatrixXd sqrt_information;
+  /// The features in the constraint's order: types (block sizes) and anchors.
+  /// Parameters must not be copied from here.
+  std::vector<const Feature*> features;
+};
+
+/// A kind of edge.
+struct RelationType {
+  /// Name in files and flags: "segment_orientation".
+  std::string name;
+  /// Tag of the edge in g2o text.
+  std::string g2o_tag;
+  /// For each feature in order the names of the types that fit there.
+  std::vector<std::vector<std::string>> feature_types;
+  /// Rows of the residual; also the size of `expected`.
+  int residual_size = 0;
+  /// Formula, units and source in one or two lines.
+  std::string description;
+  /// Makes the cost function; throws Error when the arguments do not fit.
+  std::function<std::unique_ptr<ceres::CostFunction>(const RelationArguments&)>
+      make_cost;
+};
+
+/// A weighting of structure constraints, by the name used in --delta_mode.
+struct LossType {
+  std::string name;
+  std::string description;
+  /// Makes the loss of one structure constraint. `delta` points at the
+  /// constraint's frozen weight and outlives the loss; `degrees_of_freedom` is
+  /// the rank of its information. Null means no loss.
+  std::function<std::unique_ptr<ceres::LossFunction>(const double* delta,
+                                                     int degrees_of_freedom)>
+      make_loss;
+};
+
+/// A kind of structure detector.
+struct DetectorType {
+  /// Name in --hierarchy: "orientation_mixture".
+  std::string name;
+  std::string description;
+  /// Names of the feature types that it reads, and of those that it makes
+  /// (empty when it proposes constraints only).
+  std::vector<std::string> reads;
+  std::vector<std::string> makes;
+  /// Parameters with their defaults; the factory gets all of them.
+  DetectorParameters defaults;
+  std::function<std::unique_ptr<StructureDetector>(const DetectorParameters&)>
+      make;
+};
+
+/// The plug-ins by name. One instance per process is the usual thing (Global),
+/// but a test or a program may have its own. Not thread safe while registering.
+class Registry {
+ public:
+  Registry() = default;
+  Registry(const Registry&) = delete;
+  Registry& operator=(const Registry&) = delete;
+
+  /// The registry of the process; empty until something registers.
+  static Registry& Global();
+
+  /// Adds a plug-in. Throws Error when the name or tag is empty, has white
+  /// space, or is taken. The returned reference is stable.
+  const FeatureType& Register(FeatureType type);
+  const RelationType& Register(RelationType type);
+  const LossType& Register(LossType type);
+  const DetectorType& Register(DetectorType type);
+
+  /// Look-ups. Find* return null when there is none; Get* throw an Error that
+  /// lists the known names, nearest first.
+  const FeatureType* FindFeature(const std::string& name) const;
+  const RelationType* FindRelation(const std::string& name) const;
+  const LossType* FindLoss(const std::string& name) const;
+  const DetectorType* FindDetector(const std::string& name) const;
+  const FeatureType& GetFeature(const std::string& name) const;
+  const RelationType& GetRelation(const std::string& name) const;
+  const LossType& GetLoss(const std::string& name) const;
+  const DetectorType& GetDetector(const std::string& name) const;
+  /// By g2o tag; null when there is none.
+  const FeatureType* FindFeatureByTag(const std::string& tag) const;
+  const RelationType* FindRelationByTag(const std::string& tag) const;
+
+  /// Everything, in the order of names.
+  std::vector<const FeatureType*> features() const;
+  std::vector<const RelationType*> relations() const;
+  std::vector<const LossType*> losses() const;
+  std::vector<const DetectorType*> detectors() const;
+
+ private:
+  std::map<std::string, std::unique_ptr<FeatureType>> features_;
+  std::map<std::string, std::unique_ptr<RelationType>> relations_;
+  std::map<std::string, std::unique_ptr<LossType>> losses_;
+  std::map<std::string, std::unique_ptr<DetectorType>> detectors_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_CORE_REGISTRY_H_

@@ -15,19 +15,22 @@ constexpr double DegToRad(double degrees) { return degrees * (kPi / 180.0); }
 /// Radians to degrees.
 constexpr double RadToDeg(double radians) { return radians * (180.0 / kPi); }
 
-/// Wraps `angle` (radians) to the half-open interval (-period/2, period/2].
-/// The derivative is 1 everywhere, so it is safe inside automatically
-/// differentiated residuals; the value jumps by `period` at the cut.
-/// A non-finite angle is returned as NaN.
-template <typename T>
-T WrapAngle(const T& angle, double period) {
-  using std::ceil;
-  // ceil's derivative is zero almost everywhere (Ceres' jets agree), so only
-  // the subtraction carries derivatives.
-  T wrapped = angle - period * ceil(angle / period - 0.5);
-  // One rounding step away from the cut the quotient can be off by one.
-  if (wrapped <= T(-period / 2)) wrapped += T(period);
-  if (wrapped > T(period / 2)) wrapped -= T(period);
+/// Wraps `angle` (radians) to the half-open interval (-period/2, period/2],
+/// without rounding error whatever the size of the angle. A non-finite angle
+/// gives NaN.
+inline double WrapAngle(double angle, double period) {
+  const double half = 0.5 * period;
+  if (angle > -half && angle <= half) return angle;
+  const double wrapped = std::remainder(angle, period);  // [-half, half]
+  return wrapped > -half ? wrapped : wrapped + period;
+}
+
+/// The same inside automatically differentiated residuals: the derivative is 1
+/// everywhere, the value jumps by `period` at the cut.
+template <typename T, int N>
+ceres::Jet<T, N> WrapAngle(const ceres::Jet<T, N>& angle, double period) {
+  ceres::Jet<T, N> wrapped = angle;
+  wrapped.a = WrapAngle(angle.a, period);
   return wrapped;
 }
 

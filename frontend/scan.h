@@ -25,7 +25,8 @@ struct Scan {
   /// rad.
   double start_angle = 0.0;
   double angle_step = 0.0;
-  /// Readings at or above it are "no return", m.
+  /// Range of the laser, m: readings at or above it (within the reader's
+  /// margin) are "no return".
   double maximum_range = 0.0;
   /// m, one a beam. A reading that is not a return (NaN, negative, zero, at or
   /// above maximum_range) is stored as 0.
@@ -52,8 +53,13 @@ struct Log {
   /// Messages by name that were understood.
   std::map<std::string, std::int64_t> messages;
   std::vector<SkipReport> skipped;
-  /// No scan had odometry that ever changed: the front-end has to do without.
+  /// Name of the message that gave the scans.
+  std::string scan_message;
+  /// False when no scan had odometry that ever changed: the front-end has to
+  /// do without.
   bool has_odometry = false;
+  /// Scans whose number of beams differs from the scan before.
+  std::int64_t beam_count_changes = 0;
   /// Time stamps that jump back against the scan before, and by how much at
   /// most, s.
   std::int64_t time_reversals = 0;

@@ -1,0 +1,82 @@
+#ifndef PLUMBLINE_FRONTEND_CARMEN_READER_H_
+#define PLUMBLINE_FRONTEND_CARMEN_READER_H_
+
+#include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/scan.h>
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace plumbline {
+
+/// What a CARMEN log does not say, or says wrongly.
+struct CarmenOptions {
+  /// Direction of the first beam in the laser's frame, rad. Unset: from the
+  /// message; FLASER and RLASER carry none and take the table below.
+  std::optional<double> laser_start_angle;
+  /// Step between beams, rad. Unset: as above.
+  std::optional<double> laser_step;
+  /// Readings at or above it are no return, m. Unset: from the message
+  /// (ROBOTLASER1, RAWLASER1), else PARAM robot_front_laser_max (or
+  /// robot_rear_laser_max), else 80; and lowered to the value at which the
+  /// log's own readings saturate when they pile up below that (81.8 m and 51 m
+  /// in well-known logs). How far a laser is trusted is the front-end's
+  /// business, not the reader's.
+  std::optional<double> laser_max_range;
+};
+
+/// Reads a CARMEN log (plain, gzip, bzip2, "-" for standard input) into scans.
+///
+/// Messages, one a line, `NAME fields... ipc_timestamp ipc_host
+/// logger_timestamp`:
+///
+/// | message | use |
+/// |---|---|
+/// | FLASER n r.. x y theta odom_x odom_y odom_theta | scan of the front laser:
+/// the first pose is the laser's, the second the robot's, both by odometry |
+/// | ROBOTLASER1 | the same with angles, maximum range and remissions |
+/// | RAWLASER1 | a scan without poses: placed by ODOM |
+/// | RLASER | scan of the rear laser, as FLASER |
+/// | ODOM, PARAM, SYNC, TRUEPOS, COMMENT | ODOM places RAWLASER1 scans, PARAM
+/// gives laser settings; the others are counted only |
+///
+/// A log often holds the same laser in several messages, so one kind gives the
+/// scans: the first of FLASER, ROBOTLASER1, RAWLASER1, RLASER that occurs;
+/// scans of the others are counted in Log::skipped. Scans keep the order of
+/// the lines whatever their time stamps.
+///
+/// FLASER and RLASER carry no angles. Beams start at -90 degrees, 1 degree
+/// apart for 180 and 181 beams and half a degree for 360 and 361. Any other
+/// number is spaced by PARAM laser_front_laser_resolution, symmetric to the
+/// front, or spread over 180 degrees (an odd number includes both ends).
+///
+/// The laser's place on the robot is the median over the log of the first pose
+/// seen from the second. Where that is not fixed (a "corrected" log has other
+/// poses in the first place) the first poses are passed over, the place is
+/// PARAM robot_frontlaser_offset or zero, and Log::skipped says so: corrected
+/// poses are never taken for odometry.
+///
+/// RAWLASER1 scans get the odometry interpolated by time between the ODOM
+/// lines before and after, or the last one when the times do not embrace the
+/// scan's.
+///
+/// Lines that cannot be used and readings that are no distances (not a number,
+/// negative, above 1000 m) are passed over and counted in Log::skipped, as is
+/// damage to compressed data. Throws Error when the input cannot be read or
+/// holds no scan at all; the message says what was found.
+Log ReadCarmenLog(const std::string& path, const CarmenOptions& options);
+
+/// The same from an input that is open already (a peek does not hurt).
+Log ReadCarmenLog(InputStream* input, const CarmenOptions& options);
+
+/// Whether text that starts with `prefix` (a few kilobytes are plenty) is a
+/// CARMEN log: the first line with a known tag decides.
+bool LooksLikeCarmenLog(std::string_view prefix);
+
+/// Whether text that starts with `prefix` is a g2o graph, likewise.
+bool LooksLikeG2o(std::string_view prefix);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_CARMEN_READER_H_

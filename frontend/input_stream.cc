@@ -1,0 +1,329 @@
+#include <bzlib.h>
+#include <fcntl.h>
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/input_stream.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr std::size_t kChunk = std::size_t{1} << 18;
+
+// The bytes as they are stored: a file descriptor or a string.
+class StoredBytes {
+ public:
+  StoredBytes(std::string name, int descriptor, bool owned)
+      : name_(std::move(name)), descriptor_(descriptor), owned_(owned) {
+    buffer_.resize(kChunk);
+  }
+  StoredBytes(std::string name, const std::string& contents)
+      : name_(std::move(name)),
+        buffer_(contents.begin(), contents.end()),
+        end_(buffer_.size()) {}
+  ~StoredBytes() {
+    if (owned_) close(descriptor_);
+  }
+  StoredBytes(const StoredBytes&) = delete;
+  StoredBytes& operator=(const StoredBytes&) = delete;
+
+  const char* data() const { return buffer_.data() + begin_; }
+  std::size_t size() const { return end_ - begin_; }
+  void Consume(std::size_t count) { begin_ += count; }
+
+  // Reads on until at least `count` bytes are there; false when the end comes
+  // first.
+  bool Require(std::size_t count) {
+    while (size() < count) {
+      if (descriptor_ < 0) return false;
+      std::memmove(buffer_.data(), buffer_.data() + begin_, size());
+      end_ -= begin_;
+      begin_ = 0;
+      const ssize_t got =
+          read(descriptor_, buffer_.data() + end_, buffer_.size() - end_);
+      if (got < 0) {
+        if (errno == EINTR) continue;
+        throw Error(name_, 0,
+                    std::string("cannot be read: ") + std::strerror(errno),
+                    "a readable file");
+      }
+      if (got == 0) return false;
+      end_ += static_cast<std::size_t>(got);
+    }
+    return true;
+  }
+
+ private:
+  std::string name_;
+  int descriptor_ = -1;
+  bool owned_ = false;
+  std::vector<char> buffer_;
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+};
+
+bool StartsWithGzip(const StoredBytes& bytes) {
+  return bytes.size() >= 3 && std::memcmp(bytes.data(), "\x1f\x8b\x08", 3) == 0;
+}
+
+bool StartsWithBzip2(const StoredBytes& bytes) {
+  return bytes.size() >= 4 && std::memcmp(bytes.data(), "BZh", 3) == 0 &&
+         bytes.data()[3] >= '1' && bytes.data()[3] <= '9';
+}
+
+}  // namespace
+
+// Plain unless told otherwise by the subclasses' Unpack.
+class InputStream::Unpacker {
+ public:
+  explicit Unpacker(std::unique_ptr<StoredBytes> bytes)
+      : bytes_(std::move(bytes)) {}
+  virtual ~Unpacker() = default;
+
+  // Writes at most `capacity` bytes; 0 only at the end.
+  virtual std::size_t Unpack(char* output, std::size_t capacity) {
+    if (!bytes_->Require(1)) return 0;
+    const std::size_t count = std::min(capacity, bytes_->size());
+    std::memcpy(output, bytes_->data(), count);
+    bytes_->Consume(count);
+    return count;
+  }
+
+  const std::string& damage() const { return damage_; }
+
+  static std::unique_ptr<Unpacker> Create(std::unique_ptr<StoredBytes> bytes);
+
+ protected:
+  std::unique_ptr<StoredBytes> bytes_;
+  std::string damage_;
+
+ private:
+  class Gzip;
+  class Bzip2;
+};
+
+class InputStream::Unpacker::Gzip : public Unpacker {
+ public:
+  explicit Gzip(std::unique_ptr<StoredBytes> bytes)
+      : Unpacker(std::move(bytes)) {
+    // 16: expect a gzip header and trailer, so that the checksum is tested.
+    if (inflateInit2(&stream_, 15 + 16) != Z_OK)
+      throw PLUMBLINE_ERROR("zlib cannot be initialized", "enough memory");
+  }
+  ~Gzip() override { inflateEnd(&stream_); }
+
+  std::size_t Unpack(char* output, std::size_t capacity) override {
+    while (!done_) {
+      if (!bytes_->Require(1)) {
+        damage_ = "gzip data breaks off before its end";
+        done_ = true;
+        return 0;
+      }
+      const uInt given =
+          static_cast<uInt>(std::min(bytes_->size(), std::size_t{1} << 30));
+      stream_.next_in =
+          reinterpret_cast<Bytef*>(const_cast<char*>(bytes_->data()));
+      stream_.avail_in = given;
+      stream_.next_out = reinterpret_cast<Bytef*>(output);
+      stream_.avail_out = static_cast<uInt>(capacity);
+      const int status = inflate(&stream_, Z_NO_FLUSH);
+      bytes_->Consume(given - stream_.avail_in);
+      const std::size_t count = capacity - stream_.avail_out;
+      if (status == Z_STREAM_END) {
+        NextMember();
+      } else if (status != Z_OK && status != Z_BUF_ERROR) {
+        damage_ = std::string("gzip data is corrupt") +
+                  (stream_.msg ? std::string(": ") + stream_.msg : "");
+        done_ = true;
+      }
+      if (count > 0) return count;
+    }
+    return 0;
+  }
+
+ private:
+  void NextMember() {
+    // Tapes and block devices pad with zeros.
+    while (bytes_->Require(1) && *bytes_->data() == 0) bytes_->Consume(1);
+    bytes_->Require(3);
+    if (StartsWithGzip(*bytes_)) {
+      inflateReset(&stream_);
+      return;
+    }
+    if (bytes_->size() > 0) damage_ = "gzip data is followed by something else";
+    done_ = true;
+  }
+
+  z_stream stream_ = {};
+  bool done_ = false;
+};
+
+class InputStream::Unpacker::Bzip2 : public Unpacker {
+ public:
+  explicit Bzip2(std::unique_ptr<StoredBytes> bytes)
+      : Unpacker(std::move(bytes)) {
+    Start();
+  }
+  ~Bzip2() override { BZ2_bzDecompressEnd(&stream_); }
+
+  std::size_t Unpack(char* output, std::size_t capacity) override {
+    while (!done_) {
+      // bzip2 may hold unpacked bytes back when the input is used up, so the
+      // end of the input is the end only once nothing comes out.
+      const bool more = bytes_->Require(1);
+      const unsigned given =
+          static_cast<unsigned>(std::min(bytes_->size(), std::size_t{1} << 30));
+      stream_.next_in = const_cast<char*>(bytes_->data());
+      stream_.avail_in = given;
+      stream_.next_out = output;
+      stream_.avail_out = static_cast<unsigned>(capacity);
+      const int status = BZ2_bzDecompress(&stream_);
+      bytes_->Consume(given - stream_.avail_in);
+      const std::size_t count = capacity - stream_.avail_out;
+      if (status == BZ_STREAM_END) {
+        NextMember();
+      } else if (status != BZ_OK) {
+        damage_ = "bzip2 data is corrupt";
+        done_ = true;
+      } else if (!more && count == 0) {
+        damage_ = "bzip2 data breaks off before its end";
+        done_ = true;
+      }
+      if (count > 0) return count;
+    }
+    return 0;
+  }
+
+ private:
+  void Start() {
+    stream_ = {};
+    if (BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK)
+      throw PLUMBLINE_ERROR("libbz2 cannot be initialized", "enough memory");
+  }
+
+  void NextMember() {
+    bytes_->Require(4);
+    if (StartsWithBzip2(*bytes_)) {
+      BZ2_bzDecompressEnd(&stream_);
+      Start();
+      return;
+    }
+    if (bytes_->size() > 0)
+      damage_ = "bzip2 data is followed by something else";
+    done_ = true;
+  }
+
+  bz_stream stream_ = {};
+  bool done_ = false;
+};
+
+std::unique_ptr<InputStream::Unpacker> InputStream::Unpacker::Create(
+    std::unique_ptr<StoredBytes> bytes) {
+  bytes->Require(4);
+  if (StartsWithGzip(*bytes)) return std::make_unique<Gzip>(std::move(bytes));
+  if (StartsWithBzip2(*bytes)) return std::make_unique<Bzip2>(std::move(bytes));
+  return std::make_unique<Unpacker>(std::move(bytes));
+}
+
+InputStream::InputStream(const std::string& path) : name_(path) {
+  int descriptor = STDIN_FILENO;
+  const bool owned = path != "-";
+  if (owned) {
+    descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) {
+      throw Error(path, 0,
+                  std::string("cannot be opened: ") + std::strerror(errno),
+                  "a readable file");
+    }
+  } else {
+    name_ = "standard input";
+  }
+  auto bytes = std::make_unique<StoredBytes>(name_, descriptor, owned);
+  struct stat status;
+  if (fstat(descriptor, &status) == 0 && S_ISDIR(status.st_mode))
+    throw Error(name_, 0, "is a directory", "a file");
+  unpacker_ = Unpacker::Create(std::move(bytes));
+}
+
+InputStream::InputStream(const std::string& name, std::string contents)
+    : name_(name),
+      unpacker_(
+          Unpacker::Create(std::make_unique<StoredBytes>(name, contents))) {}
+
+InputStream::~InputStream() = default;
+
+bool InputStream::Fill() {
+  if (begin_ > 0) {
+    std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+    end_ -= begin_;
+    begin_ = 0;
+  }
+  if (buffer_.size() < end_ + kChunk)
+    buffer_.resize(std::max(end_ + kChunk, 2 * buffer_.size()));
+  const std::size_t count =
+      unpacker_->Unpack(buffer_.data() + end_, buffer_.size() - end_);
+  end_ += count;
+  return count > 0;
+}
+
+bool InputStream::ReadLine(std::string_view* line) {
+  std::size_t searched = 0;
+  std::size_t length = 0;
+  std::size_t consumed = 0;
+  while (true) {
+    const char* const start = buffer_.data() + begin_;
+    const std::size_t available = end_ - begin_;
+    const void* const newline =
+        available > searched
+            ? std::memchr(start + searched, '\n', available - searched)
+            : nullptr;
+    if (newline != nullptr) {
+      length =
+          static_cast<std::size_t>(static_cast<const char*>(newline) - start);
+      consumed = length + 1;
+      break;
+    }
+    if (available > kMaximumLineLength) {
+      throw Error(name_, line_number_ + 1, "line is longer than 16 MiB",
+                  "text with line ends");
+    }
+    searched = available;
+    if (!Fill()) {
+      if (available == 0) return false;
+      length = available;
+      consumed = available;
+      break;
+    }
+  }
+  *line = std::string_view(buffer_.data() + begin_, length);
+  if (!line->empty() && line->back() == '\r') line->remove_suffix(1);
+  begin_ += consumed;
+  ++line_number_;
+  return true;
+}
+
+std::string_view InputStream::Peek(std::size_t count) {
+  while (end_ - begin_ < count && Fill()) {
+  }
+  return std::string_view(buffer_.data() + begin_,
+                          std::min(count, end_ - begin_));
+}
+
+std::string InputStream::ReadRest() {
+  std::string rest;
+  do {
+    rest.append(buffer_.data() + begin_, end_ - begin_);
+    begin_ = end_;
+  } while (Fill());
+  return rest;
+}
+
+const std::string& InputStream::damage() const { return unpacker_->damage(); }
+
+}  // namespace plumbline

@@ -1,0 +1,77 @@
+#ifndef PLUMBLINE_FRONTEND_INPUT_STREAM_H_
+#define PLUMBLINE_FRONTEND_INPUT_STREAM_H_
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace plumbline {
+
+/// Text input read line by line from a plain, gzip or bzip2 file, recognized
+/// by content and not by name. Files made of several compressed members are
+/// read through to their end.
+///
+/// Compressed data that breaks off or is corrupt ends the input there: what
+/// was unpacked before is read as usual and damage() then says what happened.
+class InputStream {
+ public:
+  /// Longest line that is accepted, bytes.
+  static constexpr std::size_t kMaximumLineLength = std::size_t{1} << 24;
+
+  /// Opens the file `path`, or standard input when it is "-". Throws Error
+  /// when it cannot be opened or read, or is a directory.
+  explicit InputStream(const std::string& path);
+
+  /// Reads from memory in place of a file (plain or compressed too); `name`
+  /// stands for the file's in messages.
+  InputStream(const std::string& name, std::string contents);
+
+  ~InputStream();
+  InputStream(const InputStream&) = delete;
+  InputStream& operator=(const InputStream&) = delete;
+
+  /// Takes the next line, without its end ("\n" or "\r\n"), into `line`, which
+  /// stays valid until the next call. The last line may lack its end. Returns
+  /// false at the end of the input. Throws Error on a read error and on a line
+  /// longer than kMaximumLineLength.
+  bool ReadLine(std::string_view* line);
+
+  /// The next bytes, at most `count` and fewer only at the end of the input,
+  /// without consuming them; valid until the next call. For recognizing the
+  /// format.
+  std::string_view Peek(std::size_t count);
+
+  /// Everything that was not consumed yet, for readers that want a
+  /// std::istream. Throws Error on a read error.
+  std::string ReadRest();
+
+  /// Number of the line that ReadLine returned last, from 1; 0 before.
+  int line_number() const { return line_number_; }
+
+  /// The path, or "standard input".
+  const std::string& name() const { return name_; }
+
+  /// What was wrong with the compressed data, empty when nothing was (known
+  /// for certain only once the end is reached).
+  const std::string& damage() const;
+
+ private:
+  class Unpacker;
+
+  // Appends unpacked bytes to the buffer; false at the end.
+  bool Fill();
+
+  std::string name_;
+  std::unique_ptr<Unpacker> unpacker_;
+  std::vector<char> buffer_;
+  // Unconsumed bytes are buffer_[begin_, end_).
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+  int line_number_ = 0;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_INPUT_STREAM_H_

@@ -222,6 +222,11 @@ TransactionResult Graph::Apply(Transaction transaction) {
       [](const Constraint* a, const Constraint* b) { return a->id < b->id; });
   std::vector<std::unique_ptr<Node>> dead_features;
   for (const FeatureId id : removed_features) {
+    const Feature& feature = features_[id]->feature;
+    if (feature.is_virtual) {
+      std::vector<FeatureId>& ids = virtual_features_[feature.level];
+      ids.erase(std::lower_bound(ids.begin(), ids.end(), id));
+    }
     dead_features.push_back(std::move(features_[id]));
     --num_features_;
   }
@@ -233,6 +238,9 @@ TransactionResult Graph::Apply(Transaction transaction) {
     node->feature.id = feature_id_end();
     std::fill(node->feature.parameters.begin() + node->feature.type->size,
               node->feature.parameters.end(), 0.0);
+    if (node->feature.is_virtual) {
+      virtual_features_[node->feature.level].push_back(node->feature.id);
+    }
     result.features.push_back(node->feature.id);
     features_.push_back(std::move(node));
     ++num_features_;
@@ -328,6 +336,12 @@ Constraint& Graph::GetConstraint(ConstraintId id) {
 const std::vector<ConstraintId>& Graph::ConstraintsOf(FeatureId id) const {
   if (FindFeature(id) == nullptr) throw UnknownId("feature", id);
   return features_[id]->constraints;
+}
+
+const std::vector<FeatureId>& Graph::VirtualFeatures(int level) const {
+  static const std::vector<FeatureId> none;
+  const auto found = virtual_features_.find(level);
+  return found == virtual_features_.end() ? none : found->second;
 }
 
 std::vector<const Feature*> Graph::Features() const {

@@ -6,6 +6,7 @@
 #include <plumbline/core/transaction.h>
 
 #include <Eigen/Core>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -68,6 +69,11 @@ class Graph {
   std::vector<const Constraint*> Constraints() const;
   std::vector<Constraint*> MutableConstraints();
 
+  /// Ids of the virtual features of a level, ascending: few, whatever the size
+  /// of the graph. A feature's level and whether it is virtual must not be
+  /// changed once it is in the graph.
+  const std::vector<FeatureId>& VirtualFeatures(int level) const;
+
   std::size_t num_features() const { return num_features_; }
   std::size_t num_constraints() const { return num_constraints_; }
   /// One past the largest id ever handed out.
@@ -90,6 +96,7 @@ class Graph {
 
   std::vector<std::unique_ptr<Node>> features_;
   std::vector<std::unique_ptr<Constraint>> constraints_;
+  std::map<int, std::vector<FeatureId>> virtual_features_;
   std::size_t num_features_ = 0;
   std::size_t num_constraints_ = 0;
   std::vector<GraphListener*> listeners_;

@@ -1,0 +1,48 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/plugin.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace plumbline {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string MessageOfLoading(const std::string& path) {
+  Registry registry;
+  try {
+    LoadPlugin(path, &registry);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(PluginTest, MissingFile) {
+  const std::string message = MessageOfLoading("nowhere/libmine.so");
+  EXPECT_THAT(message, HasSubstr("nowhere/libmine.so: cannot load plug-in"));
+  EXPECT_THAT(message, HasSubstr("No such file"));
+}
+
+TEST(PluginTest, FileThatIsNoSharedObject) {
+  std::string name =
+      (std::filesystem::temp_directory_path() / "plumblineXXXXXX").string();
+  const std::filesystem::path folder = mkdtemp(name.data());
+  const std::string path = folder / "libmine.so";
+  std::ofstream(path) << "not ELF";
+  EXPECT_THAT(MessageOfLoading(path), HasSubstr("cannot load plug-in"));
+  std::filesystem::remove_all(folder);
+}
+
+TEST(PluginTest, SharedObjectThatIsNoPlugin) {
+  // The C library's mathematics: always there, never a plug-in.
+  EXPECT_THAT(MessageOfLoading("libm.so.6"), HasSubstr("is not a plug-in"));
+}
+
+}  // namespace
+}  // namespace plumbline

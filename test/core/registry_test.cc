@@ -1,0 +1,312 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/detector.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/factors/angle.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+using ::testing::HasSubstr;
+
+FeatureType Dot() {
+  FeatureType type;
+  type.name = "dot";
+  type.size = 2;
+  type.g2o_tag = "VERTEX_DOT";
+  type.parameter_names = {"x m", "y m"};
+  return type;
+}
+
+RelationType Link() {
+  RelationType type;
+  type.name = "link";
+  type.g2o_tag = "EDGE_LINK";
+  type.feature_types = {{"dot"}, {"dot"}};
+  type.residual_size = 1;
+  type.make_cost = [](const RelationArguments&) {
+    return std::unique_ptr<ceres::CostFunction>();
+  };
+  return type;
+}
+
+template <typename Function>
+std::string MessageOf(const Function& function) {
+  try {
+    function();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(RegistryTest, FindsWhatWasRegistered) {
+  Registry registry;
+  const FeatureType& dot = registry.Register(Dot());
+  const RelationType& link = registry.Register(Link());
+  EXPECT_EQ(registry.FindFeature("dot"), &dot);
+  EXPECT_EQ(&registry.GetFeature("dot"), &dot);
+  EXPECT_EQ(registry.FindFeatureByTag("VERTEX_DOT"), &dot);
+  EXPECT_EQ(registry.FindRelation("link"), &link);
+  EXPECT_EQ(registry.FindRelationByTag("EDGE_LINK"), &link);
+  EXPECT_EQ(registry.FindFeatureByTag("EDGE_LINK"), nullptr);
+  EXPECT_EQ(registry.FindFeature("dots"), nullptr);
+  EXPECT_EQ(registry.FindLoss("dot"), nullptr);
+  EXPECT_EQ(registry.FindDetector("dot"), nullptr);
+}
+
+TEST(RegistryTest, RefusesNamesThatAreTakenOrBad) {
+  Registry registry;
+  registry.Register(Dot());
+  EXPECT_THAT(MessageOf([&] { registry.Register(Dot()); }), HasSubstr("taken"));
+  FeatureType other = Dot();
+  other.name = "other";
+  EXPECT_THAT(MessageOf([&] { registry.Register(other); }),
+              HasSubstr("'VERTEX_DOT' is registered already"));
+  RelationType link = Link();
+  link.g2o_tag = "VERTEX_DOT";
+  EXPECT_THROW(registry.Register(link), Error);
+  for (const char* const bad : {"", "two words", "tab\t", "line\n"}) {
+    FeatureType type = Dot();
+    type.g2o_tag = "VERTEX_OTHER";
+    type.name = bad;
+    EXPECT_THROW(registry.Register(type), Error) << bad;
+    type.name = "other";
+    type.g2o_tag = bad;
+    EXPECT_THROW(registry.Register(type), Error) << bad;
+  }
+  EXPECT_EQ(registry.features().size(), 1u);
+}
+
+TEST(RegistryTest, RefusesIncompleteTypes) {
+  Registry registry;
+  FeatureType large = Dot();
+  large.size = kMaxFeatureSize + 1;
+  EXPECT_THROW(registry.Register(large), Error);
+  FeatureType unnamed = Dot();
+  unnamed.parameter_names.pop_back();
+  EXPECT_THROW(registry.Register(unnamed), Error);
+  RelationType costless = Link();
+  costless.make_cost = nullptr;
+  EXPECT_THROW(registry.Register(costless), Error);
+  RelationType rowless = Link();
+  rowless.residual_size = 0;
+  EXPECT_THROW(registry.Register(rowless), Error);
+  RelationType unrelated = Link();
+  unrelated.feature_types[1].clear();
+  EXPECT_THROW(registry.Register(unrelated), Error);
+  LossType loss;
+  loss.name = "nothing";
+  EXPECT_THROW(registry.Register(loss), Error);
+  DetectorType detector;
+  detector.name = "nothing";
+  EXPECT_THROW(registry.Register(detector), Error);
+}
+
+TEST(RegistryTest, UnknownNamesListTheNearestFirst) {
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  EXPECT_THAT(MessageOf([&] { registry.GetFeature("segmant"); }),
+              HasSubstr("unknown feature type 'segmant': expected one of "
+                        "segment, "));
+  EXPECT_THAT(MessageOf([&] { registry.GetRelation("pose_poes"); }),
+              HasSubstr("expected one of pose_pose, "));
+  EXPECT_THAT(MessageOf([&] { registry.GetLoss("hubert"); }),
+              HasSubstr("expected one of huber, "));
+  EXPECT_THAT(MessageOf([&] { registry.GetDetector("lines"); }),
+              HasSubstr("none is"));
+}
+
+TEST(RegistryTest, EverythingComesInTheOrderOfNames) {
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  std::vector<std::string> names;
+  for (const FeatureType* type : registry.features()) {
+    names.push_back(type->name);
+  }
+  EXPECT_THAT(names, ::testing::ElementsAre("circle", "line", "orientation",
+                                            "point", "pose", "segment"));
+}
+
+TEST(RegistryTest, GlobalIsOneInstance) {
+  EXPECT_EQ(&Registry::Global(), &Registry::Global());
+}
+
+class BuiltinsTest : public ::testing::Test {
+ protected:
+  BuiltinsTest() { RegisterBuiltinRelations(&registry_); }
+
+  Feature Make(const std::string& type, std::vector<double> parameters) const {
+    Feature feature;
+    feature.type = &registry_.GetFeature(type);
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      feature.parameters[i] = parameters[i];
+    }
+    return feature;
+  }
+
+  // Residual of a relation with the information's root the identity.
+  Eigen::VectorXd Residual(const std::string& name, const Eigen::VectorXd& u,
+                           const std::vector<Feature>& features) const {
+    const RelationType& relation = registry_.GetRelation(name);
+    RelationArguments arguments;
+    arguments.expected = u;
+    arguments.sqrt_information = Eigen::MatrixXd::Identity(
+        relation.residual_size, relation.residual_size);
+    std::vector<const double*> blocks;
+    for (const Feature& feature : features) {
+      arguments.features.push_back(&feature);
+      blocks.push_back(feature.data());
+    }
+    const auto cost = relation.make_cost(arguments);
+    EXPECT_EQ(cost->num_residuals(), relation.residual_size);
+    EXPECT_EQ(cost->parameter_block_sizes().size(), features.size());
+    for (std::size_t i = 0; i < features.size(); ++i) {
+      EXPECT_EQ(cost->parameter_block_sizes()[i], features[i].type->size);
+    }
+    Eigen::VectorXd residual(relation.residual_size);
+    EXPECT_TRUE(cost->Evaluate(blocks.data(), residual.data(), nullptr));
+    return residual;
+  }
+
+  static Eigen::VectorXd Numbers(const std::vector<double>& numbers) {
+    return Eigen::Map<const Eigen::VectorXd>(
+        numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+  }
+
+  Registry registry_;
+};
+
+TEST_F(BuiltinsTest, RegisteringTwiceDoesNothing) {
+  const FeatureType* point = registry_.FindFeature("point");
+  RegisterBuiltinRelations(&registry_);
+  EXPECT_EQ(registry_.FindFeature("point"), point);
+  EXPECT_EQ(registry_.relations().size(), 10u);
+  EXPECT_EQ(registry_.losses().size(), 7u);
+}
+
+TEST_F(BuiltinsTest, TagsOfG2o) {
+  EXPECT_EQ(registry_.FindFeatureByTag("VERTEX_XY"),
+            registry_.FindFeature("point"));
+  EXPECT_EQ(registry_.FindFeatureByTag("VERTEX_SE2"),
+            registry_.FindFeature("pose"));
+  EXPECT_EQ(registry_.FindRelationByTag("EDGE_SE2"),
+            registry_.FindRelation("pose_pose"));
+  EXPECT_EQ(registry_.FindRelationByTag("PLUMBLINE_SEGMENT_ORIENTATION"),
+            registry_.FindRelation("segment_orientation"));
+}
+
+TEST_F(BuiltinsTest, RelationsNameKnownFeatureTypes) {
+  for (const RelationType* relation : registry_.relations()) {
+    EXPECT_FALSE(relation->description.empty()) << relation->name;
+    for (const auto& names : relation->feature_types) {
+      for (const std::string& name : names) {
+        EXPECT_NE(registry_.FindFeature(name), nullptr)
+            << relation->name << ": " << name;
+      }
+    }
+  }
+}
+
+TEST_F(BuiltinsTest, EveryCombinationOfTypesMakesACost) {
+  for (const RelationType* relation : registry_.relations()) {
+    ASSERT_EQ(relation->feature_types.size(), 2u);
+    for (const std::string& first : relation->feature_types[0]) {
+      for (const std::string& second : relation->feature_types[1]) {
+        SCOPED_TRACE(relation->name + " " + first + " " + second);
+        const Eigen::VectorXd residual = Residual(
+            relation->name, Eigen::VectorXd::Zero(relation->residual_size),
+            {Make(first, {0.1, 0.2, 0.3}), Make(second, {1.0, 2.0, 3.0})});
+        EXPECT_TRUE(residual.allFinite());
+      }
+    }
+  }
+}
+
+TEST_F(BuiltinsTest, ValuesByHand) {
+  // A 3-4-5 triangle.
+  EXPECT_NEAR(
+      Residual("point_point_distance", Numbers({4.0}),
+               {Make("point", {1.0, 1.0}), Make("circle", {4.0, 5.0, 9.0})})[0],
+      1.0, 1e-12);
+  const Eigen::VectorXd coincidence =
+      Residual("point_point_coincidence", Numbers({0.0, 1.0}),
+               {Make("pose", {1.0, 1.0, 7.0}), Make("point", {4.0, 5.0})});
+  EXPECT_NEAR(coincidence[0], 3.0, 1e-12);
+  EXPECT_NEAR(coincidence[1], 3.0, 1e-12);
+  EXPECT_NEAR(
+      Residual("point_circle_distance", Numbers({0.0}),
+               {Make("point", {3.0, 4.0}), Make("circle", {0.0, 0.0, 2.0})})[0],
+      3.0, 1e-12);
+  // A quarter turn to the left, then one metre ahead is one metre along y.
+  const Eigen::VectorXd pose = Residual(
+      "pose_pose", Numbers({0.0, 0.0, 0.0}),
+      {Make("pose", {2.0, 3.0, kPi / 2}), Make("segment", {2.0, 4.0, kPi})});
+  EXPECT_NEAR(pose[0], 1.0, 1e-12);
+  EXPECT_NEAR(pose[1], 0.0, 1e-12);
+  EXPECT_NEAR(pose[2], kPi / 2, 1e-12);
+  // A wall seen from the other side has the same orientation.
+  EXPECT_NEAR(Residual("segment_orientation", Numbers({0.0}),
+                       {Make("segment", {5.0, 5.0, 0.1}),
+                        Make("orientation", {0.3 + kPi})})[0],
+              0.2, 1e-12);
+  EXPECT_NEAR(Residual("orientation_orientation", Numbers({kPi / 2}),
+                       {Make("orientation", {0.1}),
+                        Make("orientation", {0.15 - kPi / 2})})[0],
+              0.05, 1e-12);
+}
+
+TEST_F(BuiltinsTest, LinesAreRelativeToTheirAnchor) {
+  // The horizontal line y = 10 + 2 = 12, anchored at (100, 10).
+  Feature line = Make("line", {2.0, 0.0});
+  line.anchor = {100.0, 10.0};
+  EXPECT_NEAR(std::abs(Residual("point_line_distance", Numbers({0.0}),
+                                {Make("point", {3.0, 12.5}), line})[0]),
+              0.5, 1e-12);
+}
+
+TEST_F(BuiltinsTest, LossesAreScaledByTheChiSquareQuantile) {
+  const auto rho = [this](const std::string& name, double delta, int degrees,
+                          double s) {
+    const auto loss = registry_.GetLoss(name).make_loss(&delta, degrees);
+    std::array<double, 3> values{};
+    loss->Evaluate(s, values.data());
+    return values;
+  };
+  EXPECT_NEAR(rho("frozen", 0.25, 1, 8.0)[0], 2.0, 1e-12);
+  // Two degrees of freedom: weight exp(-s/2).
+  EXPECT_NEAR(rho("continuous", 1.0, 2, 3.0)[1], std::exp(-1.5), 1e-12);
+  // chi^2_1(0.95) = 3.841459: the weight of Huber falls below one there.
+  EXPECT_NEAR(rho("huber", 1.0, 1, 3.84)[1], 1.0, 1e-12);
+  EXPECT_NEAR(rho("huber", 1.0, 1, 4 * 3.841459)[1], 0.5, 1e-6);
+  EXPECT_NEAR(rho("cauchy", 1.0, 1, 3.841459)[1], 0.5, 1e-6);
+  // chi^2_2(0.95) = 5.991465.
+  EXPECT_NEAR(rho("cauchy", 1.0, 2, 5.991465)[1], 0.5, 1e-6);
+  EXPECT_NEAR(rho("geman_mcclure", 1.0, 1, 3.841459)[1], 0.25, 1e-6);
+  EXPECT_NEAR(rho("dcs", 1.0, 1, 3.84)[1], 1.0, 1e-6);
+  EXPECT_NEAR(rho("dcs", 1.0, 1, 3 * 3.841459)[1], 0.25, 1e-6);
+  // Tukey's biweight rejects past chi^2_1(1 - 1e-5) = 19.511421.
+  EXPECT_GT(rho("tukey", 1.0, 1, 19.5)[1], 0.0);
+  EXPECT_EQ(rho("tukey", 1.0, 1, 19.52)[1], 0.0);
+}
+
+TEST_F(BuiltinsTest, NoDegreesOfFreedomNoLoss) {
+  const double delta = 1.0;
+  for (const LossType* type : registry_.losses()) {
+    const auto loss = type->make_loss(&delta, 0);
+    if (loss == nullptr) continue;
+    std::array<double, 3> values{};
+    loss->Evaluate(0.0, values.data());
+    EXPECT_EQ(values[0], 0.0) << type->name;
+  }
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -1,0 +1,98 @@
+#ifndef PLUMBLINE_APPS_LOG_SOLVER_H_
+#define PLUMBLINE_APPS_LOG_SOLVER_H_
+
+#include <plumbline/core/em.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/core/session.h>
+#include <plumbline/frontend/map_builder.h>
+#include <plumbline/frontend/odometry_refinement.h>
+#include <plumbline/frontend/relocalization.h>
+#include <plumbline/frontend/scan.h>
+#include <plumbline/frontend/segment_extraction.h>
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+struct LogSolverOptions {
+  /// Find structure. False: measurements only.
+  bool structure = true;
+  /// Detectors by level (MakeHierarchy).
+  std::string hierarchy = "orientation_mixture/orientation_relation";
+  std::map<std::string, DetectorParameters> detector_parameters;
+  OdometryRefinementOptions odometry;
+  SegmentExtractionOptions segments;
+  MapBuilderOptions builder;
+  SessionOptions session;
+  EmOptions em;
+  RelocalizationOptions relocalization;
+  /// False: the trajectory is what it was when each scan came in.
+  bool relocalize = true;
+  /// Scans between EM steps while replaying; 0: only at the end.
+  int em_every = 50;
+  /// Constraints from the robot that an EM step while replaying reaches.
+  int em_depth = 3;
+  /// While the map has fewer features than this, EM steps take in all of it:
+  /// the first orientations come from few walls and are still to move.
+  int small_map = 150;
+};
+
+struct LogSolverResult {
+  /// One a scan of the log, map frame.
+  std::vector<Pose2> trajectory;
+  EmReport em;
+  CostReport initial_cost;
+  CostReport final_cost;
+  double frontend_seconds = 0.0;
+  double detect_seconds = 0.0;
+  double solve_seconds = 0.0;
+  double relocalization_seconds = 0.0;
+  /// Seconds that each scan took, EM steps included.
+  std::vector<float> scan_seconds;
+  std::int64_t key_scans = 0;
+  std::int64_t wide_searches = 0;
+  std::int64_t refused_matches = 0;
+  std::int64_t segment_matches = 0;
+  std::int64_t segments_created = 0;
+  /// Ended early because `stop` said so: what there is, is whole.
+  bool interrupted = false;
+};
+
+/// Replays a log: front-end, EM steps near the robot on the way, EM on the
+/// whole map at the end, and every scan found again on the final map.
+class LogSolver {
+ public:
+  /// The registry must outlive the solver and have the built-ins. Throws Error
+  /// when options do not fit.
+  LogSolver(const Registry& registry, const LogSolverOptions& options);
+  ~LogSolver();
+
+  /// `progress` (may be null) is called with the scans done and in all; `stop`
+  /// (may be null) ends the replay when it returns true.
+  LogSolverResult Run(
+      const Log& log,
+      const std::function<void(std::size_t, std::size_t)>& progress = nullptr,
+      const std::function<bool()>& stop = nullptr);
+
+  const Graph& graph() const { return graph_; }
+  const SolverSession& session() const { return *session_; }
+  /// Rows of em_trace.csv: the EM on the whole map at the end.
+  const std::vector<EmPhase>& trace() const { return trace_; }
+
+ private:
+  const Registry& registry_;
+  LogSolverOptions options_;
+  Graph graph_;
+  std::unique_ptr<SolverSession> session_;
+  std::unique_ptr<EmOrchestrator> em_;
+  std::vector<EmPhase> trace_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_APPS_LOG_SOLVER_H_

@@ -1,0 +1,432 @@
+#include <plumbline/frontend/localization.h>
+#include <plumbline/frontend/map_builder.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr char kSource[] = "frontend";
+
+// Nothing is learnt along a wall from a second look, m.
+constexpr double kUnknownAlong = 50.0;
+
+Eigen::Matrix3d Symmetric(const Eigen::Matrix3d& m) {
+  return 0.5 * (m + m.transpose());
+}
+
+// Turns a covariance between the axes of the map frame and those of a frame
+// with this heading.
+Eigen::Matrix3d ToFrame(const Eigen::Matrix3d& covariance, double heading) {
+  const double c = std::cos(heading);
+  const double s = std::sin(heading);
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  rotation.topLeftCorner<2, 2>() << c, s, -s, c;
+  return Symmetric(rotation * covariance * rotation.transpose());
+}
+
+Eigen::Matrix3d ObservationCovariance(const SegmentObservation& observation,
+                                      double along_sigma) {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  covariance(0, 0) = along_sigma * along_sigma;
+  covariance(1, 1) = observation.covariance(0, 0);
+  covariance(2, 2) = observation.covariance(1, 1);
+  covariance(1, 2) = covariance(2, 1) = observation.covariance(0, 1);
+  // From the segment's own axes to the robot's.
+  return ToFrame(covariance, -observation.pose[2]);
+}
+
+Pose2 PoseOf(const Feature& feature) {
+  return Pose2(feature.parameters[0], feature.parameters[1],
+               feature.parameters[2]);
+}
+
+// Distance from a point to the visible part of a segment.
+double DistanceTo(const Feature& feature, const Eigen::Vector2d& point) {
+  const double c = std::cos(feature.parameters[2]);
+  const double s = std::sin(feature.parameters[2]);
+  const double dx = point.x() - feature.parameters[0];
+  const double dy = point.y() - feature.parameters[1];
+  const double along = c * dx + s * dy;
+  const double across = -s * dx + c * dy;
+  const double beyond =
+      std::max({0.0, feature.extent_begin - along, along - feature.extent_end});
+  return std::hypot(beyond, across);
+}
+
+}  // namespace
+
+MapBuilder::MapBuilder(Graph* graph, const Registry& registry,
+                       const MapBuilderOptions& options)
+    : graph_(graph), registry_(registry), options_(options) {}
+
+void MapBuilder::Predict(const UncertainPose2& motion) {
+  const Eigen::Matrix3d j1 = ComposeJacobianFirst(robot_, motion.mean);
+  const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
+  const Eigen::Matrix3d added = j2 * motion.covariance * j2.transpose();
+  robot_ = Compose(robot_, motion.mean);
+  const Eigen::Vector2d position = robot_.head<2>();
+  for (auto it = links_.begin(); it != links_.end();) {
+    const Feature* feature = graph_->FindFeature(it->first);
+    if (feature == nullptr ||
+        DistanceTo(*feature, position) > options_.link_radius) {
+      it = links_.erase(it);
+      continue;
+    }
+    Eigen::Matrix3d& covariance = it->second.covariance;
+    covariance = Symmetric(j1 * covariance * j1.transpose() + added);
+    ++it;
+  }
+}
+
+std::vector<FeatureId> MapBuilder::Neighborhood(int depth) const {
+  std::map<FeatureId, int> distance;
+  std::vector<FeatureId> frontier;
+  for (const auto& link : links_) {
+    distance.emplace(link.first, 1);
+    frontier.push_back(link.first);
+  }
+  for (int d = 2; d <= depth; ++d) {
+    std::vector<FeatureId> next;
+    for (FeatureId id : frontier) {
+      for (ConstraintId cid : graph_->ConstraintsOf(id)) {
+        const Constraint& constraint = graph_->GetConstraint(cid);
+        if (constraint.kind != ConstraintClass::kMeasurement) continue;
+        for (FeatureId other : constraint.features) {
+          if (other == robot_id_) continue;
+          if (distance.emplace(other, d).second) next.push_back(other);
+        }
+      }
+    }
+    frontier = std::move(next);
+  }
+  if (robot_id_ != kNoId) distance.emplace(robot_id_, 0);
+  std::vector<FeatureId> ids;
+  for (const auto& entry : distance) ids.push_back(entry.first);
+  return ids;
+}
+
+void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
+                            const std::vector<SegmentObservation>& observations,
+                            const Pose2& start) {
+  KeyScanRecord record;
+  record.scan = scan;
+  if (records_.empty()) {
+    robot_ = start;
+  } else {
+    record.motion = motion;
+    Predict(motion);
+  }
+
+  // What may be seen: features near in the graph and within sight.
+  std::vector<AssociationCandidate> candidates;
+  Eigen::Matrix3d widest = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d tightest = Eigen::Matrix3d::Identity() * 1e6;
+  for (const auto& link : links_) {
+    if (link.second.covariance.trace() > widest.trace()) {
+      widest = link.second.covariance;
+    }
+    if (link.second.covariance.trace() < tightest.trace()) {
+      tightest = link.second.covariance;
+    }
+  }
+  for (FeatureId id : Neighborhood(options_.association_depth)) {
+    if (id == robot_id_) continue;
+    const Feature& feature = graph_->GetFeature(id);
+    if (feature.is_virtual) continue;
+    AssociationCandidate candidate;
+    candidate.feature = id;
+    candidate.pose = PoseOf(feature);
+    candidate.extent_begin = feature.extent_begin;
+    candidate.extent_end = feature.extent_end;
+    const auto link = links_.find(id);
+    candidate.robot_covariance =
+        link != links_.end() ? link->second.covariance : widest;
+    candidates.push_back(candidate);
+  }
+
+  std::vector<Association> associations =
+      Associate(robot_, observations, candidates, options_.association);
+  if (!associations.empty()) {
+    const Eigen::Matrix3d prior = tightest.inverse();
+    // Again from the corrected pose: what was at the edge of the gates may be
+    // in now, or out.
+    for (int round = 0; round < 2; ++round) {
+      const Localization localized =
+          LocalizeRobot(robot_, prior, observations, candidates, associations,
+                        options_.association);
+      if (round == 0) {
+        std::vector<Association> again = Associate(
+            localized.pose, observations, candidates, options_.association);
+        if (!again.empty()) {
+          associations = std::move(again);
+          continue;
+        }
+      }
+      robot_ = localized.pose;
+      for (auto& link : links_) {
+        Eigen::Matrix3d& covariance = link.second.covariance;
+        covariance =
+            Symmetric((covariance.inverse() + localized.observation_information)
+                          .inverse());
+      }
+      for (const Association& association : associations) {
+        const FeatureId id = candidates[association.candidate].feature;
+        const auto inserted = links_.emplace(id, Link());
+        if (inserted.second) {
+          inserted.first->second.covariance = Symmetric(
+              (widest.inverse() + localized.observation_information).inverse());
+        }
+        inserted.first->second.last_seen = scan;
+      }
+      break;
+    }
+  }
+
+  std::vector<bool> used(observations.size(), false);
+  for (const Association& association : associations) {
+    const SegmentObservation& observation =
+        observations[association.observation];
+    used[association.observation] = true;
+    FeatureMatch match;
+    match.feature = candidates[association.candidate].feature;
+    match.observation = observation;
+    Feature& feature = graph_->GetFeature(match.feature);
+    const Pose2 relative =
+        Between(PoseOf(feature), Compose(robot_, observation.pose));
+    feature.extent_begin =
+        std::min(feature.extent_begin, relative[0] - 0.5 * observation.length);
+    feature.extent_end =
+        std::max(feature.extent_end, relative[0] + 0.5 * observation.length);
+    ++feature.observations;
+    ++num_matches_;
+    record.matches.push_back(std::move(match));
+  }
+  SecondLook(record.matches);
+  Grow(observations, used, &record);
+  record.pose = robot_;
+  records_.push_back(std::move(record));
+}
+
+void MapBuilder::SecondLook(const std::vector<FeatureMatch>& matches) {
+  // The feature's frame as seen from the robot: the observation's line, at the
+  // feature's own place along it.
+  std::map<FeatureId, UncertainPose2> seen;
+  for (const FeatureMatch& match : matches) {
+    const Pose2 feature = PoseOf(graph_->GetFeature(match.feature));
+    const Pose2 observed = Compose(robot_, match.observation.pose);
+    const double along = Between(observed, feature)[0];
+    UncertainPose2 observation;
+    observation.mean = match.observation.pose;
+    observation.covariance =
+        ObservationCovariance(match.observation, kUnknownAlong);
+    UncertainPose2 shift;
+    shift.mean = Pose2(along, 0.0, 0.0);
+    const UncertainPose2 frame = Compose(observation, shift);
+    const auto inserted = seen.emplace(match.feature, frame);
+    if (!inserted.second &&
+        frame.covariance(2, 2) < inserted.first->second.covariance(2, 2)) {
+      inserted.first->second = frame;
+    }
+  }
+  for (const auto& entry : seen) {
+    for (ConstraintId id : graph_->ConstraintsOf(entry.first)) {
+      const Constraint& constraint = graph_->GetConstraint(id);
+      if (constraint.features[0] != entry.first ||
+          constraint.features.size() != 2 ||
+          constraint.kind != ConstraintClass::kMeasurement) {
+        continue;
+      }
+      const auto other = seen.find(constraint.features[1]);
+      if (other == seen.end()) continue;
+      const UncertainPose2 relation =
+          Compose(Inverse(entry.second), other->second);
+      const Eigen::Matrix3d information =
+          options_.second_look_weight *
+          Symmetric(relation.covariance.inverse());
+      const Eigen::Matrix3d before = constraint.information;
+      const double floor_position =
+          options_.relation_floor_position * options_.relation_floor_position;
+      const double floor_angle =
+          options_.relation_floor_angle * options_.relation_floor_angle;
+      if (before(2, 2) > 1.0 / floor_angle ||
+          std::max(before(0, 0), before(1, 1)) > 1.0 / floor_position) {
+        continue;
+      }
+      const Eigen::Matrix3d fused = Symmetric(before + information);
+      Eigen::Vector3d difference = relation.mean - constraint.expected;
+      difference[2] = NormalizeAngle(difference[2]);
+      // Not the same walls, or badly seen: a relation does not jump.
+      if (difference.dot(information * difference) > 9.0) continue;
+      Eigen::Vector3d expected =
+          constraint.expected + fused.inverse() * (information * difference);
+      expected[2] = NormalizeAngle(expected[2]);
+      graph_->UpdateConstraint(id, expected, fused);
+    }
+  }
+}
+
+void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
+                      const std::vector<bool>& used, KeyScanRecord* record) {
+  std::vector<int> fresh;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (!used[i]) fresh.push_back(static_cast<int>(i));
+  }
+  if (fresh.empty()) return;
+  const FeatureType& segment_type = registry_.GetFeature("segment");
+  const RelationType& relation = registry_.GetRelation("pose_pose");
+
+  // The links that tell most about where the robot is.
+  std::vector<std::pair<double, FeatureId>> anchors;
+  for (const auto& link : links_) {
+    const Eigen::Matrix3d& c = link.second.covariance;
+    anchors.emplace_back(c(0, 0) + c(1, 1) + 9.0 * c(2, 2), link.first);
+  }
+  std::sort(anchors.begin(), anchors.end());
+  if (static_cast<int>(anchors.size()) > options_.links_per_feature) {
+    anchors.resize(options_.links_per_feature);
+  }
+
+  Transaction transaction;
+  std::vector<FeatureId> provisional;
+  // The first scan's best segment fixes the gauge.
+  int gauge = -1;
+  if (links_.empty() && num_created_ == 0) {
+    for (int index : fresh) {
+      if (gauge < 0 ||
+          observations[index].length > observations[gauge].length) {
+        gauge = index;
+      }
+    }
+  }
+  for (std::size_t k = 0; k < fresh.size(); ++k) {
+    const SegmentObservation& observation = observations[fresh[k]];
+    const Pose2 pose = Compose(robot_, observation.pose);
+    Feature feature;
+    feature.type = &segment_type;
+    feature.parameters = {pose[0], pose[1], pose[2]};
+    feature.extent_begin = -0.5 * observation.length;
+    feature.extent_end = 0.5 * observation.length;
+    feature.observations = 1;
+    feature.source = kSource;
+    feature.fixed = fresh[k] == gauge;
+    const FeatureId id = transaction.AddFeature(feature);
+    const Eigen::Matrix3d observation_covariance =
+        ObservationCovariance(observation, options_.along_sigma);
+
+    // Relations to what the robot is linked to share the robot's error: each
+    // gets its share of the information, so together they do not claim more
+    // than one (covariance intersection).
+    for (const auto& anchor : anchors) {
+      const Link& link = links_.at(anchor.second);
+      const Pose2 other = PoseOf(graph_->GetFeature(anchor.second));
+      const Eigen::Matrix3d j1 = ComposeJacobianFirst(robot_, observation.pose);
+      const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
+      const Eigen::Matrix3d covariance =
+          j1 * link.covariance * j1.transpose() +
+          j2 * observation_covariance * j2.transpose();
+      Constraint constraint;
+      constraint.type = &relation;
+      constraint.features = {anchor.second, id};
+      constraint.expected = Between(other, pose);
+      constraint.information =
+          Symmetric(ToFrame(covariance, other[2]).inverse()) /
+          static_cast<double>(anchors.size());
+      constraint.source = kSource;
+      transaction.AddConstraint(std::move(constraint));
+    }
+    // Relations within the scan have no robot in between.
+    std::vector<std::pair<double, std::size_t>> neighbors;
+    for (std::size_t j = 0; j < k; ++j) {
+      neighbors.emplace_back(
+          (observations[fresh[j]].pose.head<2>() - observation.pose.head<2>())
+              .norm(),
+          j);
+    }
+    std::sort(neighbors.begin(), neighbors.end());
+    if (static_cast<int>(neighbors.size()) > options_.links_within_scan) {
+      neighbors.resize(options_.links_within_scan);
+    }
+    for (const auto& neighbor : neighbors) {
+      const SegmentObservation& other = observations[fresh[neighbor.second]];
+      const UncertainPose2 first{
+          other.pose, ObservationCovariance(other, options_.along_sigma)};
+      const UncertainPose2 second{observation.pose, observation_covariance};
+      const UncertainPose2 between = Compose(Inverse(first), second);
+      Constraint constraint;
+      constraint.type = &relation;
+      constraint.features = {provisional[neighbor.second], id};
+      constraint.expected = between.mean;
+      constraint.information = Symmetric(between.covariance.inverse()) / 2.0;
+      constraint.source = kSource;
+      transaction.AddConstraint(std::move(constraint));
+    }
+    provisional.push_back(id);
+  }
+  const TransactionResult result = graph_->Apply(std::move(transaction));
+  for (std::size_t k = 0; k < fresh.size(); ++k) {
+    const SegmentObservation& observation = observations[fresh[k]];
+    // The robot relative to the new feature: only the observation's error.
+    const Pose2 inverse = Inverse(observation.pose);
+    (void)inverse;
+    Link link;
+    const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
+    const Eigen::Matrix3d j1 = ComposeJacobianFirst(robot_, observation.pose);
+    // r = f (-) o to first order: J1 dr = -J2 do.
+    const Eigen::Matrix3d j = j1.inverse() * j2;
+    link.covariance =
+        Symmetric(j * ObservationCovariance(observation, options_.along_sigma) *
+                  j.transpose());
+    link.last_seen = record->scan;
+    links_.emplace(result.features[k], link);
+    FeatureMatch match;
+    match.feature = result.features[k];
+    match.observation = observation;
+    record->matches.push_back(std::move(match));
+    ++num_created_;
+  }
+}
+
+void MapBuilder::WriteRobot() {
+  Transaction transaction;
+  FeatureId robot = robot_id_;
+  if (robot == kNoId) {
+    Feature feature;
+    feature.type = &registry_.GetFeature("pose");
+    feature.source = kSource;
+    feature.parameters = {robot_[0], robot_[1], robot_[2]};
+    robot = transaction.AddFeature(feature);
+  } else {
+    for (ConstraintId id : graph_->ConstraintsOf(robot_id_)) {
+      transaction.RemoveConstraint(id);
+    }
+    Feature& feature = graph_->GetFeature(robot_id_);
+    feature.parameters = {robot_[0], robot_[1], robot_[2]};
+  }
+  const RelationType& relation = registry_.GetRelation("pose_pose");
+  for (const auto& link : links_) {
+    const Pose2 other = PoseOf(graph_->GetFeature(link.first));
+    Constraint constraint;
+    constraint.type = &relation;
+    constraint.features = {link.first, robot};
+    constraint.expected = Between(other, robot_);
+    constraint.information =
+        Symmetric(ToFrame(link.second.covariance, other[2]).inverse()) /
+        static_cast<double>(links_.size());
+    constraint.source = kSource;
+    transaction.AddConstraint(std::move(constraint));
+  }
+  const TransactionResult result = graph_->Apply(std::move(transaction));
+  if (robot_id_ == kNoId) robot_id_ = result.features.front();
+}
+
+void MapBuilder::ReadRobot() {
+  if (robot_id_ == kNoId) return;
+  robot_ = PoseOf(graph_->GetFeature(robot_id_));
+  robot_[2] = NormalizeAngle(robot_[2]);
+}
+
+}  // namespace plumbline

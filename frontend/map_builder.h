@@ -1,0 +1,121 @@
+#ifndef PLUMBLINE_FRONTEND_MAP_BUILDER_H_
+#define PLUMBLINE_FRONTEND_MAP_BUILDER_H_
+
+#include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/association.h>
+#include <plumbline/frontend/segment_extraction.h>
+
+#include <Eigen/Core>
+#include <map>
+#include <vector>
+
+namespace plumbline {
+
+struct MapBuilderOptions {
+  /// Links from the robot to features farther away are cut, m.
+  double link_radius = 10.0;
+  /// Constraints from the robot that association may go along: 1 looks at the
+  /// linked features only.
+  int association_depth = 3;
+  AssociationOptions association;
+  /// A new feature is bound to so many features that the robot is linked to,
+  /// and to so many new ones of its own scan.
+  int links_per_feature = 5;
+  int links_within_scan = 3;
+  /// Standard deviation of a segment's position along itself in the scan that
+  /// makes it a feature, m. The position is chosen there, so it is small.
+  double along_sigma = 0.01;
+  /// A second look at two features measures their relation anew; such looks
+  /// share errors, so each counts by this much.
+  double second_look_weight = 0.2;
+  /// A relation does not get more certain than this by second looks: across
+  /// (m) and direction (rad).
+  double relation_floor_position = 0.005;
+  double relation_floor_angle = DegToRad(0.1);
+};
+
+/// One observation that was recognized as a feature.
+struct FeatureMatch {
+  FeatureId feature = kNoId;
+  SegmentObservation observation;
+};
+
+/// What is remembered of a key scan: enough to find its pose again when the
+/// map has moved.
+struct KeyScanRecord {
+  /// Index of the scan in the log.
+  int scan = 0;
+  /// Motion since the key scan before, in that scan's frame.
+  UncertainPose2 motion;
+  /// Pose (map frame) as it was when the scan came in.
+  Pose2 pose = Pose2::Zero();
+  /// Recognized features, and those that this scan made.
+  std::vector<FeatureMatch> matches;
+};
+
+/// Grows a graph of segments from scans (method.md, section 7, steps 1 to 4):
+/// predicts, associates by distance in the graph, corrects the robot alone,
+/// adds what is new. Only the last robot pose is kept; what the poses before
+/// it knew is in the relations between features.
+class MapBuilder {
+ public:
+  /// The graph and registry must outlive the builder; the graph may have
+  /// features already.
+  MapBuilder(Graph* graph, const Registry& registry,
+             const MapBuilderOptions& options);
+
+  /// Takes a key scan: `motion` since the last one (ignored for the first,
+  /// which starts at `start`), and what it saw.
+  void AddKeyScan(int scan, const UncertainPose2& motion,
+                  const std::vector<SegmentObservation>& observations,
+                  const Pose2& start);
+
+  /// Writes the robot and its links into the graph as it stands now, so that
+  /// a solve carries the robot along with what it is linked to.
+  void WriteRobot();
+  /// Takes the robot's pose back from the graph after a solve.
+  void ReadRobot();
+
+  /// Features that the robot is linked to and those they are bound to, up to
+  /// `depth` constraints from the robot, and the robot, ascending.
+  std::vector<FeatureId> Neighborhood(int depth) const;
+
+  const Pose2& robot() const { return robot_; }
+  FeatureId robot_id() const { return robot_id_; }
+  const std::vector<KeyScanRecord>& records() const { return records_; }
+  /// Observations that matched a feature, and that made one, so far.
+  std::int64_t num_matches() const { return num_matches_; }
+  std::int64_t num_created() const { return num_created_; }
+
+ private:
+  // Link from the robot to a feature.
+  struct Link {
+    // Covariance of the robot's pose relative to the feature, in the axes of
+    // the map frame.
+    Eigen::Matrix3d covariance;
+    int last_seen;
+  };
+
+  void Predict(const UncertainPose2& motion);
+  void Correct(const std::vector<Association>& associations,
+               const std::vector<SegmentObservation>& observations);
+  void SecondLook(const std::vector<FeatureMatch>& matches);
+  void Grow(const std::vector<SegmentObservation>& observations,
+            const std::vector<bool>& used, KeyScanRecord* record);
+
+  Graph* graph_;
+  const Registry& registry_;
+  MapBuilderOptions options_;
+  Pose2 robot_ = Pose2::Zero();
+  FeatureId robot_id_ = kNoId;
+  std::map<FeatureId, Link> links_;
+  std::vector<KeyScanRecord> records_;
+  std::int64_t num_matches_ = 0;
+  std::int64_t num_created_ = 0;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_MAP_BUILDER_H_

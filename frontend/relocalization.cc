@@ -1,0 +1,128 @@
+#include <ceres/ceres.h>
+#include <plumbline/core/error.h>
+#include <plumbline/factors/information.h>
+#include <plumbline/factors/pose_pose.h>
+#include <plumbline/factors/pose_segment_collinearity.h>
+#include <plumbline/frontend/relocalization.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <map>
+
+namespace plumbline {
+
+std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
+                                      const std::vector<KeyScanRecord>& records,
+                                      const RelocalizationOptions& options) {
+  std::vector<Pose2> poses;
+  poses.reserve(records.size());
+  for (const KeyScanRecord& record : records) poses.push_back(record.pose);
+  if (records.empty()) return poses;
+
+  std::map<FeatureId, Pose2> features;
+  ceres::Problem::Options problem_options;
+  problem_options.disable_all_safety_checks = true;
+  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(problem_options);
+  ceres::CauchyLoss loss(options.loss_scale);
+
+  bool anchored = false;
+  for (std::size_t k = 0; k < records.size(); ++k) {
+    const KeyScanRecord& record = records[k];
+    problem.AddParameterBlock(poses[k].data(), 3);
+    if (k > 0) {
+      problem.AddResidualBlock(
+          PosePose::Create(record.motion.mean, SqrtInformationFromCovariance(
+                                                   record.motion.covariance)),
+          nullptr, poses[k - 1].data(), poses[k].data());
+    }
+    for (const FeatureMatch& match : record.matches) {
+      const Feature* feature = graph.FindFeature(match.feature);
+      if (feature == nullptr) continue;
+      const auto inserted = features.emplace(
+          match.feature, Pose2(feature->parameters[0], feature->parameters[1],
+                               feature->parameters[2]));
+      Pose2& segment = inserted.first->second;
+      // The observed line in the robot's frame: offset of the robot's origin
+      // from it, and heading of the robot against it (Eq. 20).
+      const Pose2& observed = match.observation.pose;
+      const Pose2 inverse = Inverse(observed);
+      const Eigen::Vector2d expected(inverse[1], inverse[2]);
+      Eigen::Matrix2d covariance = match.observation.covariance;
+      covariance(0, 0) +=
+          options.feature_offset_sigma * options.feature_offset_sigma;
+      covariance(1, 1) +=
+          options.feature_angle_sigma * options.feature_angle_sigma;
+      // Offset and direction are independent at the middle of the piece; at
+      // the robot's foot point the direction moves the offset.
+      Eigen::Matrix2d lever;
+      lever << 1.0, inverse[0], 0.0, 1.0;
+      const Eigen::Matrix2d at_robot = lever * covariance * lever.transpose();
+      problem.AddResidualBlock(
+          PoseSegmentCollinearity::Create(
+              expected, SqrtInformationFromCovariance(at_robot)),
+          &loss, poses[k].data(), segment.data());
+      anchored = true;
+    }
+  }
+  for (auto& entry : features) {
+    problem.SetParameterBlockConstant(entry.second.data());
+  }
+  if (!anchored) {
+    problem.SetParameterBlockConstant(poses.front().data());
+    // Nothing to find the poses on: odometry as it stands.
+    return poses;
+  }
+
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  solver.max_num_iterations = options.max_iterations;
+  solver.num_threads = options.num_threads;
+  solver.initial_trust_region_radius = 1e8;
+  solver.function_tolerance = 1e-7;
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  if (!summary.IsSolutionUsable()) {
+    throw PLUMBLINE_ERROR("relocalization failed: " + summary.message,
+                          "a usable solution");
+  }
+  for (Pose2& pose : poses) pose[2] = NormalizeAngle(pose[2]);
+  return poses;
+}
+
+std::vector<Pose2> InterpolateScans(const std::vector<RefinedScan>& refined,
+                                    const std::vector<KeyScanRecord>& records,
+                                    const std::vector<Pose2>& key_poses) {
+  std::vector<Pose2> poses(refined.size(), Pose2::Zero());
+  for (std::size_t k = 0; k < records.size(); ++k) {
+    const std::size_t begin = records[k].scan;
+    const bool last = k + 1 == records.size();
+    const std::size_t end = last ? refined.size() : records[k + 1].scan;
+    poses[begin] = key_poses[k];
+    // What refined odometry misses at the next key, in that key's frame.
+    Pose2 missing = Pose2::Zero();
+    double whole = 0.0;
+    std::vector<double> way(end - begin, 0.0);
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      const Pose2 step = Between(refined[i - 1].pose, refined[i].pose);
+      // A turn on the spot counts as way too.
+      whole += step.head<2>().norm() + 0.5 * std::abs(step[2]);
+      way[i - begin] = whole;
+    }
+    if (!last) {
+      const Pose2 step = Between(refined[end - 1].pose, refined[end].pose);
+      whole += step.head<2>().norm() + 0.5 * std::abs(step[2]);
+      missing = Between(Compose(key_poses[k], refined[end].since_key.mean),
+                        key_poses[k + 1]);
+    }
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      const double share = whole > 0.0 ? way[i - begin] / whole : 0.0;
+      poses[i] = Compose(Compose(key_poses[k], refined[i].since_key.mean),
+                         Pose2(share * missing));
+    }
+  }
+  return poses;
+}
+
+}  // namespace plumbline

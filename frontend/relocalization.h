@@ -1,0 +1,41 @@
+#ifndef PLUMBLINE_FRONTEND_RELOCALIZATION_H_
+#define PLUMBLINE_FRONTEND_RELOCALIZATION_H_
+
+#include <plumbline/core/graph.h>
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/map_builder.h>
+#include <plumbline/frontend/odometry_refinement.h>
+
+#include <vector>
+
+namespace plumbline {
+
+struct RelocalizationOptions {
+  /// How well the map's walls are in place: offset (m) and direction (rad),
+  /// added to each observation's own covariance.
+  double feature_offset_sigma = 0.03;
+  double feature_angle_sigma = DegToRad(0.7);
+  /// Scale of the Cauchy loss on an observation, in sigmas.
+  double loss_scale = 2.0;
+  int max_iterations = 30;
+  int num_threads = 1;
+};
+
+/// Finds every key scan's pose again on the final map: refined odometry from
+/// key to key, and each recognized segment on its feature, whose place is held
+/// constant. Returns the poses (map frame) in the order of records. Throws
+/// Error when the solve fails.
+std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
+                                      const std::vector<KeyScanRecord>& records,
+                                      const RelocalizationOptions& options);
+
+/// Poses of all scans: key scans as given, the scans between them by refined
+/// odometry, with what is missing at the next key spread over the way.
+/// `refined` has one entry a scan of the log.
+std::vector<Pose2> InterpolateScans(const std::vector<RefinedScan>& refined,
+                                    const std::vector<KeyScanRecord>& records,
+                                    const std::vector<Pose2>& key_poses);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_RELOCALIZATION_H_

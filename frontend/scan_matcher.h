@@ -1,0 +1,104 @@
+#ifndef PLUMBLINE_FRONTEND_SCAN_MATCHER_H_
+#define PLUMBLINE_FRONTEND_SCAN_MATCHER_H_
+
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/scan_points.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace plumbline {
+
+struct ScanMatcherOptions {
+  /// Standard deviation of a return across its surface, m: noise of the
+  /// laser and roughness of the wall together.
+  double point_sigma = 0.03;
+  /// A return counts as so many independent ones in the covariance: returns
+  /// on one surface share the surface's own errors.
+  double independence = 0.3;
+  /// Farthest a return may lie from the reference point it is matched with,
+  /// m: at first, and when the pose has settled.
+  double initial_radius = 0.4;
+  double final_radius = 0.15;
+  int max_iterations = 20;
+  /// A step smaller than this (m, and rad) ends the iteration.
+  double convergence = 1e-4;
+  /// Correlative search: cell size (m), step of the search in translation (m)
+  /// and rotation (rad).
+  double grid_resolution = 0.1;
+  double search_step = 0.15;
+  double rotation_step = DegToRad(1.0);
+};
+
+/// What the matcher knew before: the motion model's pose and its information.
+struct MatchPrior {
+  Pose2 pose = Pose2::Zero();
+  /// Inverse covariance in the frame of `pose`'s parent (m, m, rad).
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+};
+
+struct MatchResult {
+  Pose2 pose = Pose2::Zero();
+  /// Covariance from the returns and the prior together: large along a
+  /// corridor, where only the prior speaks.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  /// Information of the returns alone; rank deficient along a corridor.
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  /// Share of the returns, of those that look at where the reference has
+  /// something, that found a partner.
+  double inlier_ratio = 0.0;
+  int inliers = 0;
+  /// Mean robust cost of a return in squared sigmas, unmatched ones at the
+  /// bound: comparable between poses of one scan against one reference.
+  double cost = 0.0;
+};
+
+/// Matches a scan to a set of reference points: a correlative search over
+/// rotation and translation for the neighbourhood of the right pose, then
+/// robust point to line least squares. Not thread safe.
+class ScanMatcher {
+ public:
+  explicit ScanMatcher(const ScanMatcherOptions& options);
+
+  /// Sets the reference: points and normals in the frame in which poses are
+  /// given. Points need no order. Cost: linear in the points and in the cells
+  /// of their bounding box.
+  void SetReference(std::vector<ScanPoint> points);
+  bool empty() const { return reference_.empty(); }
+
+  /// Point to line refinement of a pose near the truth.
+  MatchResult Refine(const std::vector<ScanPoint>& scan, const Pose2& guess,
+                     const MatchPrior& prior) const;
+
+  /// Best pose on a lattice around `center`: translations up to
+  /// `translation_window` (m) each way, rotations up to `rotation_window`
+  /// (rad) each way. `score`, if not null, gets the mean likelihood of a
+  /// return there, in [0, 1].
+  Pose2 Search(const std::vector<ScanPoint>& scan, const Pose2& center,
+               double translation_window, double rotation_window,
+               double* score) const;
+
+ private:
+  int NearestReference(const Eigen::Vector2d& point,
+                       const Eigen::Vector2d& normal, double radius) const;
+
+  ScanMatcherOptions options_;
+  std::vector<ScanPoint> reference_;
+  // Buckets of reference points, by counting sort over cells.
+  double bucket_size_ = 0.2;
+  Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
+  int bucket_columns_ = 0;
+  int bucket_rows_ = 0;
+  std::vector<int> bucket_begin_;
+  // Likelihood field of the reference for the search, made at its first use.
+  mutable std::vector<std::uint8_t> field_;
+  mutable int field_columns_ = 0;
+  mutable int field_rows_ = 0;
+  mutable bool field_valid_ = false;
+  void BuildField() const;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_SCAN_MATCHER_H_

@@ -1,0 +1,49 @@
+#ifndef PLUMBLINE_FRONTEND_SCAN_POINTS_H_
+#define PLUMBLINE_FRONTEND_SCAN_POINTS_H_
+
+#include <plumbline/frontend/scan.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace plumbline {
+
+struct ScanPointsOptions {
+  /// Returns farther away are left out, m: far beams graze the walls.
+  double usable_range = 50.0;
+  /// Returns nearer than this are the robot itself, m.
+  double minimum_range = 0.1;
+  /// Two neighbouring returns farther apart than this, or than
+  /// `gap_factor` times the distance that beams spread at their range on a
+  /// wall seen at 45 degrees, do not lie on one surface, m.
+  double gap = 0.15;
+  double gap_factor = 3.0;
+  /// Half the length along the surface over which a normal is fitted, m.
+  double normal_radius = 0.25;
+  /// Standard deviation of a fitted surface's points, m, above which the
+  /// point has no normal.
+  double normal_tolerance = 0.04;
+};
+
+/// One return of a scan.
+struct ScanPoint {
+  /// In the robot's frame, m.
+  Eigen::Vector2d position;
+  /// Unit normal of the surface, towards the laser, in the robot's frame; zero
+  /// when the surface around the point is not straight.
+  Eigen::Vector2d normal;
+  /// Distance from the laser, m.
+  double range;
+  /// Index of the beam.
+  int beam;
+};
+
+/// The returns of a scan in the order of beams, with the normals of the
+/// surfaces that they lie on (total least squares over neighbouring returns).
+/// `points` is overwritten; its capacity is kept, so reuse it in loops.
+void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
+                       std::vector<ScanPoint>* points);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_SCAN_POINTS_H_

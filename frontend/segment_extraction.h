@@ -1,0 +1,55 @@
+#ifndef PLUMBLINE_FRONTEND_SEGMENT_EXTRACTION_H_
+#define PLUMBLINE_FRONTEND_SEGMENT_EXTRACTION_H_
+
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/scan_points.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace plumbline {
+
+struct SegmentExtractionOptions {
+  /// A segment has at least so many returns and is at least so long, m.
+  int min_points = 6;
+  double min_length = 0.4;
+  /// Farthest that a return may lie off its segment, m.
+  double split_distance = 0.06;
+  /// Neighbouring returns farther apart than this, or than `gap_factor` times
+  /// the distance that beams spread, end a segment, m.
+  double gap = 0.25;
+  double gap_factor = 3.0;
+  /// Noise of one return across a wall, m: the smaller of this and the fit's
+  /// own scatter is not believed.
+  double point_sigma = 0.015;
+  /// What more returns do not average out (calibration, rough walls): offset
+  /// of a segment, m, and bend over its length, m.
+  double bias_sigma = 0.008;
+  /// rad.
+  double angle_bias_sigma = DegToRad(0.15);
+};
+
+/// A straight piece of wall as one scan sees it, in the robot's frame. Its
+/// direction is such that the laser is on its left, so the two faces of a thin
+/// wall have opposite directions.
+struct SegmentObservation {
+  /// Middle of the piece and direction.
+  Pose2 pose = Pose2::Zero();
+  /// m.
+  double length = 0.0;
+  int points = 0;
+  /// Covariance (2x2; m, rad) of the offset across and of the direction, at the
+  /// middle, where the two are independent. Nothing is known along.
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+};
+
+/// Cuts a scan into straight pieces: split at the farthest return, fit by total
+/// least squares, merge what fits one line. `points` are in the order of beams
+/// (ExtractScanPoints); `laser` is the laser's position in their frame.
+std::vector<SegmentObservation> ExtractSegments(
+    const std::vector<ScanPoint>& points, const Eigen::Vector2d& laser,
+    double angle_step, const SegmentExtractionOptions& options);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_SEGMENT_EXTRACTION_H_

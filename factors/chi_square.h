@@ -140,7 +140,7 @@ inline double ChiSquarePValue(double s, int k) {
       return std::exp(-x);
     case 3:
       return std::min(1.0, std::erfc(std::sqrt(x)) +
-                               std::sqrt(4.0 * x / kPi) * std::exp(-x));
+                               2.0 * std::sqrt(x / kPi) * std::exp(-x));
     case 4:
       return std::min(1.0, (1.0 + x) * std::exp(-x));
     default:

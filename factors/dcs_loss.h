@@ -21,7 +21,7 @@ namespace plumbline {
 /// its integral; weighting s by the squared scale itself, as is sometimes done,
 /// is not a loss: its derivative is negative beyond phi. All outputs are finite
 /// for every s >= 0. Source: Agarwal, Tipaldi, Spinello, Stachniss, Burgard,
-/// Robust map optimization using dynamic covariance scaling, ICRA 2013, Eq. 15.
+/// Robust map optimization using dynamic covariance scaling, ICRA 2013.
 class DcsLoss final : public ceres::LossFunction {
  public:
   /// `phi`: squared whitened residual up to which the loss is quadratic. Throws

@@ -609,8 +609,7 @@ class CarmenReader {
         report.reason =
             "laser pose that is not at a fixed place on the robot (a corrected "
             "log?): the robot pose alone is used";
-        report.count = static_cast<std::int64_t>(apart.empty() ? offsets.size()
-                                                               : apart.size());
+        report.count = static_cast<std::int64_t>(offsets.size());
         for (std::size_t i = 0; i < apart.size() && i < 5; ++i)
           report.first_lines.push_back(log_.scans[apart[i]].line);
         log_.skipped.push_back(report);

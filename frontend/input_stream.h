@@ -15,6 +15,8 @@ namespace plumbline {
 ///
 /// Compressed data that breaks off or is corrupt ends the input there: what
 /// was unpacked before is read as usual and damage() then says what happened.
+/// Checksums stand at the end of a block, so the last bytes before corrupt
+/// data ends may be wrong themselves.
 class InputStream {
  public:
   /// Longest line that is accepted, bytes.

@@ -1,0 +1,234 @@
+// Drives a robot with a laser and drifting odometry through a synthetic
+// building and writes what it measures as a CARMEN log, with the truth.
+
+#include <gflags/gflags.h>
+#include <plumbline/apps/app.h>
+#include <plumbline/apps/progress.h>
+#include <plumbline/apps/simulator.h>
+#include <plumbline/apps/world.h>
+#include <plumbline/core/atomic_file.h>
+#include <plumbline/core/error.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace {
+
+const plumbline::LaserOptions kLaser;
+const plumbline::OdometryOptions kOdometry;
+const plumbline::DriveOptions kDrive;
+
+}  // namespace
+
+DEFINE_string(world, "", "office, killian_like or a world file.");
+DEFINE_uint64(seed, 1,
+              "Draws the dimensions of a built-in world, the sway of the robot "
+              "and all noise.");
+DEFINE_double(size, 1.0,
+              "Multiplies the blocks of a built-in world both ways.");
+PLUMBLINE_FLAG_RANGE(size, 0.01, 100);
+DEFINE_double(rotation, 0.0, "Turns the whole world by so many degrees.");
+PLUMBLINE_FLAG_RANGE(rotation, -360, 360);
+
+DEFINE_string(output, "", "Log to write; gzip when the name ends in .gz.");
+DEFINE_string(truth, "", "Where to write walls and poses as JSON.");
+DEFINE_string(relations, "",
+              "Where to write exact displacements between scans.");
+DEFINE_string(save_world, "",
+              "Where to write the world itself as a world file.");
+
+DEFINE_int32(beams, kLaser.beams,
+             "Beams: 180 or 181 (1 degree), 360 or 361 (half).");
+PLUMBLINE_FLAG_CHOICES(beams, "180", "181", "360", "361");
+DEFINE_double(maximum_range, kLaser.maximum_range,
+              "m; farther away there is no return.");
+PLUMBLINE_FLAG_RANGE(maximum_range, 0.5, 80);
+DEFINE_double(range_noise, kLaser.noise, "Standard deviation of a range, m.");
+PLUMBLINE_FLAG_RANGE(range_noise, 0, 1);
+DEFINE_double(range_noise_per_metre, kLaser.noise_per_metre,
+              "What every metre of range adds to the deviation, m.");
+PLUMBLINE_FLAG_RANGE(range_noise_per_metre, 0, 1);
+DEFINE_double(missing, kLaser.missing,
+              "Probability that a beam gets no return.");
+PLUMBLINE_FLAG_RANGE(missing, 0, 1);
+DEFINE_double(laser_offset, kLaser.offset,
+              "Laser in front of the robot's centre, m.");
+PLUMBLINE_FLAG_RANGE(laser_offset, -1, 1);
+
+DEFINE_double(odometry_scale, kOdometry.scale, "Relative error of distances.");
+PLUMBLINE_FLAG_RANGE(odometry_scale, -0.5, 0.5);
+DEFINE_double(odometry_turn_scale, kOdometry.turn_scale,
+              "Relative error of turns.");
+PLUMBLINE_FLAG_RANGE(odometry_turn_scale, -0.5, 0.5);
+DEFINE_double(odometry_heading_bias, kOdometry.heading_bias_deg,
+              "Degrees that the heading turns away every metre.");
+PLUMBLINE_FLAG_RANGE(odometry_heading_bias, -10, 10);
+DEFINE_double(odometry_noise, kOdometry.noise,
+              "Standard deviation of a distance of 1 m, m; grows with the root "
+              "of the distance.");
+PLUMBLINE_FLAG_RANGE(odometry_noise, 0, 1);
+DEFINE_double(odometry_heading_noise, kOdometry.heading_noise_deg,
+              "Standard deviation of the heading after 1 m, degrees; grows "
+              "with the root of the distance.");
+PLUMBLINE_FLAG_RANGE(odometry_heading_noise, 0, 20);
+DEFINE_double(odometry_turn_noise, kOdometry.turn_noise_deg,
+              "Standard deviation of a turn of 1 degree, degrees; grows with "
+              "the root of the turn.");
+PLUMBLINE_FLAG_RANGE(odometry_turn_noise, 0, 5);
+
+DEFINE_double(speed, kDrive.speed, "m/s on straight ways.");
+PLUMBLINE_FLAG_RANGE(speed, 0.05, 3);
+DEFINE_double(turn_rate, kDrive.turn_rate, "rad/s at most.");
+PLUMBLINE_FLAG_RANGE(turn_rate, 0.05, 3);
+DEFINE_double(sway, kDrive.sway,
+              "Standard deviation of disturbances of the turn rate, rad/s.");
+PLUMBLINE_FLAG_RANGE(sway, 0, 0.5);
+DEFINE_double(scan_rate, kDrive.scan_rate, "Scans a second.");
+PLUMBLINE_FLAG_RANGE(scan_rate, 1, 50);
+
+namespace plumbline {
+namespace {
+
+bool EndsWith(const std::string& text, const std::string& ending) {
+  return text.size() >= ending.size() &&
+         text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+World LoadWorld() {
+  const std::vector<std::string>& names = BuiltInWorlds();
+  if (std::find(names.begin(), names.end(), FLAGS_world) != names.end()) {
+    return MakeWorld(FLAGS_world, FLAGS_seed, FLAGS_size);
+  }
+  std::ifstream file(FLAGS_world);
+  // A directory opens but does not read.
+  if (!file || (file.peek(), file.bad())) {
+    throw Error(
+        "--world", 0,
+        "'" + FLAGS_world + "' is no built-in world and no readable file",
+        "office, killian_like or a world file");
+  }
+  return ReadWorld(file, FLAGS_world);
+}
+
+SimulatorOptions OptionsFromFlags() {
+  SimulatorOptions options;
+  options.laser.beams = FLAGS_beams;
+  options.laser.maximum_range = FLAGS_maximum_range;
+  options.laser.noise = FLAGS_range_noise;
+  options.laser.noise_per_metre = FLAGS_range_noise_per_metre;
+  options.laser.missing = FLAGS_missing;
+  options.laser.offset = FLAGS_laser_offset;
+  options.odometry.scale = FLAGS_odometry_scale;
+  options.odometry.turn_scale = FLAGS_odometry_turn_scale;
+  options.odometry.heading_bias_deg = FLAGS_odometry_heading_bias;
+  options.odometry.noise = FLAGS_odometry_noise;
+  options.odometry.heading_noise_deg = FLAGS_odometry_heading_noise;
+  options.odometry.turn_noise_deg = FLAGS_odometry_turn_noise;
+  options.drive.speed = FLAGS_speed;
+  options.drive.turn_rate = FLAGS_turn_rate;
+  options.drive.sway = FLAGS_sway;
+  options.drive.scan_rate = FLAGS_scan_rate;
+  return options;
+}
+
+// What the log says about itself: everything that made it, no file names.
+std::string Provenance() {
+  std::string text = "plumbline_simulate --world=" +
+                     FLAGS_world.substr(FLAGS_world.rfind('/') + 1) +
+                     " --seed=" + std::to_string(FLAGS_seed);
+  for (const FlagValue& flag : ChangedFlags()) {
+    if (flag.type != "string" && flag.name != "seed" && flag.name != "quiet") {
+      text += " --" + flag.name + "=" + flag.value;
+    }
+  }
+  return text;
+}
+
+int Run() {
+  if (FLAGS_world.empty() || FLAGS_output.empty()) {
+    throw Error("plumbline_simulate", 0, "a flag is missing",
+                "--world and --output (--help explains them)");
+  }
+  World world = LoadWorld();
+  RotateWorld(FLAGS_rotation, &world);
+  if (!FLAGS_save_world.empty()) {
+    WriteFileAtomically(FLAGS_save_world, [&](std::ostream& output) {
+      output << "# " << Provenance() << '\n';
+      WriteWorld(world, output);
+    });
+  }
+  SimulatorOptions options = OptionsFromFlags();
+  Progress progress("simulating", "per mille", 1000);
+  options.progress = [&progress](double share) {
+    progress.Update(static_cast<std::int64_t>(1000 * share));
+    return !InterruptRequested();
+  };
+  const Simulation simulation = Simulate(world, options, FLAGS_seed);
+  progress.Finish();
+
+  WriteFileAtomically(FLAGS_output, [&](std::ostream& output) {
+    if (!EndsWith(FLAGS_output, ".gz")) {
+      WriteCarmenLog(simulation, options.laser, {Provenance()}, output);
+      return;
+    }
+    std::ostringstream text;
+    WriteCarmenLog(simulation, options.laser, {Provenance()}, text);
+    output << GzipCompress(text.str());
+  });
+  if (!FLAGS_truth.empty()) {
+    WriteFileAtomically(FLAGS_truth, [&](std::ostream& output) {
+      WriteTruth(simulation, output);
+    });
+  }
+  if (!FLAGS_relations.empty()) {
+    WriteFileAtomically(FLAGS_relations, [&](std::ostream& output) {
+      WriteRelations(simulation, FLAGS_seed, output);
+    });
+  }
+  std::size_t scans = 0;
+  double way = 0.0;
+  for (std::size_t i = 0; i < simulation.states.size(); ++i) {
+    const SimulatedState& state = simulation.states[i];
+    if (!state.ranges.empty()) ++scans;
+    if (i > 0) {
+      way += (state.pose - simulation.states[i - 1].pose).head<2>().norm();
+    }
+  }
+  const SimulatedState& last = simulation.states.back();
+  std::cout << scans << " scans on " << static_cast<int>(way + 0.5)
+            << " m; odometry ends "
+            << (last.pose - last.odometry).head<2>().norm() << " m off\n";
+  return kExitSuccess;
+}
+
+}  // namespace
+}  // namespace plumbline
+
+int main(int argc, char** argv) {
+  plumbline::AppInfo info;
+  info.name = "plumbline_simulate";
+  info.summary =
+      "Drives a robot with a laser and drifting odometry through a synthetic "
+      "building and writes a CARMEN log, with the true walls and poses. The "
+      "same flags give the same files.";
+  info.usage = {"--world=NAME_OR_FILE --output=LOG [flags]"};
+  info.example =
+      "plumbline_simulate --world=office --seed=7 --output=office.clf "
+      "--truth=office.truth.json";
+  info.groups = {
+      {"World", {"world", "seed", "size", "rotation"}},
+      {"Output", {"output", "truth", "relations", "save_world", "quiet"}},
+      {"Laser",
+       {"beams", "maximum_range", "range_noise", "range_noise_per_metre",
+        "missing", "laser_offset"}},
+      {"Odometry",
+       {"odometry_scale", "odometry_turn_scale", "odometry_heading_bias",
+        "odometry_noise", "odometry_heading_noise", "odometry_turn_noise"}},
+      {"Drive", {"speed", "turn_rate", "sway", "scan_rate"}}};
+  plumbline::ParseFlags(info, argc, argv);
+  return plumbline::RunMain(plumbline::Run);
+}

@@ -16,9 +16,13 @@ struct SessionOptions {
   int max_iterations = 50;
   /// Relative change of the cost at which a solve ends.
   double function_tolerance = 1e-8;
-  /// Warm starts want near Gauss-Newton steps (performance.md).
-  double initial_trust_region_radius = 1e16;
-  /// Threads of residual evaluation. Results do not depend on it.
+  /// Damping of the steps is its inverse, relative to the scale of each
+  /// parameter, and never gets smaller: large for near Gauss-Newton steps from
+  /// warm starts, small enough that undetermined directions stay put.
+  double initial_trust_region_radius = 1e10;
+  /// Threads of residual evaluation in global solves. With more than one, Ceres
+  /// adds up costs in any order: results agree to rounding only, the same bytes
+  /// come with one thread. Residuals are not where the time goes.
   int num_threads = 1;
 };
 
@@ -42,8 +46,14 @@ struct SolveReport {
   std::string message;
 };
 
+/// Smallest weight that an E-step gives to a live structure constraint. With a
+/// weight of exactly zero, a virtual feature whose constraints are all bad
+/// would be held by nothing and could never be pulled back by them; this much
+/// moves nothing else.
+constexpr double kDeltaFloor = 1e-6;
+
 /// Sums of s_c(x) = |r|^2 over live constraints: measurements unweighted,
-/// structure weighted as in the last solve (sum of rho(s)).
+/// structure weighted as in a solve at the present deltas (sum of rho(s)).
 struct CostReport {
   double measurement = 0.0;
   double structure = 0.0;
@@ -61,29 +71,39 @@ class SolverSession : public GraphListener {
                 const SessionOptions& options);
   ~SolverSession() override;
 
-  /// Optimizes every feature that is not fixed. A graph without a fixed
-  /// feature has no gauge: the feature with the lowest id of the lowest level
-  /// is held for the solve. Parameters are left as they were when the solve
-  /// fails (usable is false).
+  /// Optimizes every feature that is not fixed and has a live constraint. A
+  /// connected part of the graph without a fixed feature (and without a
+  /// relation of a single feature) has no gauge: its feature with the lowest id
+  /// of the lowest level is held for the solve. What is undetermined all the
+  /// same (a segment along its wall, a rotation about a held point) stays where
+  /// it is, up to rounding. Angles are wrapped to (-pi, pi] after a solve.
+  /// Parameters are left as they were when the solve fails (usable is false).
   SolveReport SolveGlobal();
 
-  /// Optimizes the given features (unknown and fixed ones are passed over)
-  /// with every other feature constant. Costs what these features and their
-  /// constraints cost, whatever the size of the graph.
+  /// Optimizes the given features (unknown and fixed ones, and those without a
+  /// live constraint, are passed over) with every other feature constant. Costs
+  /// what these features and their constraints cost, whatever the size of the
+  /// graph. Features that nothing around them holds have no gauge: then the
+  /// lowest of them is held as in SolveGlobal.
   SolveReport SolveLocal(const std::vector<FeatureId>& features);
 
-  /// Whitened squared residual s_c at the present state, unweighted.
+  /// Whitened squared residual s_c at the present state, unweighted; infinite
+  /// when it cannot be evaluated. Here and below, `constraint` is one of the
+  /// graph, live or broken.
   double SquaredResidual(const Constraint& constraint) const;
   /// Error e_c = f(x) (-) u in the units of the relation, not whitened.
   Eigen::VectorXd Error(const Constraint& constraint) const;
   /// Chi-square p-value of the residual with the rank of the information as
-  /// degrees of freedom, at the present state.
+  /// degrees of freedom, at the present state; 1 for a rank of 0.
   double Delta(const Constraint& constraint) const;
-  /// Writes Delta() to every live structure constraint on `features`, or of
-  /// the whole graph when null.
+  /// The E-step: writes Delta(), and at least kDeltaFloor, to every live
+  /// structure constraint on `features`, or of the whole graph when null. No
+  /// weight freezes for good: Delta() is that of the unweighted residual.
   void UpdateDeltas(const std::vector<FeatureId>* features = nullptr);
 
-  CostReport Cost() const;
+  /// Cost at the present state of the whole graph, or of the live constraints
+  /// on `features`.
+  CostReport Cost(const std::vector<FeatureId>* features = nullptr) const;
 
   const SessionOptions& options() const;
   /// Sums over all solves so far.

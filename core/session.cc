@@ -1,0 +1,625 @@
+#include <ceres/ceres.h>
+#include <dlfcn.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/session.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/factors/chi_square.h>
+#include <plumbline/factors/information.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Ceres' other ways to stop. A change of parameters is judged relative to the
+// norm of the whole state: far from the origin its default would stop at
+// centimetres.
+constexpr double kParameterTolerance = 1e-12;
+// A factorization that fails halves the radius and tries again; the default of
+// 5 tries does not get far enough.
+constexpr int kMaxInvalidSteps = 20;
+// Rows times squared columns below which a dense solve is done before a sparse
+// one has been set up.
+constexpr double kDenseWork = 3e5;
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+      .count();
+}
+
+// Some builds of CHOLMOD start a hard-coded number of OpenMP threads whatever
+// the machine, which makes factorizations slower. While this lives, OpenMP
+// regions started by this thread run on this thread. OpenMP is looked up at run
+// time: it is there only if the linear algebra library brought it along.
+class SerialOpenMp {
+ public:
+  SerialOpenMp() {
+    static const auto get = reinterpret_cast<int (*)()>(
+        dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"));
+    static const auto set = reinterpret_cast<void (*)(int)>(
+        dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
+    if (get == nullptr || set == nullptr) return;
+    set_ = set;
+    old_levels_ = get();
+    set_(0);
+  }
+  SerialOpenMp(const SerialOpenMp&) = delete;
+  SerialOpenMp& operator=(const SerialOpenMp&) = delete;
+  ~SerialOpenMp() {
+    if (set_ != nullptr) set_(old_levels_);
+  }
+
+ private:
+  void (*set_)(int) = nullptr;
+  int old_levels_ = 0;
+};
+
+ceres::Problem::Options ProblemOptions(bool fast_removal) {
+  ceres::Problem::Options options;
+  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.enable_fast_removal = fast_removal;
+  // The graph has checked sizes and that blocks differ.
+  options.disable_all_safety_checks = true;
+  return options;
+}
+
+// The fastest that is there: measured on pose graphs of 10^3 to 10^4 poses,
+// thin or not, it is CHOLMOD.
+ceres::SparseLinearAlgebraLibraryType SparseLibrary() {
+  return ceres::IsSparseLinearAlgebraLibraryTypeAvailable(ceres::SUITE_SPARSE)
+             ? ceres::SUITE_SPARSE
+             : ceres::EIGEN_SPARSE;
+}
+
+// What the session knows of a feature type.
+struct TypeInfo {
+  std::unique_ptr<ceres::Manifold> manifold;
+  // Indices of the parameters that are angles (named with the unit rad).
+  std::vector<int> angles;
+};
+
+bool EndsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() &&
+         text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+TypeInfo MakeTypeInfo(const FeatureType& type) {
+  TypeInfo info;
+  if (type.make_manifold) info.manifold = type.make_manifold();
+  for (std::size_t i = 0; i < type.parameter_names.size(); ++i) {
+    if (EndsWith(type.parameter_names[i], " rad")) {
+      info.angles.push_back(static_cast<int>(i));
+    }
+  }
+  return info;
+}
+
+struct Block {
+  Feature* feature = nullptr;
+  TypeInfo* type = nullptr;
+  // Live constraints on it; in the problem while there are some.
+  int residuals = 0;
+  // As the problem has it.
+  bool constant = false;
+};
+
+struct Residual {
+  std::unique_ptr<ceres::CostFunction> cost;
+  std::unique_ptr<ceres::LossFunction> loss;
+  // Null while the constraint is not live.
+  ceres::ResidualBlockId id = nullptr;
+  // Rank of the information.
+  int degrees_of_freedom = 0;
+};
+
+// Disjoint sets with path halving; the root of a set is its smallest index.
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t size) : parents_(size) {
+    std::iota(parents_.begin(), parents_.end(), std::size_t{0});
+  }
+  std::size_t Find(std::size_t i) {
+    while (parents_[i] != i) {
+      parents_[i] = parents_[parents_[i]];
+      i = parents_[i];
+    }
+    return i;
+  }
+  void Join(std::size_t i, std::size_t j) {
+    i = Find(i);
+    j = Find(j);
+    parents_[std::max(i, j)] = std::min(i, j);
+  }
+
+ private:
+  std::vector<std::size_t> parents_;
+};
+
+}  // namespace
+
+struct SolverSession::Impl {
+  Impl(Graph* graph_in, const Registry& registry,
+       const SessionOptions& options_in)
+      : graph(graph_in),
+        options(options_in),
+        loss_type(registry.GetLoss(options_in.delta_mode)),
+        problem(ProblemOptions(/*fast_removal=*/true)) {
+    totals.usable = true;
+    totals.converged = true;
+  }
+
+  TypeInfo* InfoOf(const FeatureType* type) {
+    const auto found = types.find(type);
+    if (found != types.end()) return &found->second;
+    return &types.emplace(type, MakeTypeInfo(*type)).first->second;
+  }
+
+  RelationArguments ArgumentsOf(const Constraint& constraint) const {
+    RelationArguments arguments;
+    arguments.expected = constraint.expected;
+    for (const FeatureId id : constraint.features) {
+      arguments.features.push_back(&std::as_const(*graph).GetFeature(id));
+    }
+    return arguments;
+  }
+
+  std::unique_ptr<ceres::CostFunction> MakeCost(
+      const Constraint& constraint) const {
+    RelationArguments arguments = ArgumentsOf(constraint);
+    arguments.sqrt_information = SqrtInformation(constraint.information);
+    return constraint.type->make_cost(arguments);
+  }
+
+  Residual& ResidualOf(ConstraintId id) { return *residuals[id]; }
+
+  void AddFeature(Feature* feature) {
+    const std::size_t index = static_cast<std::size_t>(feature->id);
+    if (blocks.size() <= index) blocks.resize(index + 1);
+    blocks[index].feature = feature;
+    blocks[index].type = InfoOf(feature->type);
+  }
+
+  void AddConstraint(const Constraint& constraint) {
+    const std::size_t index = static_cast<std::size_t>(constraint.id);
+    if (residuals.size() <= index) residuals.resize(index + 1);
+    auto residual = std::make_unique<Residual>();
+    residual->cost = MakeCost(constraint);
+    residual->degrees_of_freedom = InformationRank(constraint.information);
+    if (constraint.kind == ConstraintClass::kStructure) {
+      residual->loss =
+          loss_type.make_loss(&constraint.delta, residual->degrees_of_freedom);
+    }
+    residuals[index] = std::move(residual);
+    if (constraint.state == ConstraintState::kLive) AddResidual(constraint);
+  }
+
+  void AddResidual(const Constraint& constraint) {
+    Residual& residual = ResidualOf(constraint.id);
+    std::vector<double*> parameters;
+    parameters.reserve(constraint.features.size());
+    for (const FeatureId id : constraint.features) {
+      Block& block = blocks[id];
+      if (block.residuals++ == 0) {
+        problem.AddParameterBlock(block.feature->data(),
+                                  block.feature->type->size,
+                                  block.type->manifold.get());
+        block.constant = false;
+      }
+      parameters.push_back(block.feature->data());
+    }
+    residual.id = problem.AddResidualBlock(residual.cost.get(),
+                                           residual.loss.get(), parameters);
+  }
+
+  void RemoveResidual(const Constraint& constraint) {
+    Residual& residual = ResidualOf(constraint.id);
+    problem.RemoveResidualBlock(residual.id);
+    residual.id = nullptr;
+    for (const FeatureId id : constraint.features) {
+      Block& block = blocks[id];
+      if (--block.residuals == 0) {
+        problem.RemoveParameterBlock(block.feature->data());
+      }
+    }
+  }
+
+  void SetConstant(Block* block, bool constant) {
+    if (block->constant == constant) return;
+    block->constant = constant;
+    if (constant) {
+      problem.SetParameterBlockConstant(block->feature->data());
+    } else {
+      problem.SetParameterBlockVariable(block->feature->data());
+    }
+  }
+
+  // The features to hold because nothing else ties their part of the graph to
+  // the plane: in every connected part without a fixed feature and without a
+  // relation of one feature alone (which refers to the plane itself), the one
+  // with the lowest id of the lowest level.
+  std::vector<Block*> GaugeBlocks() {
+    DisjointSets parts(blocks.size());
+    std::vector<bool> is_tied(blocks.size(), false);
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      if (residuals[i] == nullptr || residuals[i]->id == nullptr) continue;
+      const std::vector<FeatureId>& features =
+          graph->FindConstraint(static_cast<ConstraintId>(i))->features;
+      if (features.size() == 1) is_tied[features[0]] = true;
+      for (std::size_t j = 1; j < features.size(); ++j) {
+        parts.Join(static_cast<std::size_t>(features[0]),
+                   static_cast<std::size_t>(features[j]));
+      }
+    }
+    std::vector<Block*> lowest(blocks.size(), nullptr);
+    std::vector<bool> has_gauge(blocks.size(), false);
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      Block& block = blocks[i];
+      if (block.residuals == 0) continue;
+      const std::size_t part = parts.Find(i);
+      if (block.feature->fixed || is_tied[i]) has_gauge[part] = true;
+      if (lowest[part] == nullptr ||
+          block.feature->level < lowest[part]->feature->level) {
+        lowest[part] = &block;
+      }
+    }
+    std::vector<Block*> held;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (lowest[i] != nullptr && !has_gauge[i]) held.push_back(lowest[i]);
+    }
+    return held;
+  }
+
+  // Ids of the live constraints on `features`, ascending.
+  std::vector<ConstraintId> LiveConstraintsOn(
+      const std::vector<FeatureId>& features) const {
+    std::vector<ConstraintId> ids;
+    for (const FeatureId feature : features) {
+      if (graph->FindFeature(feature) == nullptr) continue;
+      for (const ConstraintId id : graph->ConstraintsOf(feature)) {
+        if (graph->FindConstraint(id)->state == ConstraintState::kLive) {
+          ids.push_back(id);
+        }
+      }
+    }
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return ids;
+  }
+
+  // Runs Ceres on a problem of which `variables` are the blocks that vary;
+  // `rows` and `columns` are the size of its Jacobian.
+  SolveReport Solve(ceres::Problem* solved,
+                    const std::vector<Block*>& variables, int num_residuals,
+                    int rows, int columns, int num_threads,
+                    std::chrono::steady_clock::time_point start) {
+    SolveReport report;
+    report.residual_blocks = num_residuals;
+    report.variable_blocks = static_cast<int>(variables.size());
+    if (variables.empty()) {
+      report.usable = true;
+      report.converged = true;
+    } else {
+      ceres::Solver::Options solver;
+      solver.max_num_iterations = options.max_iterations;
+      solver.function_tolerance = options.function_tolerance;
+      solver.parameter_tolerance = kParameterTolerance;
+      solver.initial_trust_region_radius = options.initial_trust_region_radius;
+      solver.max_trust_region_radius = std::max(
+          solver.max_trust_region_radius, options.initial_trust_region_radius);
+      solver.max_num_consecutive_invalid_steps = kMaxInvalidSteps;
+      solver.num_threads = num_threads;
+      solver.logging_type = ceres::SILENT;
+      if (static_cast<double>(rows) * columns * columns <= kDenseWork) {
+        solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+        solver.dense_linear_algebra_library_type = ceres::EIGEN;
+      } else {
+        solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+        solver.sparse_linear_algebra_library_type = SparseLibrary();
+      }
+      const SerialOpenMp serial;
+      ceres::Solver::Summary summary;
+      ceres::Solve(solver, solved, &summary);
+      report.usable = summary.IsSolutionUsable();
+      report.converged = summary.termination_type == ceres::CONVERGENCE;
+      report.iterations = static_cast<int>(summary.iterations.size()) - 1;
+      report.initial_cost = summary.initial_cost;
+      report.final_cost = summary.final_cost;
+      report.evaluation_seconds = summary.residual_evaluation_time_in_seconds +
+                                  summary.jacobian_evaluation_time_in_seconds;
+      report.linear_solver_seconds = summary.linear_solver_time_in_seconds;
+      if (report.usable) {
+        for (const Block* block : variables) {
+          for (const int i : block->type->angles) {
+            double& angle = block->feature->parameters[i];
+            angle = NormalizeAngle(angle);
+          }
+        }
+      } else {
+        report.message = summary.message;
+      }
+    }
+    report.total_seconds = SecondsSince(start);
+    report.setup_seconds =
+        std::max(0.0, report.total_seconds - report.evaluation_seconds -
+                          report.linear_solver_seconds);
+    AddToTotals(report);
+    return report;
+  }
+
+  void AddToTotals(const SolveReport& report) {
+    ++num_solves;
+    totals.usable = totals.usable && report.usable;
+    totals.converged = totals.converged && report.converged;
+    totals.iterations += report.iterations;
+    totals.initial_cost += report.initial_cost;
+    totals.final_cost += report.final_cost;
+    totals.residual_blocks += report.residual_blocks;
+    totals.variable_blocks += report.variable_blocks;
+    totals.evaluation_seconds += report.evaluation_seconds;
+    totals.linear_solver_seconds += report.linear_solver_seconds;
+    totals.setup_seconds += report.setup_seconds;
+    totals.total_seconds += report.total_seconds;
+    if (!report.message.empty()) totals.message = report.message;
+  }
+
+  // Residual of a constraint of the graph under any cost function of its
+  // relation; false when it cannot be evaluated.
+  bool Evaluate(const Constraint& constraint, const ceres::CostFunction& cost,
+                double* residual) const {
+    constexpr std::size_t kUsualArity = 4;
+    const double* usual[kUsualArity];
+    std::vector<const double*> unusual;
+    const double** parameters = usual;
+    const std::size_t arity = constraint.features.size();
+    if (arity > kUsualArity) {
+      unusual.resize(arity);
+      parameters = unusual.data();
+    }
+    for (std::size_t i = 0; i < arity; ++i) {
+      parameters[i] =
+          std::as_const(*graph).GetFeature(constraint.features[i]).data();
+    }
+    return cost.Evaluate(parameters, residual, nullptr);
+  }
+
+  double SquaredResidual(const Constraint& constraint) const {
+    Eigen::VectorXd whitened(constraint.type->residual_size);
+    const bool evaluated =
+        Evaluate(constraint, *residuals[constraint.id]->cost, whitened.data());
+    const double squared = whitened.squaredNorm();
+    // A residual that cannot be evaluated is as wrong as can be.
+    if (!evaluated || std::isnan(squared)) {
+      return std::numeric_limits<double>::infinity();
+    }
+    return squared;
+  }
+
+  double Delta(const Constraint& constraint) const {
+    const int degrees = residuals[constraint.id]->degrees_of_freedom;
+    if (degrees < 1) return 1.0;
+    return ChiSquarePValue(SquaredResidual(constraint), degrees);
+  }
+
+  void UpdateDelta(Constraint* constraint) const {
+    if (constraint->kind != ConstraintClass::kStructure ||
+        constraint->state != ConstraintState::kLive) {
+      return;
+    }
+    constraint->delta = std::max(Delta(*constraint), kDeltaFloor);
+  }
+
+  void AddCost(const Constraint& constraint, CostReport* report) const {
+    if (constraint.state != ConstraintState::kLive) return;
+    const double squared = SquaredResidual(constraint);
+    if (constraint.kind == ConstraintClass::kMeasurement) {
+      report->measurement += squared;
+      return;
+    }
+    const ceres::LossFunction* loss = residuals[constraint.id]->loss.get();
+    if (loss == nullptr) {
+      report->structure += squared;
+      return;
+    }
+    double rho[3];
+    loss->Evaluate(squared, rho);
+    report->structure += rho[0];
+  }
+
+  Graph* graph;
+  SessionOptions options;
+  const LossType& loss_type;
+  // Costs, losses and manifolds must outlive the problem: it comes last.
+  std::map<const FeatureType*, TypeInfo> types;
+  std::vector<Block> blocks;
+  std::vector<std::unique_ptr<Residual>> residuals;
+  SolveReport totals;
+  int num_solves = 0;
+  ceres::Problem problem;
+};
+
+SolverSession::SolverSession(Graph* graph, const Registry& registry,
+                             const SessionOptions& options)
+    : impl_(std::make_unique<Impl>(graph, registry, options)) {
+  for (Feature* feature : graph->MutableFeatures()) impl_->AddFeature(feature);
+  for (const Constraint* constraint : graph->Constraints()) {
+    impl_->AddConstraint(*constraint);
+  }
+  graph->AddListener(this);
+}
+
+SolverSession::~SolverSession() { impl_->graph->RemoveListener(this); }
+
+SolveReport SolverSession::SolveGlobal() {
+  const auto start = std::chrono::steady_clock::now();
+  for (Block& block : impl_->blocks) {
+    if (block.residuals > 0) impl_->SetConstant(&block, block.feature->fixed);
+  }
+  for (Block* block : impl_->GaugeBlocks()) impl_->SetConstant(block, true);
+  std::vector<Block*> variables;
+  int columns = 0;
+  for (Block& block : impl_->blocks) {
+    if (block.residuals == 0 || block.constant) continue;
+    variables.push_back(&block);
+    columns += block.feature->type->size;
+  }
+  return impl_->Solve(&impl_->problem, variables,
+                      impl_->problem.NumResidualBlocks(),
+                      impl_->problem.NumResiduals(), columns,
+                      impl_->options.num_threads, start);
+}
+
+SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<FeatureId> ids;
+  for (const FeatureId id : features) {
+    const Feature* feature = impl_->graph->FindFeature(id);
+    if (feature == nullptr || feature->fixed ||
+        impl_->blocks[id].residuals == 0)
+      continue;
+    ids.push_back(id);
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  const std::vector<ConstraintId> constraints = impl_->LiveConstraintsOn(ids);
+
+  ceres::Problem problem(ProblemOptions(/*fast_removal=*/false));
+  for (const FeatureId id : ids) {
+    const Block& block = impl_->blocks[id];
+    problem.AddParameterBlock(block.feature->data(), block.feature->type->size,
+                              block.type->manifold.get());
+  }
+  std::vector<FeatureId> neighbours;
+  std::vector<double*> parameters;
+  bool is_tied = false;
+  int rows = 0;
+  for (const ConstraintId id : constraints) {
+    const Constraint& constraint = *impl_->graph->FindConstraint(id);
+    parameters.clear();
+    for (const FeatureId feature : constraint.features) {
+      parameters.push_back(impl_->blocks[feature].feature->data());
+      if (!std::binary_search(ids.begin(), ids.end(), feature)) {
+        neighbours.push_back(feature);
+      }
+    }
+    is_tied = is_tied || constraint.features.size() == 1;
+    rows += constraint.type->residual_size;
+    const Residual& residual = impl_->ResidualOf(id);
+    problem.AddResidualBlock(residual.cost.get(), residual.loss.get(),
+                             parameters);
+  }
+  for (const FeatureId id : neighbours) {
+    problem.SetParameterBlockConstant(impl_->blocks[id].feature->data());
+  }
+  std::vector<Block*> variables;
+  int columns = 0;
+  for (const FeatureId id : ids) {
+    variables.push_back(&impl_->blocks[id]);
+    columns += variables.back()->feature->type->size;
+  }
+  if (neighbours.empty() && !is_tied && !variables.empty()) {
+    // Nothing around them holds these features: the gauge is theirs.
+    const auto lowest = std::min_element(
+        variables.begin(), variables.end(), [](const Block* a, const Block* b) {
+          return a->feature->level < b->feature->level;
+        });
+    problem.SetParameterBlockConstant((*lowest)->feature->data());
+    columns -= (*lowest)->feature->type->size;
+    variables.erase(lowest);
+  }
+  return impl_->Solve(&problem, variables, static_cast<int>(constraints.size()),
+                      rows, columns, /*num_threads=*/1, start);
+}
+
+double SolverSession::SquaredResidual(const Constraint& constraint) const {
+  return impl_->SquaredResidual(constraint);
+}
+
+Eigen::VectorXd SolverSession::Error(const Constraint& constraint) const {
+  RelationArguments arguments = impl_->ArgumentsOf(constraint);
+  const int size = constraint.type->residual_size;
+  arguments.sqrt_information = Eigen::MatrixXd::Identity(size, size);
+  const auto cost = constraint.type->make_cost(arguments);
+  Eigen::VectorXd error(size);
+  if (!impl_->Evaluate(constraint, *cost, error.data())) {
+    error.setConstant(std::numeric_limits<double>::infinity());
+  }
+  return error;
+}
+
+double SolverSession::Delta(const Constraint& constraint) const {
+  return impl_->Delta(constraint);
+}
+
+void SolverSession::UpdateDeltas(const std::vector<FeatureId>* features) {
+  if (features == nullptr) {
+    for (Constraint* constraint : impl_->graph->MutableConstraints()) {
+      impl_->UpdateDelta(constraint);
+    }
+    return;
+  }
+  for (const ConstraintId id : impl_->LiveConstraintsOn(*features)) {
+    impl_->UpdateDelta(impl_->graph->FindConstraint(id));
+  }
+}
+
+CostReport SolverSession::Cost(const std::vector<FeatureId>* features) const {
+  CostReport report;
+  if (features == nullptr) {
+    for (const Constraint* constraint :
+         std::as_const(*impl_->graph).Constraints()) {
+      impl_->AddCost(*constraint, &report);
+    }
+    return report;
+  }
+  for (const ConstraintId id : impl_->LiveConstraintsOn(*features)) {
+    impl_->AddCost(*impl_->graph->FindConstraint(id), &report);
+  }
+  return report;
+}
+
+const SessionOptions& SolverSession::options() const { return impl_->options; }
+const SolveReport& SolverSession::totals() const { return impl_->totals; }
+int SolverSession::num_solves() const { return impl_->num_solves; }
+
+void SolverSession::OnFeatureAdded(const Feature& feature) {
+  impl_->AddFeature(&impl_->graph->GetFeature(feature.id));
+}
+
+void SolverSession::OnFeatureRemoved(const Feature& feature) {
+  impl_->blocks[feature.id] = Block();
+}
+
+void SolverSession::OnConstraintAdded(const Constraint& constraint) {
+  impl_->AddConstraint(constraint);
+}
+
+void SolverSession::OnConstraintChanged(const Constraint& constraint) {
+  Residual& residual = impl_->ResidualOf(constraint.id);
+  std::unique_ptr<ceres::CostFunction> cost = impl_->MakeCost(constraint);
+  const bool is_live = residual.id != nullptr;
+  if (is_live) impl_->RemoveResidual(constraint);
+  residual.cost = std::move(cost);
+  residual.degrees_of_freedom = InformationRank(constraint.information);
+  if (is_live) impl_->AddResidual(constraint);
+}
+
+void SolverSession::OnConstraintRetired(const Constraint& constraint) {
+  const Residual* residual = impl_->residuals[constraint.id].get();
+  if (residual != nullptr && residual->id != nullptr) {
+    impl_->RemoveResidual(constraint);
+  }
+  // Broken ones keep their cost: what they would say is asked for later.
+  if (impl_->graph->FindConstraint(constraint.id) == nullptr) {
+    impl_->residuals[constraint.id].reset();
+  }
+}
+
+}  // namespace plumbline

@@ -560,7 +560,16 @@ std::string PutInMetres(const std::string& svg, const Layout& layout,
                 "viewBox=\"0 0 %.0f %.0f\">",
                 left, -top, width, height, layout.width, layout.height);
   header += numbers;
-  return svg.substr(0, begin) + header + svg.substr(end + 1) + "</svg>\n";
+  std::string body = svg.substr(end + 1);
+  // Cairo counts the surfaces of the process in this id, to which nothing
+  // refers; the bytes must not depend on what was drawn before.
+  const std::string id = "id=\"surface";
+  const std::size_t number = body.find(id);
+  if (number != std::string::npos) {
+    const std::size_t quote = body.find('"', number + id.size());
+    body.replace(number, quote - number, "id=\"map");
+  }
+  return svg.substr(0, begin) + header + body + "</svg>\n";
 }
 
 void WriteBytes(const std::string& path, const std::string& bytes) {

@@ -65,7 +65,7 @@ std::string ProgressLine(const std::string& title, const std::string& unit,
     }
     // The bar takes what the words leave, within reason.
     const int room =
-        columns - static_cast<int>(title.size() + numbers.size()) - 10;
+        columns - static_cast<int>(title.size() + numbers.size()) - 9;
     const int width = std::min(30, room);
     if (width >= 5) {
       const int filled = static_cast<int>(fraction * width);

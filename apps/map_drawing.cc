@@ -87,37 +87,39 @@ struct Bounds {
   }
 };
 
-bool IsFinite(const DrawnWall& wall) {
-  return std::isfinite(wall.x1) && std::isfinite(wall.y1) &&
-         std::isfinite(wall.x2) && std::isfinite(wall.y2);
+/// Whether there is a place for it on a page: one runaway number must not
+/// shrink the rest of the map to nothing.
+bool IsDrawable(double x, double y) {
+  constexpr double kFarthest = 1e7;  // m; a quarter round the earth
+  return std::abs(x) <= kFarthest && std::abs(y) <= kFarthest;
 }
 
-bool IsFinite(const DrawnCircle& circle) {
-  return std::isfinite(circle.x) && std::isfinite(circle.y) &&
-         std::isfinite(circle.radius) && circle.radius > 0.0;
+bool IsDrawable(const DrawnWall& wall) {
+  return IsDrawable(wall.x1, wall.y1) && IsDrawable(wall.x2, wall.y2);
 }
 
-bool IsFinite(double x, double y) {
-  return std::isfinite(x) && std::isfinite(y);
+bool IsDrawable(const DrawnCircle& circle) {
+  return IsDrawable(circle.x, circle.y) && IsDrawable(circle.radius, 0.0) &&
+         circle.radius > 0.0;
 }
 
 Bounds BoundsOf(const MapDrawing& drawing) {
   Bounds bounds;
   for (const DrawnWall& wall : drawing.walls) {
-    if (!IsFinite(wall)) continue;
+    if (!IsDrawable(wall)) continue;
     bounds.Add(wall.x1, wall.y1);
     bounds.Add(wall.x2, wall.y2);
   }
   for (const DrawnCircle& circle : drawing.circles) {
-    if (!IsFinite(circle)) continue;
+    if (!IsDrawable(circle)) continue;
     bounds.Add(circle.x - circle.radius, circle.y - circle.radius);
     bounds.Add(circle.x + circle.radius, circle.y + circle.radius);
   }
   for (const Pose2& pose : drawing.path) {
-    if (IsFinite(pose[0], pose[1])) bounds.Add(pose[0], pose[1]);
+    if (IsDrawable(pose[0], pose[1])) bounds.Add(pose[0], pose[1]);
   }
   for (const Eigen::Vector2d& point : drawing.points) {
-    if (IsFinite(point[0], point[1])) bounds.Add(point[0], point[1]);
+    if (IsDrawable(point[0], point[1])) bounds.Add(point[0], point[1]);
   }
   if (!(bounds.min_x <= bounds.max_x)) {
     bounds.Add(-5.0, -5.0);
@@ -336,7 +338,7 @@ void DrawPoints(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   // fine grid, so that the drawing does not grow with the log.
   if (drawing.points.size() <= 5000) {
     for (const Eigen::Vector2d& point : drawing.points) {
-      if (!IsFinite(point[0], point[1])) continue;
+      if (!IsDrawable(point[0], point[1])) continue;
       cairo_new_sub_path(cr);
       cairo_arc(cr, layout.X(point[0]), layout.Y(point[1]), 1.6 * layout.unit,
                 0.0, 2.0 * kPi);
@@ -350,7 +352,7 @@ void DrawPoints(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   const int rows = static_cast<int>(layout.height / cell) + 1;
   std::vector<bool> marked(static_cast<std::size_t>(columns) * rows, false);
   for (const Eigen::Vector2d& point : drawing.points) {
-    if (!IsFinite(point[0], point[1])) continue;
+    if (!IsDrawable(point[0], point[1])) continue;
     const int column = static_cast<int>(layout.X(point[0]) / cell);
     const int row = static_cast<int>(layout.Y(point[1]) / cell);
     if (column < 0 || column >= columns || row < 0 || row >= rows) continue;
@@ -386,7 +388,7 @@ void DrawPath(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   double last_y = 0.0;
   for (std::size_t i = 0; i < drawing.path.size(); ++i) {
     const Pose2& pose = drawing.path[i];
-    if (!IsFinite(pose[0], pose[1])) continue;
+    if (!IsDrawable(pose[0], pose[1])) continue;
     const double x = layout.X(pose[0]);
     const double y = layout.Y(pose[1]);
     if (!started) {
@@ -409,7 +411,7 @@ void DrawWalls(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   // ones are not hidden; walls without a cluster lie under all.
   std::map<int, std::vector<const DrawnWall*>> by_color;
   for (const DrawnWall& wall : drawing.walls) {
-    if (!IsFinite(wall)) continue;
+    if (!IsDrawable(wall)) continue;
     by_color[std::min(std::max(wall.cluster, -1), kNumClusterColors)].push_back(
         &wall);
   }
@@ -428,7 +430,7 @@ void DrawCircles(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   SetColor(cr, kCircleColor);
   cairo_set_line_width(cr, kWallWidth * layout.unit);
   for (const DrawnCircle& circle : drawing.circles) {
-    if (!IsFinite(circle)) continue;
+    if (!IsDrawable(circle)) continue;
     cairo_new_sub_path(cr);
     // A column of a large building is still a dot.
     cairo_arc(cr, layout.X(circle.x), layout.Y(circle.y),

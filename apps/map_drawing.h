@@ -29,8 +29,8 @@ struct DrawnCircle {
   FeatureId id = kNoId;
 };
 
-/// A map as a person wants to see it. Whatever has a number that is not finite
-/// is passed over.
+/// A map as a person wants to see it. Whatever has a number that is not finite,
+/// or lies more than 10,000 km from the origin, is passed over.
 struct MapDrawing {
   std::vector<DrawnWall> walls;
   std::vector<DrawnCircle> circles;

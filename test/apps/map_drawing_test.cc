@@ -234,7 +234,8 @@ TEST_F(MapDrawingTest, DegenerateDrawings) {
   std::vector<MapDrawing> drawings(5);
   drawings[1].walls = {Wall(nan, 0.0, 1.0, 1.0, 0),
                        Wall(0.0, 0.0, infinity, 0.0, 7)};
-  drawings[1].circles = {{nan, 0.0, 1.0, 0}, {0.0, 0.0, -1.0, 1}};
+  drawings[1].circles = {
+      {nan, 0.0, 1.0, 0}, {0.0, 0.0, -1.0, 1}, {1e300, 0.0, 1.0, 2}};
   drawings[1].path = {Pose2(nan, nan, nan)};
   drawings[1].points = {{infinity, 0.0}};
   // A single point; a very long and thin map, both ways.

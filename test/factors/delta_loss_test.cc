@@ -1,3 +1,4 @@
+#include <ceres/crs_matrix.h>
 #include <ceres/problem.h>
 #include <gtest/gtest.h>
 #include <plumbline/factors/delta_loss.h>

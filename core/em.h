@@ -15,8 +15,7 @@
 namespace plumbline {
 
 /// Detectors by the level whose features they read: hierarchy[0] reads level 0.
-using Hierarchy =
-    std::vector<std::vector<std::unique_ptr<StructureDetector>>>;
+using Hierarchy = std::vector<std::vector<std::unique_ptr<StructureDetector>>>;
 
 /// Parses "a,b/c/d" (levels by '/', detectors of a level by ',') and makes the
 /// detectors with their parameters (by detector name; what is missing is the
@@ -72,9 +71,8 @@ struct EmReport {
 class EmOrchestrator {
  public:
   /// Pointers are not owned and must outlive the orchestrator.
-  EmOrchestrator(Graph* graph, SolverSession* session,
-                 const Registry& registry, Hierarchy hierarchy,
-                 const EmOptions& options);
+  EmOrchestrator(Graph* graph, SolverSession* session, const Registry& registry,
+                 Hierarchy hierarchy, const EmOptions& options);
   ~EmOrchestrator();
 
   /// One iteration: optimize, break, optimize, and for each level detect, add,

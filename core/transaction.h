@@ -31,9 +31,7 @@ class Transaction {
   void RemoveFeature(FeatureId id) { removed_features_.push_back(id); }
 
   /// Forgets a constraint.
-  void RemoveConstraint(ConstraintId id) {
-    removed_constraints_.push_back(id);
-  }
+  void RemoveConstraint(ConstraintId id) { removed_constraints_.push_back(id); }
 
   /// Takes a constraint out of every solve but keeps it on record.
   void BreakConstraint(ConstraintId id) { broken_constraints_.push_back(id); }
@@ -55,9 +53,7 @@ class Transaction {
     return static_cast<std::size_t>(-2 - id);
   }
 
-  const std::vector<Feature>& added_features() const {
-    return added_features_;
-  }
+  const std::vector<Feature>& added_features() const { return added_features_; }
   std::vector<Feature>& added_features() { return added_features_; }
   const std::vector<Constraint>& added_constraints() const {
     return added_constraints_;

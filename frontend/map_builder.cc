@@ -330,7 +330,7 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
           j2 * observation_covariance * j2.transpose();
       Constraint constraint;
       constraint.type = &relation;
-      constraint.features = {anchor.second, id};
+      constraint.features = std::vector<FeatureId>{anchor.second, id};
       constraint.expected = Between(other, pose);
       constraint.information =
           Symmetric(ToFrame(covariance, other[2]).inverse()) /
@@ -358,7 +358,8 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
       const UncertainPose2 between = Compose(Inverse(first), second);
       Constraint constraint;
       constraint.type = &relation;
-      constraint.features = {provisional[neighbor.second], id};
+      constraint.features =
+          std::vector<FeatureId>{provisional[neighbor.second], id};
       constraint.expected = between.mean;
       constraint.information = Symmetric(between.covariance.inverse()) / 2.0;
       constraint.source = kSource;
@@ -370,8 +371,6 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
   for (std::size_t k = 0; k < fresh.size(); ++k) {
     const SegmentObservation& observation = observations[fresh[k]];
     // The robot relative to the new feature: only the observation's error.
-    const Pose2 inverse = Inverse(observation.pose);
-    (void)inverse;
     Link link;
     const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
     const Eigen::Matrix3d j1 = ComposeJacobianFirst(robot_, observation.pose);
@@ -411,7 +410,7 @@ void MapBuilder::WriteRobot() {
     const Pose2 other = PoseOf(graph_->GetFeature(link.first));
     Constraint constraint;
     constraint.type = &relation;
-    constraint.features = {link.first, robot};
+    constraint.features = std::vector<FeatureId>{link.first, robot};
     constraint.expected = Between(other, robot_);
     constraint.information =
         Symmetric(ToFrame(link.second.covariance, other[2]).inverse()) /

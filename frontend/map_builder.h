@@ -94,8 +94,9 @@ class MapBuilder {
   struct Link {
     // Covariance of the robot's pose relative to the feature, in the axes of
     // the map frame.
-    Eigen::Matrix3d covariance;
-    int last_seen;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    // Index of the scan that saw it last.
+    int last_seen = 0;
   };
 
   void Predict(const UncertainPose2& motion);

@@ -1,0 +1,24 @@
+#include <plumbline/core/builtins.h>
+#include <plumbline/detectors/builtins.h>
+#include <plumbline/detectors/orientation_mixture.h>
+#include <plumbline/detectors/orientation_relation.h>
+
+#include <utility>
+
+namespace plumbline {
+
+void RegisterBuiltinDetectors(Registry* registry) {
+  for (DetectorType type :
+       {OrientationMixtureType(), OrientationRelationType()}) {
+    if (registry->FindDetector(type.name) == nullptr) {
+      registry->Register(std::move(type));
+    }
+  }
+}
+
+void RegisterBuiltins(Registry* registry) {
+  RegisterBuiltinRelations(registry);
+  RegisterBuiltinDetectors(registry);
+}
+
+}  // namespace plumbline

@@ -1,0 +1,57 @@
+#ifndef PLUMBLINE_DETECTORS_ORIENTATION_MIXTURE_H_
+#define PLUMBLINE_DETECTORS_ORIENTATION_MIXTURE_H_
+
+#include <plumbline/core/detector.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/detectors/axial.h>
+
+#include <string>
+
+namespace plumbline {
+
+struct OrientationMixtureOptions {
+  /// Tolerance of a wall against its orientation, rad.
+  double sigma = DegToRad(0.5);
+  /// Features with a shorter visible part are left out, m. A feature without
+  /// extent has an unknown length and counts as one of 1 m.
+  double min_length = 0.5;
+  /// Standard deviation of the direction of a feature of 1 m, rad. It falls
+  /// with length^1.5: points at a constant spacing and noise.
+  double direction_noise = DegToRad(0.7);
+  /// Orientations with fewer live features are dropped.
+  int minimum_support = 2;
+  /// How directions are told from clutter. `gate` also decides which features
+  /// join an orientation.
+  AxialMixtureOptions mixture;
+};
+
+/// Orientations of segments and lines (method.md, section 6): reads features of
+/// the types "segment" and "line" of a level and makes virtual "orientation"
+/// features one level up, tied by the relations segment_orientation and
+/// line_orientation (expected 0).
+///
+/// A feature that no live constraint ties to an orientation yet joins the
+/// nearest one within the gate, one that is there already or a new one. New
+/// ones are what FindAxialComponents sees in the features that are beyond every
+/// gate. With a list in the scope only the listed features join or make
+/// orientations; those that exist are known to Graph::VirtualFeatures, so none
+/// is missed and none made twice.
+class OrientationMixture : public StructureDetector {
+ public:
+  explicit OrientationMixture(const OrientationMixtureOptions& options);
+
+  const std::string& name() const override;
+  int minimum_support() const override { return options_.minimum_support; }
+  Transaction Detect(const Graph& graph, const Registry& registry,
+                     const DetectionScope& scope) const override;
+
+ private:
+  OrientationMixtureOptions options_;
+};
+
+/// "orientation_mixture" with its parameters (angles in degrees).
+DetectorType OrientationMixtureType();
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_ORIENTATION_MIXTURE_H_

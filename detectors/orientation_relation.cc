@@ -1,0 +1,142 @@
+#include <plumbline/core/error.h>
+#include <plumbline/detectors/axial.h>
+#include <plumbline/detectors/orientation_relation.h>
+#include <plumbline/detectors/parameters.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <set>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr char kName[] = "orientation_relation";
+constexpr char kAnglePrefix[] = "angle_";
+
+}  // namespace
+
+OrientationRelation::OrientationRelation(OrientationRelationOptions options)
+    : options_(std::move(options)) {
+  // An angle between undirected lines has no sign: 45 degrees is 135 from the
+  // other side.
+  std::vector<double> both;
+  for (const double angle : options_.angles) {
+    both.push_back(NormalizeAxial(angle));
+    both.push_back(NormalizeAxial(-angle));
+  }
+  options_.angles = std::move(both);
+}
+
+const std::string& OrientationRelation::name() const {
+  static const std::string name = kName;
+  return name;
+}
+
+Transaction OrientationRelation::Detect(const Graph& graph,
+                                        const Registry& registry,
+                                        const DetectionScope& scope) const {
+  std::vector<const Feature*> orientations;
+  const auto consider = [&](const Feature& feature) {
+    if (feature.level == scope.level && feature.type->name == "orientation") {
+      orientations.push_back(&feature);
+    }
+  };
+  std::set<FeatureId> ids(graph.VirtualFeatures(scope.level).begin(),
+                          graph.VirtualFeatures(scope.level).end());
+  if (scope.features != nullptr) {
+    ids.insert(scope.features->begin(), scope.features->end());
+    for (const FeatureId id : ids) {
+      const Feature* feature = graph.FindFeature(id);
+      if (feature != nullptr) consider(*feature);
+    }
+  } else if (scope.level > 0) {
+    for (const FeatureId id : ids) consider(graph.GetFeature(id));
+  } else {
+    // Orientations that were read from a file may be raw.
+    for (const Feature* feature : graph.Features()) consider(*feature);
+  }
+
+  Transaction transaction;
+  for (std::size_t j = 1; j < orientations.size(); ++j) {
+    const Feature& second = *orientations[j];
+    std::set<FeatureId> related;
+    for (const ConstraintId id : graph.ConstraintsOf(second.id)) {
+      const Constraint& constraint = graph.GetConstraint(id);
+      if (constraint.state != ConstraintState::kLive ||
+          constraint.type->name != "orientation_orientation") {
+        continue;
+      }
+      related.insert(constraint.features.begin(), constraint.features.end());
+    }
+    int relations = 0;
+    for (std::size_t i = 0; i < j && relations < options_.max_relations; ++i) {
+      const Feature& first = *orientations[i];
+      const double angle =
+          NormalizeAxial(second.parameters[0] - first.parameters[0]);
+      const int nearest = NearestAxial(options_.angles, angle, options_.gate);
+      if (nearest < 0) continue;
+      // Counted whether it is there or not, so that what is proposed does not
+      // depend on what was before.
+      ++relations;
+      if (related.count(first.id) > 0) continue;
+      Constraint constraint;
+      constraint.type = &registry.GetRelation("orientation_orientation");
+      constraint.features = {first.id, second.id};
+      constraint.expected =
+          Eigen::VectorXd::Constant(1, options_.angles[nearest]);
+      constraint.information = Eigen::MatrixXd::Constant(
+          1, 1, 1.0 / (options_.sigma * options_.sigma));
+      constraint.kind = ConstraintClass::kStructure;
+      constraint.source = kName;
+      transaction.AddConstraint(std::move(constraint));
+    }
+  }
+  return transaction;
+}
+
+DetectorType OrientationRelationType() {
+  const OrientationRelationOptions defaults;
+  DetectorType type;
+  type.name = kName;
+  type.description =
+      "Relations between orientations at allowed angles: angle_0, angle_1, ... "
+      "in degrees (0, 45, 90, 135), or the multiples of resolution_deg";
+  type.reads = {"orientation"};
+  type.defaults = {
+      {"gate_deg", RadToDeg(defaults.gate)},
+      {"sigma_deg", RadToDeg(defaults.sigma)},
+      {"resolution_deg", 0.0},
+      {"max_relations", static_cast<double>(defaults.max_relations)},
+  };
+  type.make = [known = type.defaults](const DetectorParameters& given) {
+    const ParameterReader reader(kName, known, given, kAnglePrefix);
+    OrientationRelationOptions options;
+    options.gate = DegToRad(reader.Get("gate_deg", 0.0, 45.0));
+    options.sigma = DegToRad(reader.Get("sigma_deg", 1e-6, 90.0));
+    options.max_relations = reader.GetInt("max_relations", 1);
+    std::vector<double> angles;
+    for (const auto& [name, value] : reader.values()) {
+      if (name.rfind(kAnglePrefix, 0) == 0) {
+        angles.push_back(DegToRad(reader.Get(name, -360.0, 360.0)));
+      }
+    }
+    const double resolution = reader.Get("resolution_deg", 0.0, 180.0);
+    if (resolution > 0.0) {
+      if (resolution < 0.01) {
+        throw PLUMBLINE_ERROR(std::string(kName) + ": resolution_deg is " +
+                                  std::to_string(resolution),
+                              "0, or at least 0.01");
+      }
+      for (int i = 0; i * resolution < 180.0 - 1e-9; ++i) {
+        angles.push_back(DegToRad(i * resolution));
+      }
+    }
+    if (!angles.empty()) options.angles = std::move(angles);
+    return std::make_unique<OrientationRelation>(std::move(options));
+  };
+  return type;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,54 @@
+#ifndef PLUMBLINE_DETECTORS_ORIENTATION_RELATION_H_
+#define PLUMBLINE_DETECTORS_ORIENTATION_RELATION_H_
+
+#include <plumbline/core/detector.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/factors/angle.h>
+
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+struct OrientationRelationOptions {
+  /// Angles between orientations that are expected in a building, rad. The sign
+  /// does not matter, nor do multiples of pi: 0 is "these are the same".
+  std::vector<double> angles = {0.0, kPi / 4, kPi / 2, 3 * kPi / 4};
+  /// Two orientations are related when their angle is so near to an expected
+  /// one, rad.
+  double gate = DegToRad(3.0);
+  /// Tolerance of the relation, rad.
+  double sigma = DegToRad(0.2);
+  /// An orientation is related to at most so many that stood before it. All
+  /// pairs of few orientations are related; many get enough for redundancy.
+  int max_relations = 4;
+};
+
+/// Relations between the "orientation" features of a level (method.md, section
+/// 6): orientation_orientation constraints with the expected angle nearest to
+/// the present one, in (-pi/2, pi/2]. Pairs that a live constraint relates are
+/// left alone.
+///
+/// Virtual orientations are few, so all of a level are looked at even when the
+/// scope lists features: an orientation belongs to the whole building.
+class OrientationRelation : public StructureDetector {
+ public:
+  explicit OrientationRelation(OrientationRelationOptions options);
+
+  const std::string& name() const override;
+  Transaction Detect(const Graph& graph, const Registry& registry,
+                     const DetectionScope& scope) const override;
+
+ private:
+  OrientationRelationOptions options_;
+};
+
+/// "orientation_relation". Parameters in degrees: gate_deg, sigma_deg,
+/// resolution_deg (its multiples are expected; 0: unset) and the list angle_0,
+/// angle_1, ... which is 0, 45, 90, 135 when neither it nor a resolution is
+/// given. With both, all of the angles are expected.
+DetectorType OrientationRelationType();
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_ORIENTATION_RELATION_H_

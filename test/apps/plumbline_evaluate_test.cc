@@ -1,0 +1,150 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace plumbline {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Runs the binary in a folder of its own; standard output and error go to
+// `output` together.
+class EvaluateTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    binary_ = std::string(PLUMBLINE_BIN_DIR) + "/plumbline_evaluate";
+    if (!std::ifstream(binary_)) GTEST_SKIP() << binary_ << " is not built";
+    folder_ = ::testing::TempDir() + "evaluate_" +
+              ::testing::UnitTest::GetInstance()->current_test_info()->name() +
+              "_";
+    Write("path.tum",
+          "1.000000 0 0 0 0 0 0 1\n"
+          "2.000000 4 4 0 0 0 0 1\n");
+    Write("true.relations",
+          "1.0 2.0 1 0 0 0 0 0\n"
+          "1.0 7.0 1 0 0 0 0 0\n");
+  }
+
+  void Write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ + name) << text;
+  }
+
+  std::string Read(const std::string& name) {
+    std::ifstream file(folder_ + name);
+    return {std::istreambuf_iterator<char>(file),
+            std::istreambuf_iterator<char>()};
+  }
+
+  std::string Flag(const std::string& flag, const std::string& name) {
+    return " --" + flag + "=" + folder_ + name;
+  }
+
+  int Run(const std::string& arguments, std::string* output) {
+    FILE* const pipe = popen((binary_ + arguments + " 2>&1").c_str(), "r");
+    char buffer[4096];
+    std::size_t count;
+    output->clear();
+    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0)
+      output->append(buffer, count);
+    const int status = pclose(pipe);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+  std::string binary_;
+  std::string folder_;
+};
+
+TEST_F(EvaluateTest, Relations) {
+  std::string output;
+  ASSERT_EQ(
+      Run(Flag("trajectory", "path.tum") + Flag("relations", "true.relations") +
+              Flag("output", "eval.json") +
+              Flag("relation_errors", "errors.csv"),
+          &output),
+      0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("translational error"));
+  EXPECT_THAT(output, HasSubstr("mean     5.0000"));
+  EXPECT_THAT(output, HasSubstr("1 matched, 1 not matched"));
+  const auto json = nlohmann::json::parse(Read("eval.json"));
+  EXPECT_EQ(json["relations"]["matched"], 1);
+  EXPECT_EQ(json["relations"]["not_matched"], 1);
+  EXPECT_NEAR(json["relations"]["translation_m"]["mean"].get<double>(), 5.0,
+              1e-12);
+  EXPECT_NEAR(json["relations"]["squared_translation_m2"]["max"].get<double>(),
+              25.0, 1e-9);
+  EXPECT_THAT(Read("errors.csv"), HasSubstr("\n1,1.000000,2.000000,3,4,0,5,0"));
+}
+
+TEST_F(EvaluateTest, Truth) {
+  Write("truth.json",
+        R"({"format":"plumbline-truth","version":1,"orientations_deg":[0],
+            "walls":[{"id":0,"x1":0,"y1":0,"x2":4,"y2":0,"orientation":0,
+                      "seen":[[0,4]]}],
+            "poses":[[1,0,0,0],[2,4,4,0]]})");
+  Write("map.json",
+        R"({"features":[{"id":0,"type":"segment","parameters":[0,0.25,0],
+            "extent":[0,4]}],"constraints":[]})");
+  for (const std::string& trajectory :
+       {Flag("trajectory", "path.tum"), std::string()}) {
+    std::string output;
+    ASSERT_EQ(Run(trajectory + Flag("truth", "truth.json") +
+                      Flag("map", "map.json") + Flag("output", "eval.json"),
+                  &output),
+              0)
+        << output;
+    EXPECT_THAT(output, HasSubstr("walls: 1 of 1 found"));
+    EXPECT_THAT(output, HasSubstr("missed orientations: 1 (0.00 deg)"));
+    const auto json = nlohmann::json::parse(Read("eval.json"));
+    EXPECT_NEAR(json["truth"]["offset_error_m"]["mean"].get<double>(), 0.25,
+                1e-9);
+  }
+}
+
+TEST_F(EvaluateTest, BadInput) {
+  Write("bad.relations", "1 2 3 4 5 6 7 8\n1 2 x 0 0 0 0 0\n");
+  std::string output;
+  EXPECT_EQ(
+      Run(Flag("trajectory", "path.tum") + Flag("relations", "bad.relations") +
+              Flag("output", "eval.json"),
+          &output),
+      2);
+  EXPECT_THAT(output, HasSubstr("bad.relations:2: 'x' is no finite number"));
+  EXPECT_FALSE(std::ifstream(folder_ + "eval.json"));
+
+  Write("other.relations", "101 102 1 0 0 0 0 0\n");
+  EXPECT_EQ(
+      Run(Flag("trajectory", "path.tum") + Flag("relations", "other.relations"),
+          &output),
+      2);
+  EXPECT_THAT(output, HasSubstr("other.relations:1: no relation has both"));
+  EXPECT_EQ(
+      Run(Flag("trajectory", "none.tum") + Flag("relations", "true.relations"),
+          &output),
+      2);
+  EXPECT_THAT(output, HasSubstr("none.tum: cannot be opened"));
+}
+
+TEST_F(EvaluateTest, Usage) {
+  std::string output;
+  EXPECT_EQ(Run("", &output), 1);
+  EXPECT_THAT(output, HasSubstr("nothing to compare with"));
+  EXPECT_EQ(Run(Flag("relations", "true.relations"), &output), 1);
+  EXPECT_THAT(output, HasSubstr("--trajectory"));
+  EXPECT_EQ(Run(Flag("truth", "truth.json"), &output), 1);
+  EXPECT_THAT(output, HasSubstr("go together"));
+  EXPECT_EQ(Run(" --no_such_flag=1", &output), 1);
+  EXPECT_THAT(output, HasSubstr("no_such_flag"));
+  EXPECT_EQ(Run(" --help", &output), 0);
+  EXPECT_THAT(output, HasSubstr("Example:"));
+  EXPECT_THAT(output, HasSubstr("--relation_errors"));
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -699,7 +699,8 @@ TextFormat RecognizeFormat(std::string_view prefix) {
     const std::size_t end = prefix.find('\n');
     const std::string_view tag = Tokens(prefix.substr(0, end)).Next();
     if (tag.substr(0, 7) == "VERTEX_" || tag.substr(0, 5) == "EDGE_" ||
-        tag.substr(0, 7) == "PARAMS_" || tag == "FIX")
+        tag.substr(0, 7) == "PARAMS_" || tag.substr(0, 10) == "PLUMBLINE_" ||
+        tag == "FIX")
       return TextFormat::kG2o;
     if (std::find(kCarmenNames.begin(), kCarmenNames.end(), tag) !=
         kCarmenNames.end())

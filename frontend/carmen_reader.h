@@ -74,7 +74,8 @@ Log ReadCarmenLog(InputStream* input, const CarmenOptions& options);
 /// CARMEN log: the first line with a known tag decides.
 bool LooksLikeCarmenLog(std::string_view prefix);
 
-/// Whether text that starts with `prefix` is a g2o graph, likewise.
+/// Whether text that starts with `prefix` is a g2o graph (also one that starts
+/// with this project's own tags), likewise.
 bool LooksLikeG2o(std::string_view prefix);
 
 }  // namespace plumbline

@@ -412,6 +412,7 @@ TEST(CarmenReaderTest, RecognizesFormats) {
   EXPECT_TRUE(LooksLikeG2o("VERTEX_SE2 0 0 0 0\nROBOTLASER1 0\n"));
   EXPECT_TRUE(LooksLikeG2o("# comment\n\nEDGE_SE2 0 1 1 0 0"));
   EXPECT_TRUE(LooksLikeG2o("FIX 0\n"));
+  EXPECT_TRUE(LooksLikeG2o("PLUMBLINE_VERTEX_CIRCLE 0 1 2 3\n"));
   EXPECT_FALSE(LooksLikeG2o("FLASER 180\nVERTEX_SE2\n"));
 }
 

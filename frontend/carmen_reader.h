@@ -29,17 +29,24 @@ struct CarmenOptions {
 /// Reads a CARMEN log (plain, gzip, bzip2, "-" for standard input) into scans.
 ///
 /// Messages, one a line, `NAME fields... ipc_timestamp ipc_host
-/// logger_timestamp`:
+/// logger_timestamp` (the ipc_timestamp is the scan's time):
 ///
-/// | message | use |
-/// |---|---|
-/// | FLASER n r.. x y theta odom_x odom_y odom_theta | scan of the front laser:
-/// the first pose is the laser's, the second the robot's, both by odometry |
-/// | ROBOTLASER1 | the same with angles, maximum range and remissions |
-/// | RAWLASER1 | a scan without poses: placed by ODOM |
-/// | RLASER | scan of the rear laser, as FLASER |
-/// | ODOM, PARAM, SYNC, TRUEPOS, COMMENT | ODOM places RAWLASER1 scans, PARAM
-/// gives laser settings; the others are counted only |
+///   FLASER n r1..rn x y theta odom_x odom_y odom_theta
+///       scan of the front laser: the first pose is the laser's, the second
+///       the robot's, both by odometry
+///   ROBOTLASER1 type start_angle field_of_view resolution maximum_range
+///       accuracy remission_mode n r1..rn m s1..sm laser_pose robot_pose
+///       tv rv forward side turn_axis
+///       the same with angles (the remissions "m s1..sm" may be missing)
+///   RAWLASER1 as ROBOTLASER1 up to the remissions
+///       a scan without poses: placed by ODOM
+///   RLASER as FLASER
+///       scan of the rear laser
+///   ODOM x y theta tv rv acceleration
+///   PARAM name value
+///       laser settings
+///   SYNC, TRUEPOS, COMMENT
+///       counted only
 ///
 /// A log often holds the same laser in several messages, so one kind gives the
 /// scans: the first of FLASER, ROBOTLASER1, RAWLASER1, RLASER that occurs;

@@ -19,9 +19,10 @@ using Hierarchy = std::vector<std::vector<std::unique_ptr<StructureDetector>>>;
 
 /// Parses "a,b/c/d" (levels by '/', detectors of a level by ',') and makes the
 /// detectors with their parameters (by detector name; what is missing is the
-/// default). Throws Error with the list of detectors when a name is unknown,
-/// and with the list of what fits where when a detector reads nothing that its
-/// level can hold.
+/// default). An empty description gives no detectors. A level holds what the
+/// detectors of the level below make, level 0 holds `raw_feature_types`. Throws
+/// Error with the list of detectors when a name is unknown, and with the list
+/// of what fits where when a detector reads nothing that its level can hold.
 Hierarchy MakeHierarchy(
     const std::string& description, const Registry& registry,
     const std::vector<std::string>& raw_feature_types,
@@ -37,22 +38,28 @@ struct EmOptions {
   /// Converged: nothing added, nothing removed, and the relative change of the
   /// total cost is smaller.
   double cost_tolerance = 1e-4;
-  /// A broken hypothesis may be proposed again when its error has changed by
-  /// more than so many of its standard deviations since it was broken ...
+  /// A broken hypothesis may be proposed again when its error has fallen by
+  /// more than so many of its standard deviations since it was broken and the
+  /// map relaxed without it ...
   double reproposal_sigmas = 1.0;
   /// ... but not after it was broken so often: this bounds the loop.
   int max_breaks = 3;
   std::uint64_t seed = 1;
 };
 
-/// One row of em_trace.csv.
+/// One row of em_trace.csv: the state after a phase and the solve that belongs
+/// to it.
 struct EmPhase {
   int iteration = 0;
   /// "measurements", "optimize", "break", "detect_0", "detect_1", ...
   std::string phase;
+  /// Of the whole graph, or in an iteration with a scope of the constraints on
+  /// the features that varied.
   CostReport cost;
   /// Live features by type name.
   std::map<std::string, int> features;
+  /// Live ones, and broken ones that are on record (they go with a feature that
+  /// is dropped).
   int structure_constraints = 0;
   int broken_constraints = 0;
   /// Time of this phase.
@@ -68,6 +75,24 @@ struct EmReport {
 
 /// Finds structure, weighs it, breaks it and finds it again (method.md, section
 /// 2).
+///
+/// Weights: a constraint enters with delta = 1 and so pulls with its full
+/// weight in the solve that follows; every E-step after a solve gives it the
+/// p-value of its unweighted residual (at least kDeltaFloor), and below the
+/// threshold it is broken.
+///
+/// Support: a virtual feature is dropped, with its constraints, when it has
+/// fewer live structure constraints from features of lower levels than its
+/// detector's minimum_support, or a single live constraint altogether: it would
+/// follow that one and say nothing. Dropping goes on up the levels. Fixed
+/// virtual features and those with measurements stay.
+///
+/// Memory: what was broken is remembered by what it said (relation, expected
+/// value, features; virtual ones by their type and value, since they come again
+/// under other ids), with its error once the map had relaxed without it. A
+/// hypothesis is let in again only as reproposal_sigmas and max_breaks say, and
+/// a virtual feature only with the minimum support left. Every hypothesis is
+/// thus added at most max_breaks times, so the loop ends.
 class EmOrchestrator {
  public:
   /// Pointers are not owned and must outlive the orchestrator.
@@ -76,18 +101,22 @@ class EmOrchestrator {
   ~EmOrchestrator();
 
   /// One iteration: optimize, break, optimize, and for each level detect, add,
-  /// optimize. With `scope` only the features listed vary and are looked at,
-  /// at a cost that does not depend on the size of the graph. Returns true
-  /// when it added or removed something.
+  /// optimize; solves with nothing new to solve are left out. With `scope` only
+  /// the features listed, and the virtual ones on them that have few
+  /// constraints, vary and are looked at, at a cost that does not depend on the
+  /// size of the graph. Returns true when it added or removed something.
   bool Iterate(const std::vector<FeatureId>* scope = nullptr);
 
   /// Iterates on the whole graph until it has converged (or max_iterations).
-  /// `stop` is asked between phases and ends the loop when it returns true.
+  /// The first solve has the measurements only, unless structure is live
+  /// already. `stop` is asked between phases and ends the loop when it returns
+  /// true. Returns the sums of this run.
   EmReport Run(const std::function<bool()>& stop = nullptr);
 
   /// Called after every phase.
   void SetTrace(std::function<void(const EmPhase&)> trace);
 
+  /// Sums over every iteration so far, those with a scope included.
   const EmReport& totals() const;
 
  private:

@@ -408,12 +408,15 @@ struct SolverSession::Impl {
     return ChiSquarePValue(SquaredResidual(constraint), degrees);
   }
 
-  void UpdateDelta(Constraint* constraint) const {
+  // Returns how much the weight changed.
+  double UpdateDelta(Constraint* constraint) const {
     if (constraint->kind != ConstraintClass::kStructure ||
         constraint->state != ConstraintState::kLive) {
-      return;
+      return 0.0;
     }
+    const double before = constraint->delta;
     constraint->delta = std::max(Delta(*constraint), kDeltaFloor);
+    return std::abs(constraint->delta - before);
   }
 
   void AddCost(const Constraint& constraint, CostReport* report) const {
@@ -558,16 +561,19 @@ double SolverSession::Delta(const Constraint& constraint) const {
   return impl_->Delta(constraint);
 }
 
-void SolverSession::UpdateDeltas(const std::vector<FeatureId>* features) {
+double SolverSession::UpdateDeltas(const std::vector<FeatureId>* features) {
+  double change = 0.0;
   if (features == nullptr) {
     for (Constraint* constraint : impl_->graph->MutableConstraints()) {
-      impl_->UpdateDelta(constraint);
+      change = std::max(change, impl_->UpdateDelta(constraint));
     }
-    return;
+    return change;
   }
   for (const ConstraintId id : impl_->LiveConstraintsOn(*features)) {
-    impl_->UpdateDelta(impl_->graph->FindConstraint(id));
+    change =
+        std::max(change, impl_->UpdateDelta(impl_->graph->FindConstraint(id)));
   }
+  return change;
 }
 
 CostReport SolverSession::Cost(const std::vector<FeatureId>* features) const {

@@ -99,7 +99,8 @@ class SolverSession : public GraphListener {
   /// The E-step: writes Delta(), and at least kDeltaFloor, to every live
   /// structure constraint on `features`, or of the whole graph when null. No
   /// weight freezes for good: Delta() is that of the unweighted residual.
-  void UpdateDeltas(const std::vector<FeatureId>* features = nullptr);
+  /// Returns the largest change of a weight.
+  double UpdateDeltas(const std::vector<FeatureId>* features = nullptr);
 
   /// Cost at the present state of the whole graph, or of the live constraints
   /// on `features`.

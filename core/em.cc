@@ -1,0 +1,812 @@
+#include <plumbline/core/em.h>
+#include <plumbline/core/error.h>
+#include <plumbline/factors/information.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Weights that moved less are not worth a solve.
+constexpr double kDeltaChange = 1e-6;
+// In an iteration with a scope, virtual features with more constraints are
+// held: they speak for a large part of the map, and solving for them costs as
+// much.
+constexpr std::size_t kMaxLocalConstraints = 50;
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+      .count();
+}
+
+std::vector<std::string> Split(const std::string& text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == separator) {
+      parts.emplace_back();
+    } else if (c != ' ' && c != '\t' && c != '\n' && c != '\r') {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+bool Intersects(const std::vector<std::string>& names,
+                const std::set<std::string>& set) {
+  return std::any_of(
+      names.begin(), names.end(),
+      [&set](const std::string& name) { return set.count(name) > 0; });
+}
+
+// "level 0 (segment): a, b; level 1 (orientation): c"
+std::string WhatFitsWhere(const Registry& registry,
+                          const std::vector<std::set<std::string>>& levels) {
+  std::string list;
+  for (std::size_t level = 0; level < levels.size(); ++level) {
+    std::string types;
+    for (const std::string& type : levels[level]) {
+      types += (types.empty() ? "" : ", ") + type;
+    }
+    std::string detectors;
+    for (const DetectorType* detector : registry.detectors()) {
+      if (!Intersects(detector->reads, levels[level])) continue;
+      detectors += (detectors.empty() ? "" : ", ") + detector->name;
+    }
+    list += (list.empty() ? "level " : "; level ") + std::to_string(level) +
+            " (" + (types.empty() ? "nothing" : types) +
+            "): " + (detectors.empty() ? "none" : detectors);
+  }
+  return list;
+}
+
+// A broken hypothesis, by what it said.
+struct BrokenHypothesis {
+  const RelationType* relation = nullptr;
+  std::vector<FeatureId> features;
+  Eigen::VectorXd expected;
+  Eigen::MatrixXd information;
+  // Norm of the whitened error, that is in standard deviations, once the map
+  // had been solved without it.
+  double error = std::numeric_limits<double>::infinity();
+  int breaks = 0;
+};
+
+// Id of a feature and name of a relation.
+using HypothesisKey = std::pair<FeatureId, std::string>;
+
+// Forgets what has the feature in its key.
+template <typename Container>
+void EraseFeature(FeatureId id, Container* container) {
+  container->erase(container->lower_bound({id, ""}),
+                   container->lower_bound({id + 1, ""}));
+}
+
+}  // namespace
+
+Hierarchy MakeHierarchy(
+    const std::string& description, const Registry& registry,
+    const std::vector<std::string>& raw_feature_types,
+    const std::map<std::string, DetectorParameters>& parameters) {
+  for (const auto& entry : parameters) registry.GetDetector(entry.first);
+  Hierarchy hierarchy;
+  const std::vector<std::string> levels = Split(description, '/');
+  if (levels.size() == 1 && levels[0].empty()) return hierarchy;
+
+  // Types that each level can hold, as far as it is known.
+  std::vector<std::set<std::string>> types = {
+      {raw_feature_types.begin(), raw_feature_types.end()}};
+  for (const std::string& level_description : levels) {
+    const std::size_t level = hierarchy.size();
+    hierarchy.emplace_back();
+    std::set<std::string> made;
+    for (const std::string& name : Split(level_description, ',')) {
+      const DetectorType& type = registry.GetDetector(name);
+      if (!Intersects(type.reads, types[level])) {
+        throw PLUMBLINE_ERROR("detector '" + name +
+                                  "' has nothing to read at level " +
+                                  std::to_string(level),
+                              WhatFitsWhere(registry, types));
+      }
+      DetectorParameters values = type.defaults;
+      const auto given = parameters.find(name);
+      if (given != parameters.end()) {
+        for (const auto& value : given->second) {
+          values[value.first] = value.second;
+        }
+      }
+      hierarchy.back().push_back(type.make(values));
+      made.insert(type.makes.begin(), type.makes.end());
+    }
+    types.push_back(std::move(made));
+  }
+  return hierarchy;
+}
+
+struct EmOrchestrator::Impl : public GraphListener {
+  Impl(Graph* graph_in, SolverSession* session_in, const Registry& registry_in,
+       Hierarchy hierarchy_in, const EmOptions& options_in)
+      : graph(graph_in),
+        session(session_in),
+        registry(registry_in),
+        hierarchy(std::move(hierarchy_in)),
+        options(options_in) {
+    for (const auto& level : hierarchy) {
+      for (const auto& detector : level) {
+        minimum_support[detector->name()] = detector->minimum_support();
+      }
+    }
+    for (const Feature* feature : std::as_const(*graph).Features()) {
+      OnFeatureAdded(*feature);
+    }
+    for (const Constraint* constraint : std::as_const(*graph).Constraints()) {
+      OnConstraintAdded(*constraint);
+    }
+    graph->AddListener(this);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() override { graph->RemoveListener(this); }
+
+  // -- What the graph tells ---------------------------------------------------
+
+  void OnFeatureAdded(const Feature& feature) override {
+    ++feature_counts[feature.type->name];
+    highest_level = std::max(highest_level, feature.level);
+  }
+
+  void OnFeatureRemoved(const Feature& feature) override {
+    const auto count = feature_counts.find(feature.type->name);
+    if (--count->second == 0) feature_counts.erase(count);
+    if (feature.is_virtual) {
+      // Comes again under another id: remembered by its value.
+      dropped.emplace(feature.id, feature);
+    } else {
+      EraseFeature(feature.id, &memory);
+    }
+    EraseFeature(feature.id, &silent_alone);
+  }
+
+  void OnConstraintAdded(const Constraint& constraint) override {
+    is_dirty = true;
+    if (constraint.state == ConstraintState::kBroken) {
+      broken_on_record.insert(constraint.id);
+      if (constraint.kind == ConstraintClass::kStructure) {
+        RememberBroken(constraint);
+      }
+    } else if (constraint.kind == ConstraintClass::kStructure) {
+      ++structure_count;
+    }
+  }
+
+  void OnConstraintChanged(const Constraint&) override { is_dirty = true; }
+
+  void OnConstraintRetired(const Constraint& constraint) override {
+    if (broken_on_record.erase(constraint.id) > 0) return;  // broken before
+    is_dirty = true;
+    const bool is_structure = constraint.kind == ConstraintClass::kStructure;
+    if (is_structure) --structure_count;
+    if (graph->FindConstraint(constraint.id) != nullptr) {
+      broken_on_record.insert(constraint.id);
+      if (is_structure) RememberBroken(constraint);
+    }
+    for (const FeatureId id : constraint.features) {
+      const Feature* feature = graph->FindFeature(id);
+      if (feature != nullptr && feature->is_virtual) lost_support.insert(id);
+    }
+  }
+
+  // -- Broken hypotheses ------------------------------------------------------
+
+  // A feature that is there or was there once; null when it is forgotten.
+  const Feature* Recall(FeatureId id) const {
+    const Feature* feature = graph->FindFeature(id);
+    if (feature != nullptr) return feature;
+    const auto found = dropped.find(id);
+    return found == dropped.end() ? nullptr : &found->second;
+  }
+
+  static Eigen::VectorXd WhitenedError(
+      const RelationType& relation, const Eigen::VectorXd& expected,
+      const Eigen::MatrixXd& information,
+      const std::vector<const Feature*>& features) {
+    RelationArguments arguments;
+    arguments.expected = expected;
+    arguments.sqrt_information = SqrtInformation(information);
+    arguments.features = features;
+    std::vector<const double*> parameters;
+    for (const Feature* feature : features) {
+      parameters.push_back(feature->data());
+    }
+    const auto cost = relation.make_cost(arguments);
+    Eigen::VectorXd error(relation.residual_size);
+    if (!cost->Evaluate(parameters.data(), error.data(), nullptr) ||
+        !error.allFinite()) {
+      error.setConstant(std::numeric_limits<double>::infinity());
+    }
+    return error;
+  }
+
+  // The first raw feature identifies a hypothesis; one between virtual features
+  // is found among all such of the relation.
+  static HypothesisKey KeyOf(const Constraint& constraint,
+                             const std::vector<const Feature*>& features) {
+    FeatureId raw = kNoId;
+    for (const Feature* feature : features) {
+      if (!feature->is_virtual) {
+        raw = feature->id;
+        break;
+      }
+    }
+    return {raw, constraint.type->name};
+  }
+
+  // True when `hypothesis` says what `constraint` between `features` says:
+  // every feature is the same, or is virtual and of the same type, and putting
+  // the hypothesis' own virtual features in the place of these changes the
+  // error by no more than the tolerance for re-proposal.
+  bool SaysTheSame(const BrokenHypothesis& hypothesis,
+                   const Constraint& constraint,
+                   const std::vector<const Feature*>& features) const {
+    if (hypothesis.relation != constraint.type ||
+        hypothesis.expected != constraint.expected) {
+      return false;
+    }
+    std::vector<const Feature*> replaced = features;
+    bool is_same = true;
+    for (std::size_t i = 0; i < features.size(); ++i) {
+      // A new feature has no id and equals none.
+      if (features[i]->id == hypothesis.features[i]) continue;
+      is_same = false;
+      const Feature* own = Recall(hypothesis.features[i]);
+      if (own == nullptr || !own->is_virtual || !features[i]->is_virtual ||
+          own->type != features[i]->type) {
+        return false;
+      }
+      replaced[i] = own;
+    }
+    if (is_same) return true;
+    const Eigen::VectorXd change =
+        WhitenedError(*constraint.type, constraint.expected,
+                      constraint.information, replaced) -
+        WhitenedError(*constraint.type, constraint.expected,
+                      constraint.information, features);
+    return change.norm() <= options.reproposal_sigmas;
+  }
+
+  BrokenHypothesis* FindBroken(const Constraint& constraint,
+                               const std::vector<const Feature*>& features) {
+    const auto found = memory.find(KeyOf(constraint, features));
+    if (found == memory.end()) return nullptr;
+    for (BrokenHypothesis& hypothesis : found->second) {
+      if (SaysTheSame(hypothesis, constraint, features)) return &hypothesis;
+    }
+    return nullptr;
+  }
+
+  std::vector<const Feature*> FeaturesOf(const Constraint& constraint) const {
+    std::vector<const Feature*> features;
+    for (const FeatureId id : constraint.features) {
+      features.push_back(&std::as_const(*graph).GetFeature(id));
+    }
+    return features;
+  }
+
+  // Enters a constraint of the graph into the memory.
+  void RememberBroken(const Constraint& constraint) {
+    const std::vector<const Feature*> features = FeaturesOf(constraint);
+    const HypothesisKey key = KeyOf(constraint, features);
+    BrokenHypothesis* hypothesis = FindBroken(constraint, features);
+    if (hypothesis == nullptr) {
+      std::vector<BrokenHypothesis>& entries = memory[key];
+      entries.emplace_back();
+      hypothesis = &entries.back();
+      hypothesis->relation = constraint.type;
+      hypothesis->expected = constraint.expected;
+    }
+    // The latest values are those to compare with.
+    hypothesis->features = constraint.features;
+    hypothesis->information = constraint.information;
+    hypothesis->error = std::numeric_limits<double>::infinity();
+    ++hypothesis->breaks;
+    unmeasured.insert(key);
+  }
+
+  // What the hypotheses just broken would say, now that the map is solved
+  // without them.
+  void MeasureRelaxedErrors() {
+    for (const HypothesisKey& key : unmeasured) {
+      const auto found = memory.find(key);
+      if (found == memory.end()) continue;
+      for (BrokenHypothesis& hypothesis : found->second) {
+        if (!std::isinf(hypothesis.error)) continue;
+        std::vector<const Feature*> features;
+        for (const FeatureId id : hypothesis.features) {
+          const Feature* feature = Recall(id);
+          if (feature != nullptr) features.push_back(feature);
+        }
+        if (features.size() != hypothesis.features.size()) continue;
+        hypothesis.error =
+            WhitenedError(*hypothesis.relation, hypothesis.expected,
+                          hypothesis.information, features)
+                .norm();
+      }
+    }
+    unmeasured.clear();
+  }
+
+  bool MayBeProposed(const Constraint& constraint,
+                     const std::vector<const Feature*>& features) {
+    const BrokenHypothesis* hypothesis = FindBroken(constraint, features);
+    if (hypothesis == nullptr) return true;
+    if (hypothesis->breaks >= options.max_breaks) return false;
+    const double error = WhitenedError(*constraint.type, constraint.expected,
+                                       constraint.information, features)
+                             .norm();
+    return error < hypothesis->error - options.reproposal_sigmas;
+  }
+
+  // What identifies a virtual feature `id` with this constraint alone: it
+  // follows the other feature, so its value does not matter.
+  static HypothesisKey AloneKey(const Constraint& constraint, FeatureId id) {
+    for (const FeatureId other : constraint.features) {
+      if (other != id) return {other, constraint.type->name};
+    }
+    return {kNoId, constraint.type->name};
+  }
+
+  // -- The steps of an iteration ----------------------------------------------
+
+  // Features, live structure constraints and all live constraints that an
+  // iteration works on.
+  struct Scope {
+    // Null for the whole graph.
+    const std::vector<FeatureId>* features = nullptr;
+    // With a list: the list and the virtual features on it that have few
+    // constraints; these vary.
+    std::vector<FeatureId> variables;
+    // The same with all virtual features on it.
+    std::vector<FeatureId> attached;
+  };
+
+  bool IsLiveStructure(const Constraint& constraint) const {
+    return constraint.state == ConstraintState::kLive &&
+           constraint.kind == ConstraintClass::kStructure;
+  }
+
+  Scope MakeScope(const std::vector<FeatureId>* features) const {
+    Scope scope;
+    scope.features = features;
+    if (features == nullptr) return scope;
+    std::set<FeatureId> seen;
+    std::set<FeatureId> variables;
+    std::vector<FeatureId> queue;
+    for (const FeatureId id : *features) {
+      if (graph->FindFeature(id) == nullptr || !seen.insert(id).second) {
+        continue;
+      }
+      variables.insert(id);
+      queue.push_back(id);
+    }
+    for (std::size_t i = 0; i < queue.size(); ++i) {
+      const int level = graph->FindFeature(queue[i])->level;
+      for (const ConstraintId constraint_id : graph->ConstraintsOf(queue[i])) {
+        const Constraint& constraint = *graph->FindConstraint(constraint_id);
+        if (!IsLiveStructure(constraint)) continue;
+        for (const FeatureId id : constraint.features) {
+          const Feature& other = *graph->FindFeature(id);
+          if (!other.is_virtual || other.level <= level ||
+              !seen.insert(id).second) {
+            continue;
+          }
+          if (graph->ConstraintsOf(id).size() <= kMaxLocalConstraints) {
+            variables.insert(id);
+            queue.push_back(id);
+          }
+        }
+      }
+    }
+    scope.variables.assign(variables.begin(), variables.end());
+    scope.attached.assign(seen.begin(), seen.end());
+    return scope;
+  }
+
+  void Optimize(const Scope& scope) {
+    const auto start = std::chrono::steady_clock::now();
+    if (scope.features == nullptr) {
+      if (is_dirty) {
+        is_usable = session->SolveGlobal().usable;
+        is_dirty = false;
+      }
+    } else {
+      is_usable = session->SolveLocal(scope.variables).usable;
+    }
+    totals.solve_seconds += SecondsSince(start);
+  }
+
+  // Live structure constraints that the iteration works on, ascending.
+  std::vector<Constraint*> StructureOf(const Scope& scope) {
+    std::vector<Constraint*> structure;
+    if (scope.features == nullptr) {
+      for (Constraint* constraint : graph->MutableConstraints()) {
+        if (IsLiveStructure(*constraint)) structure.push_back(constraint);
+      }
+      return structure;
+    }
+    std::set<ConstraintId> ids;
+    for (const FeatureId id : scope.variables) {
+      const auto& constraints = graph->ConstraintsOf(id);
+      ids.insert(constraints.begin(), constraints.end());
+    }
+    for (const ConstraintId id : ids) {
+      Constraint* constraint = graph->FindConstraint(id);
+      if (IsLiveStructure(*constraint)) structure.push_back(constraint);
+    }
+    return structure;
+  }
+
+  // E-step and breaking; true when something was broken or dropped.
+  bool Break(const Scope& scope) {
+    const double change = session->UpdateDeltas(
+        scope.features == nullptr ? nullptr : &scope.variables);
+    if (change > kDeltaChange) is_dirty = true;
+    Transaction transaction;
+    // Residuals of a state that could not be solved for prove nothing.
+    if (options.break_constraints && is_usable) {
+      for (const Constraint* constraint : StructureOf(scope)) {
+        const double delta = constraint->delta > kDeltaFloor
+                                 ? constraint->delta
+                                 : session->Delta(*constraint);
+        if (delta >= options.delta_threshold) continue;
+        transaction.BreakConstraint(constraint->id);
+      }
+    }
+    const bool has_broken = !transaction.empty();
+    if (has_broken) graph->Apply(std::move(transaction));
+    if (scope.features == nullptr) {
+      for (int level = 0; level <= highest_level; ++level) {
+        const auto& ids = graph->VirtualFeatures(level);
+        lost_support.insert(ids.begin(), ids.end());
+      }
+    }
+    const bool has_dropped = DropUnsupported();
+    return has_broken || has_dropped;
+  }
+
+  int MinimumSupport(const Feature& feature) const {
+    const auto found = minimum_support.find(feature.source);
+    return found == minimum_support.end() ? 1 : found->second;
+  }
+
+  bool IsSupport(const Constraint& constraint, const Feature& feature) const {
+    return std::any_of(constraint.features.begin(), constraint.features.end(),
+                       [&](FeatureId id) {
+                         return graph->FindFeature(id)->level < feature.level;
+                       });
+  }
+
+  // Drops virtual features without support, also those that lose theirs by it.
+  bool DropUnsupported() {
+    bool has_dropped = false;
+    while (!lost_support.empty()) {
+      const FeatureId id = *lost_support.begin();
+      lost_support.erase(lost_support.begin());
+      const Feature* feature = graph->FindFeature(id);
+      if (feature == nullptr || !feature->is_virtual || feature->fixed) {
+        continue;
+      }
+      Transaction transaction;
+      const Constraint* last = nullptr;
+      int live = 0;
+      int support = 0;
+      bool is_measured = false;
+      for (const ConstraintId constraint_id : graph->ConstraintsOf(id)) {
+        const Constraint& constraint = *graph->FindConstraint(constraint_id);
+        if (constraint.state != ConstraintState::kLive) continue;
+        if (constraint.kind == ConstraintClass::kMeasurement) {
+          is_measured = true;
+          break;
+        }
+        ++live;
+        if (IsSupport(constraint, *feature)) ++support;
+        last = &constraint;
+        transaction.RemoveConstraint(constraint_id);
+      }
+      if (is_measured) continue;
+      const bool is_supported = support >= MinimumSupport(*feature);
+      if (is_supported && live > 1) continue;
+      if (is_supported && last != nullptr) {
+        // Nothing is wrong with it, but it would be found and dropped again.
+        silent_alone.insert(AloneKey(*last, id));
+      }
+      transaction.RemoveFeature(id);
+      graph->Apply(std::move(transaction));
+      has_dropped = true;
+    }
+    return has_dropped;
+  }
+
+  // What a detector of a level may look at in a scope.
+  std::vector<FeatureId> FeaturesOfLevel(const Scope& scope, int level) const {
+    std::vector<FeatureId> ids;
+    for (const FeatureId id : scope.attached) {
+      const Feature* feature = graph->FindFeature(id);
+      if (feature != nullptr && feature->level == level) ids.push_back(id);
+    }
+    return ids;
+  }
+
+  // Detects, filters and adds; true when something was added.
+  bool Detect(int level, const std::vector<FeatureId>* scope_features) {
+    const auto start = std::chrono::steady_clock::now();
+    const Scope scope = MakeScope(scope_features);
+    DetectionScope detection;
+    detection.level = level;
+    const std::vector<FeatureId> ids = FeaturesOfLevel(scope, level);
+    if (scope_features != nullptr) detection.features = &ids;
+    bool has_changed = false;
+    const auto& detectors = hierarchy[static_cast<std::size_t>(level)];
+    for (std::size_t i = 0; i < detectors.size(); ++i) {
+      // Different for every detector, the same in every iteration, so that what
+      // is found at a fixed point is the same too.
+      detection.seed =
+          options.seed + 1000003u * static_cast<std::uint64_t>(level) + i;
+      Transaction proposal = detectors[i]->Detect(*graph, registry, detection);
+      if (proposal.empty()) continue;
+      Transaction accepted = Filter(std::move(proposal), *detectors[i]);
+      if (accepted.empty()) continue;
+      graph->Apply(std::move(accepted));
+      has_changed = true;
+    }
+    totals.detect_seconds += SecondsSince(start);
+    return has_changed;
+  }
+
+  bool IsThere(const Constraint& constraint) const {
+    const std::vector<ConstraintId>* fewest = nullptr;
+    for (const FeatureId id : constraint.features) {
+      if (graph->FindFeature(id) == nullptr) return false;
+      const auto& constraints = graph->ConstraintsOf(id);
+      if (fewest == nullptr || constraints.size() < fewest->size()) {
+        fewest = &constraints;
+      }
+    }
+    return fewest != nullptr &&
+           std::any_of(fewest->begin(), fewest->end(), [&](ConstraintId id) {
+             const Constraint& other = *graph->FindConstraint(id);
+             return other.state == ConstraintState::kLive &&
+                    other.type == constraint.type &&
+                    other.features == constraint.features &&
+                    other.expected == constraint.expected;
+           });
+  }
+
+  // Takes out of a proposal what is there already, what was broken before, and
+  // virtual features that are left with too little support.
+  Transaction Filter(Transaction proposal, const StructureDetector& detector) {
+    std::vector<Feature>& features = proposal.added_features();
+    for (Feature& feature : features) {
+      feature.is_virtual = true;
+      if (feature.source.empty()) feature.source = detector.name();
+    }
+    const auto find = [&](FeatureId id) -> const Feature* {
+      if (!Transaction::IsProvisional(id)) return graph->FindFeature(id);
+      const std::size_t index = Transaction::ProvisionalIndex(id);
+      return index < features.size() ? &features[index] : nullptr;
+    };
+    std::vector<Constraint> constraints;
+    for (Constraint& constraint : proposal.added_constraints()) {
+      if (IsThere(constraint)) continue;
+      std::vector<const Feature*> between;
+      for (const FeatureId id : constraint.features) {
+        if (const Feature* feature = find(id)) between.push_back(feature);
+      }
+      // Constraints between unknown features are left to Graph::Apply.
+      if (between.size() == constraint.features.size() &&
+          !MayBeProposed(constraint, between)) {
+        continue;
+      }
+      constraints.push_back(std::move(constraint));
+    }
+
+    std::vector<bool> is_kept(features.size(), true);
+    for (bool has_changed = true; has_changed;) {
+      has_changed = false;
+      for (std::size_t i = 0; i < features.size(); ++i) {
+        if (!is_kept[i] || features[i].fixed) continue;
+        const FeatureId id = Transaction::ProvisionalId(i);
+        const auto is_on = [id](const Constraint& constraint) {
+          return std::count(constraint.features.begin(),
+                            constraint.features.end(), id) > 0;
+        };
+        const Constraint* last = nullptr;
+        int live = 0;
+        int support = 0;
+        for (const Constraint& constraint : constraints) {
+          if (!is_on(constraint)) continue;
+          ++live;
+          last = &constraint;
+          if (std::any_of(constraint.features.begin(),
+                          constraint.features.end(), [&](FeatureId other) {
+                            const Feature* feature = find(other);
+                            return feature != nullptr &&
+                                   feature->level < features[i].level;
+                          })) {
+            ++support;
+          }
+        }
+        if (support >= detector.minimum_support() &&
+            !(live == 1 && silent_alone.count(AloneKey(*last, id)) > 0)) {
+          continue;
+        }
+        is_kept[i] = false;
+        has_changed = true;
+        constraints.erase(
+            std::remove_if(constraints.begin(), constraints.end(), is_on),
+            constraints.end());
+      }
+    }
+
+    Transaction accepted;
+    std::map<FeatureId, FeatureId> new_ids;
+    for (std::size_t i = 0; i < features.size(); ++i) {
+      if (!is_kept[i]) continue;
+      new_ids[Transaction::ProvisionalId(i)] =
+          accepted.AddFeature(std::move(features[i]));
+    }
+    for (Constraint& constraint : constraints) {
+      for (FeatureId& id : constraint.features) {
+        const auto found = new_ids.find(id);
+        if (found != new_ids.end()) id = found->second;
+      }
+      if (constraint.source.empty()) constraint.source = detector.name();
+      accepted.AddConstraint(std::move(constraint));
+    }
+    for (const FeatureId id : proposal.removed_features()) {
+      accepted.RemoveFeature(id);
+    }
+    for (const ConstraintId id : proposal.removed_constraints()) {
+      accepted.RemoveConstraint(id);
+    }
+    for (const ConstraintId id : proposal.broken_constraints()) {
+      accepted.BreakConstraint(id);
+    }
+    return accepted;
+  }
+
+  // Reports a phase that began at `start`; false when the loop shall stop.
+  bool EndPhase(const std::string& name, const Scope& scope,
+                std::chrono::steady_clock::time_point start) {
+    if (trace) {
+      EmPhase phase;
+      phase.iteration = totals.iterations;
+      phase.phase = name;
+      phase.seconds = SecondsSince(start);
+      phase.cost =
+          session->Cost(scope.features == nullptr ? nullptr : &scope.variables);
+      phase.features = feature_counts;
+      phase.structure_constraints = structure_count;
+      phase.broken_constraints = static_cast<int>(broken_on_record.size());
+      trace(phase);
+    }
+    if (stop && stop()) is_stopped = true;
+    return !is_stopped;
+  }
+
+  bool Iterate(const std::vector<FeatureId>* features) {
+    ++totals.iterations;
+    auto start = std::chrono::steady_clock::now();
+    Scope scope = MakeScope(features);
+    Optimize(scope);
+    if (!EndPhase("optimize", scope, start)) return false;
+
+    start = std::chrono::steady_clock::now();
+    bool has_changed = Break(scope);
+    if (features != nullptr) scope = MakeScope(features);
+    Optimize(scope);
+    MeasureRelaxedErrors();
+    if (!EndPhase("break", scope, start)) return has_changed;
+
+    for (std::size_t level = 0; level < hierarchy.size(); ++level) {
+      start = std::chrono::steady_clock::now();
+      if (Detect(static_cast<int>(level), features)) {
+        has_changed = true;
+        if (features != nullptr) scope = MakeScope(features);
+        Optimize(scope);
+      }
+      if (!EndPhase("detect_" + std::to_string(level), scope, start)) break;
+    }
+    return has_changed;
+  }
+
+  Graph* graph;
+  SolverSession* session;
+  const Registry& registry;
+  Hierarchy hierarchy;
+  EmOptions options;
+  std::map<std::string, int> minimum_support;
+
+  std::map<HypothesisKey, std::vector<BrokenHypothesis>> memory;
+  // Keys of hypotheses that were broken and not measured since.
+  std::set<HypothesisKey> unmeasured;
+  // Virtual features that are gone, as they were last.
+  std::map<FeatureId, Feature> dropped;
+  // Features and relations that alone made a virtual feature that said nothing.
+  std::set<HypothesisKey> silent_alone;
+  // Virtual features that lost a constraint.
+  std::set<FeatureId> lost_support;
+
+  std::map<std::string, int> feature_counts;
+  std::set<ConstraintId> broken_on_record;
+  int structure_count = 0;
+  int highest_level = 0;
+  // The graph or a weight changed since the last global solve.
+  bool is_dirty = true;
+  bool is_usable = true;
+  bool is_stopped = false;
+  std::function<bool()> stop;
+  std::function<void(const EmPhase&)> trace;
+  EmReport totals;
+};
+
+EmOrchestrator::EmOrchestrator(Graph* graph, SolverSession* session,
+                               const Registry& registry, Hierarchy hierarchy,
+                               const EmOptions& options)
+    : impl_(std::make_unique<Impl>(graph, session, registry,
+                                   std::move(hierarchy), options)) {}
+
+EmOrchestrator::~EmOrchestrator() = default;
+
+bool EmOrchestrator::Iterate(const std::vector<FeatureId>* scope) {
+  impl_->stop = nullptr;
+  impl_->is_stopped = false;
+  // Parameters may have been changed without the graph's knowledge.
+  impl_->is_dirty = true;
+  return impl_->Iterate(scope);
+}
+
+EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
+  const EmReport before = impl_->totals;
+  impl_->stop = stop;
+  impl_->is_stopped = false;
+  impl_->is_dirty = true;
+  bool has_converged = false;
+
+  const auto start = std::chrono::steady_clock::now();
+  const Impl::Scope whole;
+  impl_->Optimize(whole);
+  bool goes_on = impl_->EndPhase(
+      impl_->structure_count == 0 ? "measurements" : "optimize", whole, start);
+  double cost = impl_->session->Cost().total();
+  for (int i = 0; goes_on && i < impl_->options.max_iterations; ++i) {
+    const bool has_changed = impl_->Iterate(nullptr);
+    goes_on = !impl_->is_stopped;
+    const double last_cost = cost;
+    cost = impl_->session->Cost().total();
+    if (goes_on && !has_changed && impl_->is_usable &&
+        std::abs(cost - last_cost) <=
+            impl_->options.cost_tolerance * std::max(cost, last_cost)) {
+      has_converged = true;
+      goes_on = false;
+    }
+  }
+  impl_->stop = nullptr;
+  impl_->totals.converged = has_converged;
+  EmReport report = impl_->totals;
+  report.iterations -= before.iterations;
+  report.detect_seconds -= before.detect_seconds;
+  report.solve_seconds -= before.solve_seconds;
+  return report;
+}
+
+void EmOrchestrator::SetTrace(std::function<void(const EmPhase&)> trace) {
+  impl_->trace = std::move(trace);
+}
+
+const EmReport& EmOrchestrator::totals() const { return impl_->totals; }
+
+}  // namespace plumbline

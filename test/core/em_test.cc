@@ -1,0 +1,811 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/em.h>
+#include <plumbline/core/error.h>
+#include <plumbline/factors/angle.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// A detector made of a function.
+class TestDetector : public StructureDetector {
+ public:
+  using Function = std::function<Transaction(const Graph&, const Registry&,
+                                             const DetectionScope&)>;
+  TestDetector(std::string name, int support, Function detect)
+      : name_(std::move(name)), support_(support), detect_(std::move(detect)) {}
+  const std::string& name() const override { return name_; }
+  int minimum_support() const override { return support_; }
+  Transaction Detect(const Graph& graph, const Registry& registry,
+                     const DetectionScope& scope) const override {
+    return detect_(graph, registry, scope);
+  }
+
+ private:
+  std::string name_;
+  int support_;
+  Function detect_;
+};
+
+Feature Orientation(const Registry& registry, double angle, int level = 1) {
+  Feature feature;
+  feature.type = &registry.GetFeature("orientation");
+  feature.level = level;
+  feature.is_virtual = true;
+  feature.parameters[0] = angle;
+  return feature;
+}
+
+Constraint Structure(const Registry& registry, const std::string& relation,
+                     FeatureId a, FeatureId b, double expected,
+                     double sigma_degrees) {
+  Constraint constraint;
+  constraint.type = &registry.GetRelation(relation);
+  constraint.features = {a, b};
+  constraint.expected = Eigen::VectorXd::Constant(1, expected);
+  const double sigma = DegToRad(sigma_degrees);
+  constraint.information = Eigen::MatrixXd::Constant(1, 1, 1 / (sigma * sigma));
+  constraint.kind = ConstraintClass::kStructure;
+  return constraint;
+}
+
+bool HasLive(const Graph& graph, FeatureId id, const std::string& relation) {
+  for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
+    const Constraint& constraint = graph.GetConstraint(constraint_id);
+    if (constraint.state == ConstraintState::kLive &&
+        constraint.type->name == relation) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// Ties every free segment within 6 degrees of one of the directions to an
+// orientation there; tolerance 0.5 degrees.
+TestDetector::Function DirectionDetector(std::vector<double> degrees) {
+  return [degrees](const Graph& graph, const Registry& registry,
+                   const DetectionScope& scope) {
+    std::vector<const Feature*> segments;
+    if (scope.features != nullptr) {
+      for (const FeatureId id : *scope.features) {
+        segments.push_back(graph.FindFeature(id));
+      }
+    } else {
+      segments = graph.Features();
+    }
+    Transaction transaction;
+    for (const double direction : degrees) {
+      FeatureId orientation = kNoId;
+      for (const FeatureId id : graph.VirtualFeatures(scope.level + 1)) {
+        const double angle = graph.GetFeature(id).parameters[0];
+        if (std::abs(NormalizeAxial(angle - DegToRad(direction))) < 0.2) {
+          orientation = id;
+        }
+      }
+      for (const Feature* segment : segments) {
+        if (segment->type->name != "segment" || segment->level != scope.level ||
+            HasLive(graph, segment->id, "segment_orientation")) {
+          continue;
+        }
+        if (std::abs(NormalizeAxial(segment->parameters[2] -
+                                    DegToRad(direction))) > DegToRad(6.0)) {
+          continue;
+        }
+        if (orientation == kNoId) {
+          orientation = transaction.AddFeature(
+              Orientation(registry, DegToRad(direction), scope.level + 1));
+        }
+        transaction.AddConstraint(Structure(registry, "segment_orientation",
+                                            segment->id, orientation, 0.0,
+                                            0.5));
+      }
+    }
+    return transaction;
+  };
+}
+
+// Right angles between all orientations of the level.
+Transaction RightAngles(const Graph& graph, const Registry& registry,
+                        const DetectionScope& scope) {
+  Transaction transaction;
+  const auto& ids = graph.VirtualFeatures(scope.level);
+  for (std::size_t j = 1; j < ids.size(); ++j) {
+    if (HasLive(graph, ids[j], "orientation_orientation")) continue;
+    transaction.AddConstraint(Structure(registry, "orientation_orientation",
+                                        ids[0], ids[j], kPi / 2, 0.1));
+  }
+  return transaction;
+}
+
+class EmTest : public ::testing::Test {
+ protected:
+  EmTest() {
+    RegisterBuiltinRelations(&registry_);
+    Feature robot;
+    robot.type = &registry_.GetFeature("pose");
+    robot.fixed = true;
+    Transaction transaction;
+    transaction.AddFeature(robot);
+    robot_ = graph_.Apply(transaction).features[0];
+  }
+
+  // A segment seen from the fixed robot in this direction, to 1 cm and 1
+  // degree.
+  FeatureId AddSegment(double degrees) {
+    Feature segment;
+    segment.type = &registry_.GetFeature("segment");
+    const double n = static_cast<double>(segments_.size());
+    segment.parameters = {n, 1.0, DegToRad(degrees)};
+    Constraint seen;
+    seen.type = &registry_.GetRelation("pose_pose");
+    seen.expected = Eigen::Vector3d(n, 1.0, DegToRad(degrees));
+    const double sigma = DegToRad(1.0);
+    seen.information =
+        Eigen::Vector3d(1e4, 1e4, 1.0 / (sigma * sigma)).asDiagonal();
+    Transaction transaction;
+    seen.features = {robot_, transaction.AddFeature(segment)};
+    transaction.AddConstraint(seen);
+    const TransactionResult result = graph_.Apply(transaction);
+    segments_.push_back(result.features[0]);
+    sightings_.push_back(result.constraints[0]);
+    return segments_.back();
+  }
+
+  // The robot now sees the i-th segment in this direction.
+  void Turn(std::size_t i, double degrees) {
+    const Constraint& seen = graph_.GetConstraint(sightings_[i]);
+    Eigen::VectorXd expected = seen.expected;
+    expected[2] = DegToRad(degrees);
+    graph_.UpdateConstraint(seen.id, expected, seen.information);
+  }
+
+  void Add(int level, const std::string& name, int support,
+           TestDetector::Function detect) {
+    const auto size = static_cast<std::size_t>(level) + 1;
+    if (hierarchy_.size() < size) hierarchy_.resize(size);
+    hierarchy_[size - 1].push_back(
+        std::make_unique<TestDetector>(name, support, std::move(detect)));
+  }
+
+  EmOrchestrator& Make(const EmOptions& options = EmOptions()) {
+    session_ =
+        std::make_unique<SolverSession>(&graph_, registry_, SessionOptions());
+    em_ = std::make_unique<EmOrchestrator>(&graph_, session_.get(), registry_,
+                                           std::move(hierarchy_), options);
+    em_->SetTrace([this](const EmPhase& phase) { trace_.push_back(phase); });
+    return *em_;
+  }
+
+  int Count(const std::string& relation, ConstraintState state) const {
+    int count = 0;
+    for (const Constraint* constraint : graph_.Constraints()) {
+      count += constraint->type->name == relation && constraint->state == state;
+    }
+    return count;
+  }
+  int Live(const std::string& relation = "segment_orientation") const {
+    return Count(relation, ConstraintState::kLive);
+  }
+  int Broken(const std::string& relation = "segment_orientation") const {
+    return Count(relation, ConstraintState::kBroken);
+  }
+
+  double Direction(FeatureId segment) const {
+    return RadToDeg(graph_.GetFeature(segment).parameters[2]);
+  }
+  double Angle(FeatureId orientation) const {
+    return RadToDeg(graph_.GetFeature(orientation).parameters[0]);
+  }
+
+  Registry registry_;
+  Graph graph_;
+  FeatureId robot_ = kNoId;
+  std::vector<FeatureId> segments_;
+  std::vector<ConstraintId> sightings_;
+  Hierarchy hierarchy_;
+  std::vector<EmPhase> trace_;
+  // In this order: the session outlives the orchestrator.
+  std::unique_ptr<SolverSession> session_;
+  std::unique_ptr<EmOrchestrator> em_;
+};
+
+// Ten walls around 0 degrees, nine around 90, and one at 5 degrees that the
+// detector takes for one of the first.
+class BuildingTest : public EmTest {
+ protected:
+  BuildingTest() {
+    const double noise[] = {0.5,  -0.8, 1.1, -0.3, 0.2,
+                            -1.0, 0.7,  0.4, -0.6, -0.2};
+    for (int i = 0; i < 10; ++i) AddSegment(noise[i]);
+    for (int i = 0; i < 9; ++i) AddSegment(90.0 - noise[i]);
+    wrong_ = AddSegment(5.0);
+    Add(0, "directions", 2, DirectionDetector({0.0, 90.0}));
+    Add(1, "right_angles", 1, RightAngles);
+  }
+  FeatureId wrong_ = kNoId;
+};
+
+TEST_F(BuildingTest, WrongStructureIsBrokenAndTheRestIsRight) {
+  const EmReport report = Make().Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_LT(report.iterations, 30);
+  EXPECT_EQ(Live(), 19);
+  EXPECT_EQ(Broken(), 1);
+  EXPECT_EQ(Live("orientation_orientation"), 1);
+  EXPECT_FALSE(HasLive(graph_, wrong_, "segment_orientation"));
+  EXPECT_NEAR(Direction(wrong_), 5.0, 1e-5);
+  ASSERT_EQ(graph_.VirtualFeatures(1).size(), 2u);
+  const double first = Angle(graph_.VirtualFeatures(1)[0]);
+  const double second = Angle(graph_.VirtualFeatures(1)[1]);
+  EXPECT_NEAR(first, 0.0, 0.15);
+  EXPECT_NEAR(RadToDeg(NormalizeAxial(DegToRad(second - first - 90.0))), 0.0,
+              0.02);
+  // Noise of up to 1.1 degrees is pulled in.
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_NEAR(Direction(segments_[i]), first, 0.6);
+  }
+  EXPECT_EQ(graph_.GetFeature(graph_.VirtualFeatures(1)[0]).source,
+            "directions");
+}
+
+TEST_F(BuildingTest, WithoutBreakingItIsKeptAtLowWeight) {
+  EmOptions options;
+  options.break_constraints = false;
+  const EmReport report = Make(options).Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_EQ(Live(), 20);
+  EXPECT_EQ(Broken(), 0);
+  for (const ConstraintId id : graph_.ConstraintsOf(wrong_)) {
+    const Constraint& constraint = graph_.GetConstraint(id);
+    if (constraint.kind == ConstraintClass::kStructure) {
+      EXPECT_LT(constraint.delta, 0.05);
+      EXPECT_GE(constraint.delta, kDeltaFloor);
+    }
+  }
+}
+
+TEST_F(BuildingTest, TraceTellsThePhases) {
+  EmOrchestrator& em = Make();
+  em.Run();
+  ASSERT_GE(trace_.size(), 9u);
+  std::vector<std::string> names;
+  for (int i = 0; i < 9; ++i) {
+    names.push_back(std::to_string(trace_[i].iteration) + trace_[i].phase);
+  }
+  EXPECT_THAT(names, ElementsAre("0measurements", "1optimize", "1break",
+                                 "1detect_0", "1detect_1", "2optimize",
+                                 "2break", "2detect_0", "2detect_1"));
+  EXPECT_EQ(trace_[0].structure_constraints, 0);
+  EXPECT_EQ(trace_[0].cost.structure, 0.0);
+  EXPECT_NEAR(trace_[0].cost.measurement, 0.0, 1e-12);
+  EXPECT_EQ(trace_[0].features.at("segment"), 20);
+  EXPECT_EQ(trace_[0].features.count("orientation"), 0u);
+  EXPECT_EQ(trace_[3].structure_constraints, 20);
+  EXPECT_EQ(trace_[3].features.at("orientation"), 2);
+  EXPECT_EQ(trace_[4].structure_constraints, 21);
+  EXPECT_EQ(trace_[4].broken_constraints, 0);
+  EXPECT_EQ(trace_[6].structure_constraints, 20);
+  EXPECT_EQ(trace_[6].broken_constraints, 1);
+  EXPECT_GT(trace_[6].cost.structure, 0.0);
+  EXPECT_LT(trace_[6].cost.total(), trace_[4].cost.total());
+  EXPECT_EQ(em.totals().iterations, trace_.back().iteration);
+  EXPECT_TRUE(em.totals().converged);
+}
+
+TEST_F(BuildingTest, SolvesOnlyWhatIsNew) {
+  Make().Run();
+  const int solves = session_->num_solves();
+  // From a fixed point: one to begin with and one for the weights at most.
+  const EmReport report = em_->Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_EQ(report.iterations, 1);
+  EXPECT_LE(session_->num_solves() - solves, 2);
+}
+
+TEST_F(BuildingTest, StopEndsTheLoopBetweenPhases) {
+  int asked = 0;
+  const EmReport report = Make().Run([&asked] { return ++asked == 4; });
+  EXPECT_EQ(asked, 4);
+  EXPECT_EQ(trace_.size(), 4u);
+  EXPECT_EQ(trace_.back().phase, "detect_0");
+  EXPECT_FALSE(report.converged);
+  EXPECT_EQ(report.iterations, 1);
+  // It can go on.
+  EXPECT_TRUE(em_->Run().converged);
+  EXPECT_EQ(Live(), 19);
+}
+
+TEST_F(BuildingTest, NoIterationsSolveTheMeasurements) {
+  EmOptions options;
+  options.max_iterations = 0;
+  const EmReport report = Make(options).Run();
+  EXPECT_EQ(report.iterations, 0);
+  EXPECT_FALSE(report.converged);
+  EXPECT_EQ(session_->num_solves(), 1);
+  EXPECT_EQ(Live(), 0);
+}
+
+TEST_F(BuildingTest, StructureThatIsThereIsUsed) {
+  Make().Run();
+  em_.reset();
+  trace_.clear();
+  Make().Run();
+  EXPECT_EQ(trace_[0].phase, "optimize");
+  EXPECT_EQ(trace_[0].structure_constraints, 20);
+  EXPECT_EQ(trace_[0].broken_constraints, 1);
+}
+
+TEST_F(BuildingTest, BrokenOnesOnRecordAreRemembered) {
+  Make().Run();
+  em_.reset();
+  Add(0, "directions", 2, DirectionDetector({0.0, 90.0}));
+  const EmReport report = Make().Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_EQ(Broken(), 1);
+  EXPECT_FALSE(HasLive(graph_, wrong_, "segment_orientation"));
+}
+
+TEST_F(BuildingTest, ScopeTouchesNothingElse) {
+  Make();
+  em_->Run();
+  // Two orientations with ten and nine walls vary with the scope; far walls do
+  // not.
+  Turn(0, 0.3);
+  Turn(5, -3.0);
+  const FeatureId late = AddSegment(-0.4);
+  const double far = Direction(segments_[5]);
+  const std::vector<FeatureId> scope = {segments_[0], segments_[1], late};
+  trace_.clear();
+  EXPECT_TRUE(em_->Iterate(&scope));
+  EXPECT_TRUE(HasLive(graph_, late, "segment_orientation"));
+  EXPECT_EQ(Direction(segments_[5]), far);
+  EXPECT_EQ(Live(), 20);
+  EXPECT_EQ(trace_.size(), 4u);
+  EXPECT_FALSE(em_->Iterate(&scope));
+  // The whole graph notices the turned wall.
+  EXPECT_TRUE(em_->Iterate());
+  EXPECT_FALSE(HasLive(graph_, segments_[5], "segment_orientation"));
+}
+
+TEST_F(EmTest, LargeVirtualFeaturesAreHeldInAScope) {
+  for (int i = 0; i < 60; ++i) AddSegment(0.0);
+  Add(0, "directions", 2, DirectionDetector({0.0}));
+  Make().Run();
+  ASSERT_EQ(Live(), 60);
+  const FeatureId orientation = graph_.VirtualFeatures(1)[0];
+  const double angle = graph_.GetFeature(orientation).parameters[0];
+  Turn(0, 0.5);
+  const std::vector<FeatureId> scope = {segments_[0]};
+  const int blocks = session_->totals().residual_blocks;
+  const int solves = session_->num_solves();
+  em_->Iterate(&scope);
+  EXPECT_EQ(graph_.GetFeature(orientation).parameters[0], angle);
+  // The wall's sighting and its orientation, in every solve.
+  EXPECT_EQ(session_->totals().residual_blocks - blocks,
+            2 * (session_->num_solves() - solves));
+  // Between 0.5 (weight 1 degree) and 0 (0.5 degrees), weighted by delta.
+  EXPECT_GT(Direction(segments_[0]), 0.05);
+  EXPECT_LT(Direction(segments_[0]), 0.3);
+}
+
+TEST_F(EmTest, AStubbornDetectorIsNotBelievedForEver) {
+  // Two walls 8 degrees apart are said to be parallel, every time by a new
+  // orientation of a slightly different value.
+  const FeatureId a = AddSegment(0.0);
+  const FeatureId b = AddSegment(8.0);
+  int calls = 0;
+  Add(0, "stubborn", 2,
+      [&](const Graph& graph, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        if (HasLive(graph, a, "segment_orientation")) return transaction;
+        const FeatureId orientation = transaction.AddFeature(
+            Orientation(registry, DegToRad(4.0 + 0.1 * (calls++ % 3))));
+        for (const FeatureId id : {a, b}) {
+          transaction.AddConstraint(Structure(registry, "segment_orientation",
+                                              id, orientation, 0.0, 0.5));
+        }
+        return transaction;
+      });
+  const EmReport report = Make().Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_LT(report.iterations, 10);
+  EXPECT_GE(calls, 2);
+  EXPECT_EQ(Live(), 0);
+  EXPECT_TRUE(graph_.VirtualFeatures(1).empty());
+  EXPECT_NEAR(Direction(a), 0.0, 1e-5);
+  EXPECT_NEAR(Direction(b), 8.0, 1e-5);
+  // Nothing was ever accepted again.
+  int most = 0;
+  for (const EmPhase& phase : trace_) {
+    if (phase.iteration > 1 && phase.phase == "detect_0") {
+      most = std::max(most, phase.structure_constraints);
+    }
+  }
+  EXPECT_EQ(most, 0);
+}
+
+TEST_F(EmTest, AHypothesisThatBecomesTrueIsBelievedAgain) {
+  for (int i = 0; i < 5; ++i) AddSegment(0.0);
+  const FeatureId wall = AddSegment(5.0);
+  Add(0, "directions", 2, DirectionDetector({0.0}));
+  Make().Run();
+  EXPECT_FALSE(HasLive(graph_, wall, "segment_orientation"));
+  Turn(5, 0.5);
+  em_->Run();
+  EXPECT_TRUE(HasLive(graph_, wall, "segment_orientation"));
+  EXPECT_EQ(Live(), 6);
+}
+
+TEST_F(EmTest, AHypothesisIsBrokenOnlySoOften) {
+  for (int i = 0; i < 5; ++i) AddSegment(0.0);
+  const FeatureId wall = AddSegment(5.9);
+  Add(0, "directions", 2, DirectionDetector({0.0}));
+  EmOptions options;
+  options.max_breaks = 2;
+  Make(options).Run();
+  EXPECT_EQ(Broken(), 1);
+  // 0.9 degrees nearer is more than the tolerance of 0.5 degrees.
+  Turn(5, 5.0);
+  em_->Run();
+  EXPECT_EQ(Broken(), 2);
+  Turn(5, 4.1);
+  em_->Run();
+  EXPECT_EQ(Broken(), 2);
+  // Not even when it is true now.
+  Turn(5, 0.0);
+  em_->Run();
+  EXPECT_FALSE(HasLive(graph_, wall, "segment_orientation"));
+}
+
+TEST_F(EmTest, ASmallImprovementIsNoReasonToTryAgain) {
+  for (int i = 0; i < 5; ++i) AddSegment(0.0);
+  AddSegment(5.0);
+  Add(0, "directions", 2, DirectionDetector({0.0}));
+  Make().Run();
+  EXPECT_EQ(Broken(), 1);
+  Turn(5, 4.6);
+  em_->Run();
+  EXPECT_EQ(Broken(), 1);
+  Turn(5, 5.9);  // worse
+  em_->Run();
+  EXPECT_EQ(Broken(), 1);
+}
+
+TEST_F(EmTest, AFeatureThatSaysNothingIsDroppedOnce) {
+  AddSegment(0.0);
+  Add(0, "directions", 1, DirectionDetector({0.0, 90.0}));
+  const EmReport report = Make().Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_LT(report.iterations, 6);
+  EXPECT_TRUE(graph_.VirtualFeatures(1).empty());
+  EXPECT_EQ(Live(), 0);
+  // With company the same wall has an orientation.
+  AddSegment(0.2);
+  em_->Run();
+  EXPECT_EQ(Live(), 2);
+}
+
+TEST_F(EmTest, ASingleChildWithARelationStays) {
+  AddSegment(0.3);
+  AddSegment(90.0);
+  Add(0, "directions", 1, DirectionDetector({0.0, 90.0}));
+  Add(1, "right_angles", 1, RightAngles);
+  EXPECT_TRUE(Make().Run().converged);
+  EXPECT_EQ(Live(), 2);
+  EXPECT_EQ(Live("orientation_orientation"), 1);
+  EXPECT_LT(std::abs(Direction(segments_[1]) - Direction(segments_[0]) - 90.0),
+            0.3);
+}
+
+TEST_F(EmTest, DroppingGoesUpTheLevels) {
+  // Two orientations at level 1, one of level 2 on them that needs both.
+  AddSegment(0.0);
+  AddSegment(0.0);
+  AddSegment(30.0);
+  AddSegment(30.0);
+  Add(0, "directions", 2, DirectionDetector({0.0, 30.0}));
+  Add(1, "summits", 2,
+      [](const Graph& graph, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        const auto& ids = graph.VirtualFeatures(1);
+        if (ids.size() < 2 || !graph.VirtualFeatures(2).empty()) {
+          return transaction;
+        }
+        const FeatureId summit =
+            transaction.AddFeature(Orientation(registry, 0.0, 2));
+        transaction.AddConstraint(Structure(registry, "orientation_orientation",
+                                            ids[0], summit, 0.0, 0.5));
+        transaction.AddConstraint(Structure(registry, "orientation_orientation",
+                                            ids[1], summit, -DegToRad(30.0),
+                                            0.5));
+        return transaction;
+      });
+  Make().Run();
+  ASSERT_EQ(graph_.VirtualFeatures(2).size(), 1u);
+  EXPECT_EQ(Live("orientation_orientation"), 2);
+  // Both walls of the second orientation turn away, each to its own side.
+  Turn(2, 50.0);
+  Turn(3, 10.0);
+  EXPECT_TRUE(em_->Run().converged);
+  EXPECT_TRUE(graph_.VirtualFeatures(2).empty());
+  EXPECT_EQ(graph_.VirtualFeatures(1).size(), 1u);
+  EXPECT_EQ(Live("orientation_orientation"), 0);
+  EXPECT_EQ(Live(), 2);
+}
+
+TEST_F(EmTest, TooLittleSupportIsNotAdded) {
+  AddSegment(0.0);
+  AddSegment(0.0);
+  Add(0, "directions", 3, DirectionDetector({0.0}));
+  EXPECT_FALSE(Make().Iterate());
+  EXPECT_TRUE(graph_.VirtualFeatures(1).empty());
+  AddSegment(0.0);
+  EXPECT_TRUE(em_->Iterate());
+  EXPECT_EQ(Live(), 3);
+}
+
+TEST_F(EmTest, WhatIsThereAlreadyIsNotAddedAgain) {
+  const FeatureId a = AddSegment(0.0);
+  const FeatureId b = AddSegment(1.0);
+  Add(0, "forgetful", 1,
+      [&](const Graph&, const Registry& registry, const DetectionScope&) {
+        Constraint constraint;
+        constraint.type = &registry.GetRelation("pose_pose");
+        constraint.features = {a, b};
+        constraint.expected = Eigen::Vector3d(1.0, 0.0, 0.0);
+        constraint.information = Eigen::Matrix3d::Identity();
+        constraint.kind = ConstraintClass::kStructure;
+        Transaction transaction;
+        transaction.AddConstraint(constraint);
+        return transaction;
+      });
+  const EmReport report = Make().Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_EQ(graph_.num_constraints(), 3u);
+}
+
+TEST_F(EmTest, AnEndlessDetectorEndsAtMaxIterations) {
+  AddSegment(0.0);
+  AddSegment(0.0);
+  Add(0, "endless", 2,
+      [&](const Graph&, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        const FeatureId orientation =
+            transaction.AddFeature(Orientation(registry, 0.0));
+        for (const FeatureId id : segments_) {
+          transaction.AddConstraint(Structure(registry, "segment_orientation",
+                                              id, orientation, 0.0, 0.5));
+        }
+        return transaction;
+      });
+  EmOptions options;
+  options.max_iterations = 4;
+  const EmReport report = Make(options).Run();
+  EXPECT_EQ(report.iterations, 4);
+  EXPECT_FALSE(report.converged);
+  EXPECT_EQ(graph_.VirtualFeatures(1).size(), 4u);
+}
+
+TEST_F(EmTest, FixedAndMeasuredVirtualFeaturesStay) {
+  const FeatureId a = AddSegment(0.0);
+  Transaction transaction;
+  Feature known = Orientation(registry_, 0.0);
+  known.fixed = true;
+  transaction.AddFeature(known);
+  const FeatureId measured =
+      transaction.AddFeature(Orientation(registry_, 0.1));
+  transaction.AddFeature(Orientation(registry_, 0.2));  // on nothing
+  Constraint compass =
+      Structure(registry_, "segment_orientation", a, measured, 0.0, 1.0);
+  compass.kind = ConstraintClass::kMeasurement;
+  transaction.AddConstraint(compass);
+  const TransactionResult result = graph_.Apply(transaction);
+  Make().Run();
+  EXPECT_NE(graph_.FindFeature(result.features[0]), nullptr);
+  EXPECT_NE(graph_.FindFeature(result.features[1]), nullptr);
+  EXPECT_EQ(graph_.FindFeature(result.features[2]), nullptr);
+}
+
+TEST_F(EmTest, AnEmptyHierarchyConverges) {
+  AddSegment(0.0);
+  const EmReport report = Make().Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_EQ(report.iterations, 1);
+}
+
+TEST_F(EmTest, DetectorsGetLevelScopeAndSeed) {
+  AddSegment(0.0);
+  AddSegment(0.1);
+  std::vector<std::string> seen;
+  const auto record = [&](const Graph&, const Registry&,
+                          const DetectionScope& scope) {
+    std::string text = std::to_string(scope.level) + ":";
+    if (scope.features == nullptr)
+      text += " all";
+    else
+      for (const FeatureId id : *scope.features)
+        text += " " + std::to_string(id);
+    seen.push_back(text);
+    return Transaction();
+  };
+  std::set<std::uint64_t> seeds;
+  Add(0, "directions", 2, DirectionDetector({0.0}));
+  Add(0, "first", 1, record);
+  Add(1, "second", 1, record);
+  for (const char* const name : {"third", "fourth"}) {
+    Add(1, name, 1,
+        [&](const Graph&, const Registry&, const DetectionScope& scope) {
+          seeds.insert(scope.seed);
+          return Transaction();
+        });
+  }
+  Make();
+  em_->Iterate();
+  const std::vector<FeatureId> scope = {segments_[1], robot_};
+  em_->Iterate(&scope);
+  // The robot has the id 0, the walls 1 and 2, their orientation 3.
+  EXPECT_THAT(seen, ElementsAre("0: all", "1: all", "0: 0 2", "1: 3"));
+  EXPECT_EQ(seeds.size(), 2u);
+}
+
+TEST_F(EmTest, ABadProposalIsAnErrorAndChangesNothing) {
+  AddSegment(0.0);
+  Add(0, "bad", 1,
+      [&](const Graph&, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        transaction.AddConstraint(Structure(registry, "segment_orientation",
+                                            segments_[0], 77, 0.0, 0.5));
+        return transaction;
+      });
+  EXPECT_THROW(Make().Iterate(), Error);
+  EXPECT_EQ(graph_.num_constraints(), 1u);
+}
+
+TEST_F(EmTest, RemovedWallsTakeTheirSupportAlong) {
+  for (int i = 0; i < 3; ++i) AddSegment(0.0);
+  Add(0, "directions", 3, DirectionDetector({0.0}));
+  Make().Run();
+  ASSERT_EQ(Live(), 3);
+  Transaction transaction;
+  for (const ConstraintId id : graph_.ConstraintsOf(segments_[1])) {
+    transaction.RemoveConstraint(id);
+  }
+  transaction.RemoveFeature(segments_[1]);
+  graph_.Apply(transaction);
+  EXPECT_TRUE(em_->Iterate());
+  EXPECT_TRUE(graph_.VirtualFeatures(1).empty());
+  EXPECT_EQ(Live(), 0);
+}
+
+class SecondBuilding : public BuildingTest {
+ public:
+  void TestBody() override {}
+  std::vector<double> Run() {
+    Make().Run();
+    std::vector<double> state;
+    for (const Feature* feature : graph_.Features()) {
+      state.insert(state.end(), feature->parameters.begin(),
+                   feature->parameters.end());
+    }
+    for (const Constraint* constraint : graph_.Constraints()) {
+      state.push_back(constraint->delta);
+    }
+    return state;
+  }
+};
+
+TEST(EmDeterminismTest, SameInputSameBytes) {
+  SecondBuilding first;
+  SecondBuilding second;
+  EXPECT_EQ(first.Run(), second.Run());
+}
+
+class HierarchyTest : public ::testing::Test {
+ protected:
+  HierarchyTest() {
+    RegisterBuiltinRelations(&registry_);
+    Register("lines", {"point"}, {"line"});
+    Register("circles", {"point"}, {"circle"});
+    Register("centres", {"circle"}, {"point"});
+    Register("orientations", {"segment", "line"}, {"orientation"});
+    Register("relations", {"orientation"}, {});
+  }
+
+  void Register(const std::string& name, std::vector<std::string> reads,
+                std::vector<std::string> makes) {
+    DetectorType type;
+    type.name = name;
+    type.reads = std::move(reads);
+    type.makes = std::move(makes);
+    type.defaults = {{"sigma", 0.5}, {"support", 2.0}};
+    type.make = [this, name](const DetectorParameters& parameters) {
+      if (parameters.count("typo") > 0) {
+        throw PLUMBLINE_ERROR("unknown parameter typo", "sigma or support");
+      }
+      given_[name] = parameters;
+      return std::make_unique<TestDetector>(name, 1, nullptr);
+    };
+    registry_.Register(std::move(type));
+  }
+
+  std::string MessageOf(const std::string& description,
+                        const std::vector<std::string>& raw) {
+    try {
+      MakeHierarchy(description, registry_, raw, {});
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  Registry registry_;
+  std::map<std::string, DetectorParameters> given_;
+};
+
+TEST_F(HierarchyTest, ReadsLevelsAndNames) {
+  const Hierarchy hierarchy =
+      MakeHierarchy("lines, circles/centres,orientations/relations", registry_,
+                    {"point"}, {});
+  ASSERT_EQ(hierarchy.size(), 3u);
+  ASSERT_EQ(hierarchy[0].size(), 2u);
+  EXPECT_EQ(hierarchy[0][1]->name(), "circles");
+  ASSERT_EQ(hierarchy[1].size(), 2u);
+  EXPECT_EQ(hierarchy[1][0]->name(), "centres");
+  ASSERT_EQ(hierarchy[2].size(), 1u);
+}
+
+TEST_F(HierarchyTest, EmptyMeansNoDetectors) {
+  EXPECT_TRUE(MakeHierarchy("", registry_, {"point"}, {}).empty());
+}
+
+TEST_F(HierarchyTest, ParametersOverrideDefaults) {
+  MakeHierarchy("lines/orientations", registry_, {"point"},
+                {{"lines", {{"sigma", 0.1}}}, {"centres", {{"sigma", 9.0}}}});
+  EXPECT_EQ(given_["lines"],
+            (DetectorParameters{{"sigma", 0.1}, {"support", 2.0}}));
+  EXPECT_EQ(given_["orientations"],
+            (DetectorParameters{{"sigma", 0.5}, {"support", 2.0}}));
+  EXPECT_THROW(
+      MakeHierarchy("lines", registry_, {"point"}, {{"lines", {{"typo", 1}}}}),
+      Error);
+  EXPECT_THROW(MakeHierarchy("lines", registry_, {"point"}, {{"line", {}}}),
+               Error);
+}
+
+TEST_F(HierarchyTest, UnknownNamesListTheDetectors) {
+  EXPECT_THAT(MessageOf("line/orientations", {"point"}),
+              HasSubstr("unknown detector 'line': expected one of lines, "));
+  EXPECT_THAT(MessageOf("lines,/orientations", {"point"}),
+              HasSubstr("unknown detector ''"));
+  EXPECT_THAT(MessageOf("lines//relations", {"point"}),
+              HasSubstr("unknown detector ''"));
+}
+
+TEST_F(HierarchyTest, MisplacedDetectorsListWhatFitsWhere) {
+  EXPECT_THAT(MessageOf("lines/orientations", {"segment"}),
+              HasSubstr("detector 'lines' has nothing to read at level 0: "
+                        "expected level 0 (segment): orientations"));
+  EXPECT_THAT(
+      MessageOf("lines/centres", {"point"}),
+      HasSubstr("detector 'centres' has nothing to read at level 1: expected "
+                "level 0 (point): circles, lines; level 1 (line): "
+                "orientations"));
+  EXPECT_THAT(MessageOf("orientations/relations/relations", {"segment"}),
+              HasSubstr("level 2 (nothing): none"));
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -10,15 +10,20 @@
 namespace plumbline {
 
 /// Writes map.json: {"features": [...], "constraints": [...]} with, for every
-/// feature, id, type, level, virtual, fixed, parameters, anchor, extent,
-/// observations, source and support (ids of the live structure constraints
-/// from below), and for every constraint id, type, features, expected,
-/// information, class, delta, state and source. Deterministic; numbers read
-/// back as the same doubles.
+/// feature, id, type, level, virtual, fixed, parameters, anchor, extent
+/// ([begin, end]), observations, source and support (ids of the live structure
+/// constraints from below), and for every constraint id, type, features,
+/// expected, information (rows), class ("measurement" or "structure"), delta,
+/// state ("live" or "broken") and source. One line an element. Deterministic;
+/// numbers read back as the same doubles (one that is not finite becomes null,
+/// which is not read back).
 void WriteGraphJson(const Graph& graph, std::ostream& output);
 
 /// Reads what WriteGraphJson wrote into an empty graph; ids are kept in order
-/// but made dense. Throws Error that names `name` and the place.
+/// but made dense. "support" follows from the constraints and is passed over,
+/// as are names that are not known. Throws Error that names `name` and the
+/// place ("features[3].parameters", or the line where it is not JSON); the
+/// graph is empty then.
 void ReadGraphJson(std::istream& input, const std::string& name,
                    const Registry& registry, Graph* graph);
 

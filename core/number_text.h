@@ -1,0 +1,42 @@
+#ifndef PLUMBLINE_CORE_NUMBER_TEXT_H_
+#define PLUMBLINE_CORE_NUMBER_TEXT_H_
+
+#include <charconv>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace plumbline {
+
+/// Appends the shortest decimal number that reads back as the same double;
+/// whatever the locale. Not finite ones become "nan", "inf" or "-inf".
+inline void AppendNumber(double value, std::string* text) {
+  char buffer[32];
+  const std::to_chars_result result =
+      std::to_chars(buffer, buffer + sizeof(buffer), value);
+  text->append(buffer, result.ptr);
+}
+
+/// Appends a whole number.
+inline void AppendNumber(std::int64_t value, std::string* text) {
+  char buffer[32];
+  const std::to_chars_result result =
+      std::to_chars(buffer, buffer + sizeof(buffer), value);
+  text->append(buffer, result.ptr);
+}
+
+/// Reads all of `text` as a number, with or without a sign. False when it is
+/// not one or does not fit the type.
+template <typename Number>
+bool ParseNumber(std::string_view text, Number* value) {
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') {
+    text.remove_prefix(1);
+  }
+  const std::from_chars_result result =
+      std::from_chars(text.data(), text.data() + text.size(), *value);
+  return result.ec == std::errc() && result.ptr == text.data() + text.size();
+}
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_CORE_NUMBER_TEXT_H_

@@ -6,6 +6,7 @@
 #include <plumbline/detectors/orientation_mixture.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <set>
 #include <string>
@@ -246,6 +247,29 @@ TEST_F(OrientationMixtureTest, ScopeLimitsWhatIsLookedAt) {
   EXPECT_EQ(extension.added_constraints().size(), 3u);
   const std::vector<FeatureId> none;
   EXPECT_TRUE(Detect(&none).empty());
+}
+
+TEST_F(OrientationMixtureTest, RemovedOrientationsAreNotExtended) {
+  const FeatureId gone = AddOrientation(0.0);
+  const FeatureId stays = AddOrientation(2.0);
+  Transaction transaction;
+  transaction.RemoveFeature(gone);
+  graph_.Apply(std::move(transaction));
+  EXPECT_EQ(graph_.VirtualFeatures(1), (std::vector<FeatureId>{stays}));
+  EXPECT_TRUE(graph_.VirtualFeatures(0).empty());
+  AddSegment(0.0, 3.0);
+  const Transaction extension = Detect();
+  ASSERT_EQ(extension.added_constraints().size(), 1u);
+  EXPECT_EQ(extension.added_constraints()[0].features[1], stays);
+}
+
+// A diverged state must not reach the graph as a hypothesis.
+TEST_F(OrientationMixtureTest, DirectionsThatAreNotNumbersAreLeftOut) {
+  for (int i = 0; i < 6; ++i) AddSegment(0.1 * i, 3.0);
+  graph_.GetFeature(5).parameters[2] = std::nan("");
+  const Transaction transaction = Detect();
+  EXPECT_EQ(transaction.added_features().size(), 1u);
+  EXPECT_EQ(transaction.added_constraints().size(), 5u);
 }
 
 TEST_F(OrientationMixtureTest, SameInputSameProposal) {

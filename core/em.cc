@@ -566,6 +566,20 @@ struct EmOrchestrator::Impl : public GraphListener {
     return has_changed;
   }
 
+  // True when the numbers fit the relation and each other, so that the error
+  // can be computed.
+  static bool IsWellFormed(const Constraint& constraint,
+                           const std::vector<const Feature*>& between) {
+    if (constraint.type == nullptr) return false;
+    const RelationType& type = *constraint.type;
+    const Eigen::Index size = type.residual_size;
+    return between.size() == constraint.features.size() &&
+           between.size() == type.feature_types.size() &&
+           constraint.expected.size() == size &&
+           constraint.information.rows() == size &&
+           IsValidInformation(constraint.information);
+  }
+
   bool IsThere(const Constraint& constraint) const {
     const std::vector<ConstraintId>* fewest = nullptr;
     for (const FeatureId id : constraint.features) {
@@ -600,14 +614,16 @@ struct EmOrchestrator::Impl : public GraphListener {
     };
     std::vector<Constraint> constraints;
     for (Constraint& constraint : proposal.added_constraints()) {
-      if (IsThere(constraint)) continue;
       std::vector<const Feature*> between;
       for (const FeatureId id : constraint.features) {
-        if (const Feature* feature = find(id)) between.push_back(feature);
+        const Feature* feature = find(id);
+        if (feature != nullptr && feature->type != nullptr) {
+          between.push_back(feature);
+        }
       }
-      // Constraints between unknown features are left to Graph::Apply.
-      if (between.size() == constraint.features.size() &&
-          !MayBeProposed(constraint, between)) {
+      // What is not well-formed is left to Graph::Apply, which says why.
+      if (IsWellFormed(constraint, between) &&
+          (IsThere(constraint) || !MayBeProposed(constraint, between))) {
         continue;
       }
       constraints.push_back(std::move(constraint));

@@ -662,16 +662,42 @@ TEST_F(EmTest, DetectorsGetLevelScopeAndSeed) {
 }
 
 TEST_F(EmTest, ABadProposalIsAnErrorAndChangesNothing) {
+  const FeatureId wall = AddSegment(0.0);
+  const FeatureId bad = AddSegment(5.0);
   AddSegment(0.0);
+  std::function<void(Constraint*)> spoil;
+  Add(0, "directions", 2, DirectionDetector({0.0}));
   Add(0, "bad", 1,
-      [&](const Graph&, const Registry& registry, const DetectionScope&) {
+      [&](const Graph& graph, const Registry& registry, const DetectionScope&) {
         Transaction transaction;
-        transaction.AddConstraint(Structure(registry, "segment_orientation",
-                                            segments_[0], 77, 0.0, 0.5));
+        if (spoil == nullptr) return transaction;
+        const FeatureId orientation = graph.VirtualFeatures(1)[0];
+        // One that is there, one that was broken.
+        for (const FeatureId id : {wall, bad}) {
+          Constraint constraint = Structure(registry, "segment_orientation", id,
+                                            orientation, 0.0, 0.5);
+          spoil(&constraint);
+          transaction.AddConstraint(constraint);
+        }
         return transaction;
       });
-  EXPECT_THROW(Make().Iterate(), Error);
-  EXPECT_EQ(graph_.num_constraints(), 1u);
+  Make().Run();
+  ASSERT_EQ(Live(), 2);
+  const std::size_t constraints = graph_.num_constraints();
+  const std::vector<std::function<void(Constraint*)>> spoilers = {
+      [](Constraint* c) { c->features[1] = 77; },
+      [](Constraint* c) { c->features[1] = Transaction::ProvisionalId(0); },
+      [](Constraint* c) { c->features.pop_back(); },
+      [](Constraint* c) { c->type = nullptr; },
+      [](Constraint* c) { c->expected = Eigen::Vector2d::Zero(); },
+      [](Constraint* c) { c->information = Eigen::Matrix2d::Identity(); },
+      [](Constraint* c) { c->information(0, 0) = -1.0; },
+  };
+  for (const auto& spoiler : spoilers) {
+    spoil = spoiler;
+    EXPECT_THROW(em_->Iterate(), Error);
+    EXPECT_EQ(graph_.num_constraints(), constraints);
+  }
 }
 
 TEST_F(EmTest, RemovedWallsTakeTheirSupportAlong) {

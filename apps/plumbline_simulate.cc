@@ -1,13 +1,18 @@
 // Drives a robot with a laser and drifting odometry through a synthetic
-// building and writes what it measures as a CARMEN log, with the truth.
+// building and writes what it measures as a CARMEN log, with the truth; or
+// writes one of the paper's synthetic worlds as a graph.
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/app.h>
 #include <plumbline/apps/progress.h>
 #include <plumbline/apps/simulator.h>
+#include <plumbline/apps/synthetic_worlds.h>
 #include <plumbline/apps/world.h>
 #include <plumbline/core/atomic_file.h>
+#include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/registry.h>
 
 #include <algorithm>
 #include <fstream>
@@ -24,7 +29,8 @@ const plumbline::DriveOptions kDrive;
 
 }  // namespace
 
-DEFINE_string(world, "", "office, killian_like or a world file.");
+DEFINE_string(world, "",
+              "office, killian_like, a world file, or S1 to S6: graphs.");
 DEFINE_uint64(seed, 1,
               "Draws the dimensions of a built-in world, the sway of the robot "
               "and all noise.");
@@ -34,8 +40,22 @@ PLUMBLINE_FLAG_RANGE(size, 0.01, 100);
 DEFINE_double(rotation, 0.0, "Turns the whole world by so many degrees.");
 PLUMBLINE_FLAG_RANGE(rotation, -360, 360);
 
-DEFINE_string(output, "", "Log to write; gzip when the name ends in .gz.");
-DEFINE_string(truth, "", "Where to write walls and poses as JSON.");
+DEFINE_double(position_noise, -1.0,
+              "S1 to S6: largest error of initial positions on x and y, m; -1: "
+              "the world's own.");
+PLUMBLINE_FLAG_RANGE(position_noise, -1, 10);
+DEFINE_double(distance_noise, -1.0,
+              "S1 to S5: largest error of distances, m; -1: the world's own.");
+PLUMBLINE_FLAG_RANGE(distance_noise, -1, 0.4);
+DEFINE_int32(outliers, -1,
+             "S1 to S5: points beside the structure; -1: the world's own.");
+PLUMBLINE_FLAG_RANGE(outliers, -1, 1000);
+
+DEFINE_string(output, "",
+              "Log (gzip when the name ends in .gz) or g2o file to write.");
+DEFINE_string(truth, "",
+              "Where to write walls and poses, or positions and structure, as "
+              "JSON.");
 DEFINE_string(relations, "",
               "Where to write exact displacements between scans.");
 DEFINE_string(save_world, "",
@@ -109,7 +129,7 @@ World LoadWorld() {
     throw Error(
         "--world", 0,
         "'" + FLAGS_world + "' is no built-in world and no readable file",
-        "office, killian_like or a world file");
+        "office, killian_like, S1 to S6 or a world file");
   }
   return ReadWorld(file, FLAGS_world);
 }
@@ -148,11 +168,52 @@ std::string Provenance() {
   return text;
 }
 
+bool IsSynthetic(const std::string& world) {
+  const std::vector<std::string>& names = SyntheticWorldNames();
+  return std::find(names.begin(), names.end(), world) != names.end();
+}
+
+int RunSynthetic() {
+  if (!FLAGS_relations.empty() || !FLAGS_save_world.empty()) {
+    throw Error("plumbline_simulate", 0,
+                FLAGS_world + " is a graph, not a building with a robot",
+                "no --relations and no --save_world");
+  }
+  SyntheticOptions options = DefaultSyntheticOptions(FLAGS_world);
+  if (FLAGS_position_noise >= 0.0)
+    options.position_noise = FLAGS_position_noise;
+  if (FLAGS_distance_noise >= 0.0)
+    options.distance_noise = FLAGS_distance_noise;
+  if (FLAGS_outliers >= 0) options.outliers = FLAGS_outliers;
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  const SyntheticWorld world =
+      MakeSyntheticWorld(FLAGS_world, options, FLAGS_seed, registry);
+  WriteFileAtomically(FLAGS_output, [&](std::ostream& output) {
+    std::ostringstream text;
+    text << "# " << Provenance() << '\n';
+    WriteG2o(*world.graph, nullptr, text);
+    output << (EndsWith(FLAGS_output, ".gz") ? GzipCompress(text.str())
+                                             : text.str());
+  });
+  if (!FLAGS_truth.empty()) {
+    WriteFileAtomically(FLAGS_truth, [&](std::ostream& output) {
+      WriteSyntheticTruth(world.truth, output);
+    });
+  }
+  std::cout << world.graph->num_features() << " features, "
+            << world.graph->num_constraints() << " constraints; "
+            << world.truth.num_virtual_features()
+            << " virtual features to be found\n";
+  return kExitSuccess;
+}
+
 int Run() {
   if (FLAGS_world.empty() || FLAGS_output.empty()) {
     throw Error("plumbline_simulate", 0, "a flag is missing",
                 "--world and --output (--help explains them)");
   }
+  if (IsSynthetic(FLAGS_world)) return RunSynthetic();
   World world = LoadWorld();
   RotateWorld(FLAGS_rotation, &world);
   if (!FLAGS_save_world.empty()) {
@@ -213,14 +274,17 @@ int main(int argc, char** argv) {
   info.name = "plumbline_simulate";
   info.summary =
       "Drives a robot with a laser and drifting odometry through a synthetic "
-      "building and writes a CARMEN log, with the true walls and poses. The "
-      "same flags give the same files.";
-  info.usage = {"--world=NAME_OR_FILE --output=LOG [flags]"};
+      "building and writes a CARMEN log, with the true walls and poses; or "
+      "writes a world of the synthetic experiments as a graph, with its "
+      "structure. The same flags give the same files.";
+  info.usage = {"--world=NAME_OR_FILE --output=LOG [flags]",
+                "--world=S1|...|S6 --output=GRAPH [flags]"};
   info.example =
       "plumbline_simulate --world=office --seed=7 --output=office.clf "
       "--truth=office.truth.json";
   info.groups = {
       {"World", {"world", "seed", "size", "rotation"}},
+      {"Graphs", {"position_noise", "distance_noise", "outliers"}},
       {"Output", {"output", "truth", "relations", "save_world", "quiet"}},
       {"Laser",
        {"beams", "maximum_range", "range_noise", "range_noise_per_metre",

@@ -329,7 +329,7 @@ struct SolverSession::Impl {
       ceres::Solve(solver, solved, &summary);
       report.usable = summary.IsSolutionUsable();
       report.converged = summary.termination_type == ceres::CONVERGENCE;
-      report.iterations = static_cast<int>(summary.iterations.size()) - 1;
+      report.iterations = summary.num_linear_solves;
       report.initial_cost = summary.initial_cost;
       report.final_cost = summary.final_cost;
       report.evaluation_seconds = summary.residual_evaluation_time_in_seconds +

@@ -30,6 +30,7 @@ struct SessionOptions {
 struct SolveReport {
   bool usable = false;
   bool converged = false;
+  /// Steps computed, each a factorization; rejected ones included.
   int iterations = 0;
   /// 1/2 sum of rho(s) before and after, over the residuals of this solve.
   double initial_cost = 0.0;

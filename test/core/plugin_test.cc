@@ -39,6 +39,25 @@ TEST(PluginTest, FileThatIsNoSharedObject) {
   std::filesystem::remove_all(folder);
 }
 
+#ifdef PLUMBLINE_TEST_PLUGIN_DIR
+TEST(PluginTest, RegistersWhatItHas) {
+  Registry registry;
+  const std::string path = std::string(PLUMBLINE_TEST_PLUGIN_DIR) + "/good.so";
+  LoadPlugin(path, &registry);
+  EXPECT_EQ(registry.GetFeature("tree").g2o_tag, "MINE_TREE");
+  // What it registers is refused like anybody's: the name is taken now.
+  EXPECT_THROW(LoadPlugin(path, &registry), Error);
+}
+
+TEST(PluginTest, OtherInterfaceVersionIsRefusedWithBothVersions) {
+  const std::string message =
+      MessageOfLoading(std::string(PLUMBLINE_TEST_PLUGIN_DIR) + "/old.so");
+  EXPECT_THAT(message, HasSubstr("interface version 12345"));
+  EXPECT_THAT(message, HasSubstr("expected version " +
+                                 std::to_string(kPluginInterfaceVersion)));
+}
+#endif
+
 TEST(PluginTest, SharedObjectThatIsNoPlugin) {
   // The C library's mathematics: always there, never a plug-in.
   EXPECT_THAT(MessageOfLoading("libm.so.6"), HasSubstr("is not a plug-in"));

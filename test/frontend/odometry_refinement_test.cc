@@ -1,0 +1,392 @@
+#include <gtest/gtest.h>
+#include <plumbline/frontend/odometry_refinement.h>
+
+#include <cmath>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::Corridor;
+using testing::FullCircle;
+using testing::HeadingError;
+using testing::Laser;
+using testing::MakeScan;
+using testing::Noise;
+using testing::PositionError;
+using testing::Room;
+using testing::Wall;
+
+OdometryRefinementOptions Options() {
+  OdometryRefinementOptions options;
+  options.key_distance = 0.3;
+  options.key_rotation = 0.15;
+  options.window = 12;
+  return options;
+}
+
+// A room of 10 m x 8 m with a pillar.
+std::vector<Wall> Hall() {
+  std::vector<Wall> walls = Room(10.0, 8.0);
+  for (const Wall& side : testing::Moved(Room(0.8, 0.8), {1.0, 0.5, 0.0})) {
+    walls.push_back(side);
+  }
+  return walls;
+}
+
+// Drives along relative motions; odometry reports `reported` in their place.
+struct Drive {
+  std::vector<Pose2> truth;
+  std::vector<Pose2> odometry;
+};
+
+Drive Along(const Pose2& start, const std::vector<Pose2>& motions,
+            const std::vector<Pose2>& reported) {
+  Drive drive;
+  drive.truth.push_back(start);
+  drive.odometry.push_back(start);
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    drive.truth.push_back(Compose(drive.truth.back(), motions[i]));
+    drive.odometry.push_back(Compose(drive.odometry.back(), reported[i]));
+  }
+  return drive;
+}
+
+std::vector<RefinedScan> Refine(const std::vector<Wall>& walls,
+                                const Drive& drive, const Laser& laser,
+                                const OdometryRefinementOptions& options,
+                                Noise* noise = nullptr) {
+  OdometryRefiner refiner(options);
+  std::vector<RefinedScan> refined;
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    Scan scan = MakeScan(walls, drive.truth[i], laser, noise);
+    scan.odometry = drive.odometry[i];
+    refined.push_back(refiner.Process(scan));
+  }
+  return refined;
+}
+
+TEST(OdometryCovarianceTest, HandWorked) {
+  OdometryNoise noise;
+  noise.translation = 0.01;
+  noise.translation_per_metre = 0.1;
+  noise.translation_per_radian = 0.05;
+  noise.rotation = 0.02;
+  noise.rotation_per_metre = 0.03;
+  noise.rotation_per_radian = 0.4;
+  const Eigen::Matrix3d covariance =
+      OdometryCovariance(Pose2(3.0, -4.0, -0.5), noise);
+  // 0.01 + 5 x 0.1 + 0.5 x 0.05 and 0.02 + 5 x 0.03 + 0.5 x 0.4.
+  const Eigen::Vector3d sigmas(0.535, 0.535, 0.37);
+  EXPECT_NEAR((covariance -
+               Eigen::Matrix3d(sigmas.array().square().matrix().asDiagonal()))
+                  .norm(),
+              0.0, 1e-12);
+  // A turn by more than a half turn is one the other way.
+  EXPECT_NEAR(std::sqrt(OdometryCovariance(Pose2(0.0, 0.0, 2.0 * kPi - 0.5),
+                                           noise)(2, 2)),
+              0.22, 1e-12);
+}
+
+TEST(OdometryRefinerTest, FirstScanIsAKeyWhereOdometryStarts) {
+  OdometryRefiner refiner(Options());
+  Scan scan = MakeScan(Hall(), Pose2::Zero(), FullCircle());
+  scan.odometry = Pose2(5.0, -3.0, 2.0);
+  const RefinedScan refined = refiner.Process(scan);
+  EXPECT_TRUE(refined.is_key);
+  EXPECT_EQ(refined.pose, Pose2(5.0, -3.0, 2.0));
+  EXPECT_EQ(refined.since_key.mean, Pose2::Zero());
+  EXPECT_EQ(refined.since_key.covariance, Eigen::Matrix3d::Zero());
+  EXPECT_EQ(refiner.points().size(), 720u);
+}
+
+TEST(OdometryRefinerTest, CorrectsWrongTurns) {
+  // Around in a square of 3 m; in each corner odometry turns 30 degrees too
+  // far, spread over nine scans.
+  std::vector<Pose2> motions;
+  std::vector<Pose2> reported;
+  for (int side = 0; side < 4; ++side) {
+    for (int i = 0; i < 15; ++i) {
+      motions.emplace_back(0.2, 0.0, 0.0);
+      reported.emplace_back(0.21, 0.0, DegToRad(0.4));
+    }
+    for (int i = 0; i < 9; ++i) {
+      motions.emplace_back(0.0, 0.0, DegToRad(10.0));
+      reported.emplace_back(0.0, 0.0, DegToRad(10.0 + 30.0 / 9.0));
+    }
+  }
+  const Drive drive = Along(Pose2(-3.0, -2.5, 0.0), motions, reported);
+  Laser laser = FullCircle();
+  laser.sigma = 0.01;
+  Noise noise(1);
+  const std::vector<RefinedScan> refined =
+      Refine(Hall(), drive, laser, Options(), &noise);
+  ASSERT_GT(HeadingError(drive.odometry.back(), drive.truth.back()),
+            DegToRad(90.0));
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    ASSERT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.08) << i;
+    ASSERT_LT(HeadingError(refined[i].pose, drive.truth[i]), DegToRad(1.0))
+        << i;
+    EXPECT_FALSE(refined[i].odometry_only) << i;
+  }
+}
+
+TEST(OdometryRefinerTest, CorrectsOneWrongTurnBetweenTwoScans) {
+  for (double wrong : {30.0, -30.0}) {
+    SCOPED_TRACE(wrong);
+    std::vector<Pose2> motions(10, Pose2(0.1, 0.0, 0.0));
+    std::vector<Pose2> reported = motions;
+    motions[5] = Pose2(0.1, 0.0, DegToRad(40.0));
+    reported[5] = Pose2(0.1, 0.0, DegToRad(40.0 + wrong));
+    const Drive drive = Along(Pose2(-3.0, -2.5, 0.0), motions, reported);
+    OdometryRefiner refiner(Options());
+    RefinedScan refined;
+    for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+      Scan scan = MakeScan(Hall(), drive.truth[i], FullCircle());
+      scan.odometry = drive.odometry[i];
+      refined = refiner.Process(scan);
+    }
+    EXPECT_LT(PositionError(refined.pose, drive.truth.back()), 0.03);
+    EXPECT_LT(HeadingError(refined.pose, drive.truth.back()), DegToRad(0.5));
+    EXPECT_GE(refiner.wide_searches(), 1);
+    EXPECT_EQ(refiner.refusals(), 0);
+  }
+}
+
+TEST(OdometryRefinerTest, KeepsOdometryAlongAFeaturelessCorridor) {
+  // Odometry bends by 2 degrees a metre but measures the way right.
+  const std::vector<Pose2> motions(100, Pose2(0.1, 0.0, 0.0));
+  const std::vector<Pose2> reported(100, Pose2(0.1, 0.0, DegToRad(0.2)));
+  const Drive drive = Along(Pose2::Zero(), motions, reported);
+  Laser laser = FullCircle();
+  laser.maximum_range = 8.0;
+  laser.sigma = 0.01;
+  Noise noise(2);
+  const std::vector<RefinedScan> refined =
+      Refine(Corridor(), drive, laser, Options(), &noise);
+  EXPECT_GT(HeadingError(drive.odometry.back(), drive.truth.back()),
+            DegToRad(19.0));
+  EXPECT_NEAR(refined.back().pose[0], 10.0, 0.3);
+  EXPECT_NEAR(refined.back().pose[1], 0.0, 0.05);
+  EXPECT_LT(HeadingError(refined.back().pose, drive.truth.back()),
+            DegToRad(1.0));
+  for (std::size_t i = 1; i < refined.size(); ++i) {
+    const Eigen::Matrix3d& covariance = refined[i].since_key.covariance;
+    EXPECT_GT(covariance(0, 0), 4.0 * covariance(1, 1)) << i;
+  }
+}
+
+TEST(OdometryRefinerTest, BackwardsGivenAsForwards) {
+  // Some robots' odometry has no sign.
+  const std::vector<Pose2> motions(12, Pose2(-0.3, 0.0, 0.0));
+  const std::vector<Pose2> reported(12, Pose2(0.3, 0.0, 0.0));
+  const Drive drive = Along(Pose2(3.0, -2.0, 0.2), motions, reported);
+  const std::vector<RefinedScan> refined =
+      Refine(Hall(), drive, FullCircle(), Options());
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    EXPECT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.05) << i;
+    EXPECT_LT(HeadingError(refined[i].pose, drive.truth[i]), DegToRad(0.5))
+        << i;
+  }
+}
+
+TEST(OdometryRefinerTest, NoOdometryAtAll) {
+  std::vector<Pose2> motions;
+  for (int i = 0; i < 40; ++i) {
+    motions.emplace_back(0.1, 0.0, DegToRad(i % 3 == 0 ? 4.0 : 1.0));
+  }
+  const std::vector<Pose2> reported(motions.size(), Pose2::Zero());
+  const Drive drive = Along(Pose2(-3.5, -2.5, 0.0), motions, reported);
+  ASSERT_EQ(drive.odometry.back(), drive.odometry.front());
+  const std::vector<RefinedScan> refined =
+      Refine(Hall(), drive, FullCircle(), Options());
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    EXPECT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.08) << i;
+    EXPECT_LT(HeadingError(refined[i].pose, drive.truth[i]), DegToRad(1.0))
+        << i;
+  }
+}
+
+TEST(OdometryRefinerTest, StandingStillMakesNoKeys) {
+  const std::vector<Pose2> motions(60, Pose2::Zero());
+  const Drive drive = Along(Pose2(-2.0, -2.0, 0.3), motions, motions);
+  Laser laser = FullCircle();
+  laser.sigma = 0.015;
+  Noise noise(4);
+  const std::vector<RefinedScan> refined =
+      Refine(Hall(), drive, laser, Options(), &noise);
+  EXPECT_TRUE(refined[0].is_key);
+  for (std::size_t i = 1; i < refined.size(); ++i) {
+    EXPECT_FALSE(refined[i].is_key) << i;
+    EXPECT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.02);
+    EXPECT_LT(HeadingError(refined[i].pose, drive.truth[i]), DegToRad(0.5));
+  }
+}
+
+TEST(OdometryRefinerTest, KeysComeByDistanceAndByRotation) {
+  OdometryRefinementOptions options = Options();
+  options.key_distance = 0.3;
+  options.key_rotation = DegToRad(10.0);
+  std::vector<Pose2> motions(10, Pose2(0.11, 0.0, 0.0));
+  motions.insert(motions.end(), 9, Pose2(0.0, 0.0, DegToRad(4.0)));
+  const Drive drive = Along(Pose2(-3.0, -2.0, 0.0), motions, motions);
+  for (bool match : {true, false}) {
+    SCOPED_TRACE(match);
+    options.match_scans = match;
+    const std::vector<RefinedScan> refined =
+        Refine(Hall(), drive, FullCircle(), options);
+    std::vector<int> keys;
+    for (std::size_t i = 0; i < refined.size(); ++i) {
+      if (refined[i].is_key) keys.push_back(static_cast<int>(i));
+    }
+    // Every third scan of 0.11 m; after the tenth, 0.11 m of the way are left,
+    // and a turn of 12 degrees is over the limit.
+    EXPECT_EQ(keys, (std::vector<int>{0, 3, 6, 9, 13, 16, 19}));
+  }
+}
+
+TEST(OdometryRefinerTest, SinceKeyIsRelativeToTheKeyBefore) {
+  std::vector<Pose2> motions;
+  for (int i = 0; i < 30; ++i) {
+    motions.emplace_back(0.1, 0.01, DegToRad(3.0));
+  }
+  const Drive drive = Along(Pose2(-2.0, -2.0, 2.8), motions, motions);
+  for (bool match : {true, false}) {
+    OdometryRefinementOptions options = Options();
+    options.match_scans = match;
+    const std::vector<RefinedScan> refined =
+        Refine(Hall(), drive, FullCircle(), options);
+    Pose2 key = refined[0].pose;
+    for (std::size_t i = 1; i < refined.size(); ++i) {
+      const Pose2 expected = Between(key, refined[i].pose);
+      EXPECT_LT((refined[i].since_key.mean - expected).norm(), 1e-9) << i;
+      const Eigen::Matrix3d& covariance = refined[i].since_key.covariance;
+      EXPECT_LT((covariance - covariance.transpose()).norm(), 1e-12);
+      EXPECT_GT(covariance(0, 0), 0.0);
+      if (refined[i].is_key) key = refined[i].pose;
+    }
+  }
+}
+
+TEST(OdometryRefinerTest, WithoutMatchingItIsRawOdometry) {
+  OdometryRefinementOptions options = Options();
+  options.match_scans = false;
+  options.key_distance = 0.45;
+  options.noise.translation = 0.0;
+  options.noise.translation_per_metre = 0.1;
+  options.noise.translation_per_radian = 0.0;
+  options.noise.rotation = 0.001;
+  options.noise.rotation_per_metre = 0.0;
+  options.noise.rotation_per_radian = 0.0;
+  const std::vector<Pose2> motions(9, Pose2(0.1, 0.0, 0.0));
+  const std::vector<Pose2> reported(9, Pose2(0.1, 0.0, 0.01));
+  const Drive drive = Along(Pose2(-3.0, 1.0, 3.1), motions, reported);
+  const std::vector<RefinedScan> refined =
+      Refine(Hall(), drive, FullCircle(), options);
+  int since = 0;
+  double last = 0.0;
+  for (std::size_t i = 1; i < refined.size(); ++i) {
+    EXPECT_TRUE(refined[i].odometry_only);
+    EXPECT_LT(PositionError(refined[i].pose, drive.odometry[i]), 1e-12);
+    EXPECT_LT(HeadingError(refined[i].pose, drive.odometry[i]), 1e-12);
+    ++since;
+    // Independent steps of 0.01 m and 0.001 rad add up.
+    const Eigen::Matrix3d& covariance = refined[i].since_key.covariance;
+    EXPECT_NEAR(covariance(2, 2), since * 1e-6, 1e-15);
+    const double position = covariance(0, 0) + covariance(1, 1);
+    EXPECT_GE(position, since * 2e-4 - 1e-12);
+    EXPECT_LE(position, since * 2e-4 + 1e-5);
+    EXPECT_GT(covariance.trace(), last);
+    last = covariance.trace();
+    EXPECT_EQ(refined[i].is_key, since == 5) << i;
+    if (refined[i].is_key) {
+      since = 0;
+      last = 0.0;
+    }
+  }
+}
+
+TEST(OdometryRefinerTest, TooFewReturnsLeaveOdometry) {
+  // Nothing in sight from the third scan on.
+  const std::vector<Pose2> motions(6, Pose2(0.1, 0.0, 0.0));
+  const std::vector<Pose2> reported(6, Pose2(0.12, 0.0, 0.0));
+  const Drive drive = Along(Pose2(-3.0, -2.0, 0.0), motions, reported);
+  OdometryRefiner refiner(Options());
+  RefinedScan before;
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    Scan scan = MakeScan(i < 3 ? Hall() : std::vector<Wall>(), drive.truth[i],
+                         FullCircle());
+    scan.odometry = drive.odometry[i];
+    const RefinedScan refined = refiner.Process(scan);
+    if (i >= 3) {
+      EXPECT_TRUE(refined.odometry_only) << i;
+      EXPECT_LT((Between(before.pose, refined.pose) - reported[0]).norm(),
+                1e-12);
+    }
+    before = refined;
+  }
+}
+
+TEST(OdometryRefinerTest, SightComesBackAfterDarkness) {
+  // Blind from the start: there is nothing to match with until walls come.
+  const std::vector<Pose2> motions(20, Pose2(0.1, 0.0, 0.0));
+  const Drive drive = Along(Pose2(-3.0, -2.0, 0.0), motions, motions);
+  OdometryRefiner refiner(Options());
+  RefinedScan refined;
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    Scan scan = MakeScan(i < 8 ? std::vector<Wall>() : Hall(), drive.truth[i],
+                         FullCircle());
+    scan.odometry = drive.odometry[i];
+    refined = refiner.Process(scan);
+  }
+  EXPECT_FALSE(refined.odometry_only);
+  EXPECT_LT(PositionError(refined.pose, drive.truth.back()), 0.05);
+}
+
+TEST(OdometryRefinerTest, AnotherPlaceIsRefused) {
+  // The robot is carried to a place that looks like nothing seen before.
+  OdometryRefiner refiner(Options());
+  refiner.Process(MakeScan(Room(10.0, 8.0), Pose2::Zero(), FullCircle()));
+  Scan scan = MakeScan(Room(2.0, 1.5), Pose2::Zero(), FullCircle());
+  scan.odometry = Pose2(0.1, 0.0, 0.0);
+  const RefinedScan refined = refiner.Process(scan);
+  EXPECT_TRUE(refined.odometry_only);
+  EXPECT_EQ(refiner.refusals(), 1);
+  EXPECT_LT((refined.pose - Pose2(0.1, 0.0, 0.0)).norm(), 1e-12);
+}
+
+TEST(OdometryRefinerTest, LaserOffsetIsAccountedFor) {
+  // The laser sits 0.4 m before the axle: turning on the spot moves it.
+  Laser laser = FullCircle();
+  laser.offset = Pose2(0.4, 0.1, 0.2);
+  const std::vector<Pose2> motions(30, Pose2(0.0, 0.0, DegToRad(6.0)));
+  const std::vector<Pose2> reported(30, Pose2(0.0, 0.0, DegToRad(5.0)));
+  const Drive drive = Along(Pose2(-1.0, -1.0, 0.0), motions, reported);
+  const std::vector<RefinedScan> refined =
+      Refine(Hall(), drive, laser, Options());
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    EXPECT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.04) << i;
+    EXPECT_LT(HeadingError(refined[i].pose, drive.truth[i]), DegToRad(0.5))
+        << i;
+  }
+}
+
+TEST(OdometryRefinerTest, SameResultTenKilometresAway) {
+  const std::vector<Pose2> motions(15, Pose2(0.2, 0.0, DegToRad(5.0)));
+  const std::vector<Pose2> reported(15, Pose2(0.21, 0.0, DegToRad(7.0)));
+  const Pose2 shift(10000.0, -10000.0, 0.0);
+  const Drive here = Along(Pose2(-3.0, -2.0, 0.0), motions, reported);
+  Drive there = here;
+  for (Pose2& pose : there.odometry) pose += shift;
+  const auto a = Refine(Hall(), here, FullCircle(), Options());
+  const auto b = Refine(Hall(), there, FullCircle(), Options());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_LT((b[i].pose - shift - a[i].pose).norm(), 1e-5) << i;
+    EXPECT_EQ(a[i].is_key, b[i].is_key);
+  }
+}
+
+}  // namespace
+}  // namespace plumbline

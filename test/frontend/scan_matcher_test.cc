@@ -1,0 +1,329 @@
+#include <gtest/gtest.h>
+#include <plumbline/frontend/scan_matcher.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::Corridor;
+using testing::FullCircle;
+using testing::HeadingError;
+using testing::Laser;
+using testing::MakeScan;
+using testing::Noise;
+using testing::PointsOf;
+using testing::PositionError;
+using testing::Room;
+using testing::Transformed;
+using testing::Wall;
+
+ScanMatcherOptions Options() {
+  ScanMatcherOptions options;
+  options.point_sigma = 0.03;
+  options.independence = 0.3;
+  options.initial_radius = 0.4;
+  options.final_radius = 0.15;
+  options.max_iterations = 30;
+  options.convergence = 1e-5;
+  options.grid_resolution = 0.1;
+  options.search_step = 0.15;
+  options.rotation_step = DegToRad(1.0);
+  return options;
+}
+
+// A room of 7 m x 5 m with a pillar that makes it tell its corners apart.
+std::vector<Wall> RoomWithPillar() {
+  std::vector<Wall> walls = Room(7.0, 5.0);
+  for (const Wall& side : testing::Moved(Room(0.8, 0.8), {2.0, 1.2, 0.0})) {
+    walls.push_back(side);
+  }
+  return walls;
+}
+
+// What was seen from `robot`, in the map frame.
+std::vector<ScanPoint> Seen(const std::vector<Wall>& walls, const Pose2& robot,
+                            const ScanPointsOptions& options = {}) {
+  return Transformed(PointsOf(MakeScan(walls, robot, FullCircle()), options),
+                     robot);
+}
+
+TEST(ScanMatcherTest, RefineRecoversADisplacement) {
+  ScanMatcher matcher(Options());
+  EXPECT_TRUE(matcher.empty());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)));
+  EXPECT_FALSE(matcher.empty());
+  const Pose2 truth(-0.2, 0.3, 0.25);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
+  for (const Pose2& error :
+       {Pose2(0.2, 0.0, 0.0), Pose2(0.0, -0.2, 0.0),
+        Pose2(0.0, 0.0, DegToRad(5.0)), Pose2(-0.14, 0.14, DegToRad(-5.0)),
+        Pose2(0.0, 0.0, 0.0)}) {
+    SCOPED_TRACE(error.transpose());
+    const MatchResult match = matcher.Refine(scan, truth + error, MatchPrior());
+    EXPECT_LT(PositionError(match.pose, truth), 0.005);
+    EXPECT_LT(HeadingError(match.pose, truth), DegToRad(0.1));
+    EXPECT_GT(match.inlier_ratio, 0.95);
+    EXPECT_GT(match.inliers, 500);
+    EXPECT_LT(match.cost, 0.1);
+  }
+}
+
+TEST(ScanMatcherTest, CovarianceCoversTheErrorsOfNoisyScans) {
+  Laser laser = FullCircle();
+  laser.sigma = 0.01;
+  Noise noise(7);
+  const Pose2 truth(0.3, -0.1, -2.0);
+  ScanMatcher matcher(Options());
+  double sum = 0.0;
+  constexpr int kScans = 20;
+  for (int i = 0; i < kScans; ++i) {
+    matcher.SetReference(
+        PointsOf(MakeScan(Room(7.0, 5.0), Pose2::Zero(), laser, &noise)));
+    const MatchResult match =
+        matcher.Refine(PointsOf(MakeScan(Room(7.0, 5.0), truth, laser, &noise)),
+                       truth + Pose2(0.05, 0.05, 0.02), MatchPrior());
+    Eigen::Vector3d error = match.pose - truth;
+    error[2] = NormalizeAngle(error[2]);
+    EXPECT_LT(error.head<2>().norm(), 0.02);
+    EXPECT_LT(std::abs(error[2]), DegToRad(0.5));
+    sum += error.dot(match.covariance.inverse() * error);
+  }
+  // chi^2 with 3 degrees of freedom: not surer than right. The noise here is
+  // a third of point_sigma, so it may well be less sure.
+  EXPECT_LT(sum / kScans, 4.5);
+}
+
+TEST(ScanMatcherTest, SearchFindsAWrongTurn) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)));
+  const Pose2 truth(-0.3, 0.3, 0.3);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
+  for (double turn : {25.0, -25.0}) {
+    SCOPED_TRACE(turn);
+    const Pose2 guess = truth + Pose2(0.2, -0.1, DegToRad(turn));
+    double score = -1.0;
+    const Pose2 found =
+        matcher.Search(scan, guess, 0.45, DegToRad(30.0), &score);
+    EXPECT_LT(PositionError(found, truth), 0.15);
+    EXPECT_LT(HeadingError(found, truth), DegToRad(2.0));
+    EXPECT_GT(score, 0.6);
+    EXPECT_LE(score, 1.0);
+    const MatchResult match = matcher.Refine(scan, found, MatchPrior());
+    EXPECT_LT(PositionError(match.pose, truth), 0.005);
+    EXPECT_LT(HeadingError(match.pose, truth), DegToRad(0.1));
+  }
+}
+
+TEST(ScanMatcherTest, SearchStaysInItsWindow) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
+  const Pose2 guess(0.9, 0.0, DegToRad(20.0));
+  const Pose2 found = matcher.Search(scan, guess, 0.3, DegToRad(5.0), nullptr);
+  EXPECT_LE(std::abs(found[0] - guess[0]), 0.3 + 1e-9);
+  EXPECT_LE(std::abs(found[1] - guess[1]), 0.3 + 1e-9);
+  EXPECT_LE(HeadingError(found, guess), DegToRad(5.0) + 1e-9);
+  // No window: the guess itself.
+  EXPECT_LT((matcher.Search(scan, guess, 0.0, 0.0, nullptr) - guess).norm(),
+            1e-12);
+}
+
+TEST(ScanMatcherTest, ScoreIsHigherAtTheTruth) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
+  double right = 0.0;
+  double wrong = 0.0;
+  matcher.Search(scan, Pose2::Zero(), 0.0, 0.0, &right);
+  matcher.Search(scan, Pose2(0.0, 0.0, DegToRad(15.0)), 0.0, 0.0, &wrong);
+  EXPECT_GT(right, 0.6);
+  EXPECT_LT(wrong, 0.5 * right);
+}
+
+TEST(ScanMatcherTest, CorridorSaysNothingAlong) {
+  ScanPointsOptions points;
+  points.usable_range = 10.0;
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(Corridor(), Pose2::Zero(), points));
+  const Pose2 truth(0.5, 0.1, 0.05);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(Corridor(), truth, FullCircle()), points);
+  MatchPrior prior;
+  prior.pose = Pose2(0.6, 0.0, 0.0);
+  prior.information =
+      Eigen::Vector3d(1.0 / 0.01, 1.0 / 0.01, 1.0 / 0.01).asDiagonal();
+  const MatchResult match = matcher.Refine(scan, prior.pose, prior);
+  // Along, the prior stands; across and heading come from the walls.
+  EXPECT_NEAR(match.pose[0], 0.6, 0.02);
+  EXPECT_NEAR(match.pose[1], 0.1, 0.005);
+  EXPECT_NEAR(match.pose[2], 0.05, DegToRad(0.2));
+  EXPECT_NEAR(std::sqrt(match.covariance(0, 0)), 0.1, 0.03);
+  EXPECT_LT(std::sqrt(match.covariance(1, 1)), 0.01);
+  EXPECT_LT(std::sqrt(match.covariance(2, 2)), DegToRad(0.5));
+  const Eigen::Vector3d eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(match.information)
+          .eigenvalues();
+  EXPECT_LT(eigenvalues[0], 1e-3 * eigenvalues[1]);
+}
+
+TEST(ScanMatcherTest, PriorPullsOnlyWhereTheReturnsAreSilent) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2(0.1, 0.1, 0.1), FullCircle()));
+  MatchPrior prior;
+  prior.pose = Pose2::Zero();
+  prior.information = Eigen::Matrix3d::Identity() * 100.0;
+  const MatchResult match = matcher.Refine(scan, prior.pose, prior);
+  EXPECT_LT((match.pose - Pose2(0.1, 0.1, 0.1)).norm(), 0.01);
+}
+
+TEST(ScanMatcherTest, InformationAndCovarianceAreSymmetricPositive) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
+  const MatchResult match = matcher.Refine(
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle())),
+      Pose2::Zero(), MatchPrior());
+  EXPECT_LT((match.information - match.information.transpose()).norm(), 1e-6);
+  EXPECT_LT((match.covariance - match.covariance.transpose()).norm(), 1e-12);
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(match.covariance)
+                .eigenvalues()[0],
+            0.0);
+}
+
+TEST(ScanMatcherTest, SameResultTenKilometresAway) {
+  const Pose2 shift(10000.0, -10000.0, 0.0);
+  const Pose2 truth(-0.2, 0.3, 0.25);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
+  const std::vector<ScanPoint> reference =
+      Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1));
+  const Pose2 guess = truth + Pose2(0.1, -0.1, DegToRad(3.0));
+  MatchPrior prior;
+  prior.pose = guess;
+  prior.information = Eigen::Matrix3d::Identity();
+
+  ScanMatcher here(Options());
+  here.SetReference(reference);
+  const MatchResult match_here = here.Refine(scan, guess, prior);
+  ScanMatcher there(Options());
+  there.SetReference(Transformed(reference, shift));
+  prior.pose += shift;
+  const MatchResult match_there = there.Refine(scan, guess + shift, prior);
+  EXPECT_LT((match_there.pose - shift - match_here.pose).norm(), 1e-6);
+  EXPECT_LT((match_there.covariance - match_here.covariance).norm(),
+            1e-6 * match_here.covariance.norm());
+  const Pose2 found_here =
+      here.Search(scan, guess, 0.3, DegToRad(6.0), nullptr);
+  const Pose2 found_there =
+      there.Search(scan, guess + shift, 0.3, DegToRad(6.0), nullptr);
+  EXPECT_LT((found_there - shift - found_here).norm(), 1e-6);
+}
+
+TEST(ScanMatcherTest, TurnedWorldTurnsTheResult) {
+  // The whole thing by 120 degrees, and by 4 km.
+  const Pose2 turn(4000.0, 1000.0, DegToRad(120.0));
+  const Pose2 truth(-0.2, 0.3, 0.25);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
+  ScanMatcher matcher(Options());
+  matcher.SetReference(
+      Transformed(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)), turn));
+  const Pose2 guess = truth + Pose2(0.1, -0.1, DegToRad(3.0));
+  const MatchResult match =
+      matcher.Refine(scan, Compose(turn, guess), MatchPrior());
+  const Pose2 back = Compose(Inverse(turn), match.pose);
+  EXPECT_LT(PositionError(back, truth), 0.005);
+  EXPECT_LT(HeadingError(back, truth), DegToRad(0.1));
+}
+
+TEST(ScanMatcherTest, EmptyReferenceLeavesTheGuess) {
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
+  ScanMatcher matcher(Options());
+  matcher.SetReference({});
+  EXPECT_TRUE(matcher.empty());
+  const Pose2 guess(1.0, 2.0, 0.5);
+  const MatchResult match = matcher.Refine(scan, guess, MatchPrior());
+  EXPECT_LT((match.pose - guess).norm(), 1e-12);
+  EXPECT_EQ(match.inliers, 0);
+  EXPECT_EQ(match.inlier_ratio, 0.0);
+  EXPECT_EQ(match.information, Eigen::Matrix3d::Zero());
+}
+
+TEST(ScanMatcherTest, EmptyScanLeavesTheGuess) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
+  const Pose2 guess(1.0, 2.0, 0.5);
+  const MatchResult match = matcher.Refine({}, guess, MatchPrior());
+  EXPECT_LT((match.pose - guess).norm(), 1e-12);
+  EXPECT_EQ(match.inliers, 0);
+  double score = -1.0;
+  EXPECT_EQ(matcher.Search({}, guess, 0.3, 0.1, &score), guess);
+  EXPECT_EQ(score, 0.0);
+}
+
+TEST(ScanMatcherTest, ScanFarFromTheReferenceHasNoInliers) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
+  const Pose2 guess(500.0, -500.0, 0.0);
+  const MatchResult match = matcher.Refine(scan, guess, MatchPrior());
+  EXPECT_EQ(match.inliers, 0);
+  EXPECT_LT((match.pose - guess).norm(), 1e-12);
+}
+
+TEST(ScanMatcherTest, OtherFaceOfAThinWallIsNoPartner) {
+  // Seen from above at y = 0.05, from below at y = -0.05.
+  ScanMatcher matcher(Options());
+  matcher.SetReference(
+      Seen({{{-2.0, 0.05}, {2.0, 0.05}}}, Pose2(0.0, 1.5, 0.0)));
+  const Pose2 below(0.0, -1.5, 0.0);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan({{{-2.0, -0.05}, {2.0, -0.05}}}, below, FullCircle()));
+  const MatchResult match = matcher.Refine(scan, below, MatchPrior());
+  EXPECT_EQ(match.inliers, 0);
+}
+
+TEST(ScanMatcherTest, PeopleInTheScanDoNotDragIt) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
+  // Somebody stands 0.3 m before the wall at y = -2.5, over 1.5 m.
+  std::vector<Wall> crowded = RoomWithPillar();
+  crowded.push_back({{-1.5, -2.2}, {0.0, -2.2}});
+  const Pose2 truth(0.1, 0.1, 0.05);
+  const MatchResult match =
+      matcher.Refine(PointsOf(MakeScan(crowded, truth, FullCircle())),
+                     Pose2::Zero(), MatchPrior());
+  EXPECT_LT(PositionError(match.pose, truth), 0.01);
+  EXPECT_LT(HeadingError(match.pose, truth), DegToRad(0.2));
+  EXPECT_LT(match.inlier_ratio, 0.95);
+}
+
+TEST(ScanMatcherTest, NewReferenceReplacesTheOld) {
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
+  ScanMatcher matcher(Options());
+  matcher.SetReference(scan);
+  double before = 0.0;
+  matcher.Search(scan, Pose2::Zero(), 0.0, 0.0, &before);
+  matcher.SetReference(Transformed(scan, Pose2(50.0, 0.0, 0.0)));
+  double after = 0.0;
+  matcher.Search(scan, Pose2::Zero(), 0.0, 0.0, &after);
+  EXPECT_GT(before, 0.6);
+  EXPECT_EQ(after, 0.0);
+  EXPECT_EQ(matcher.Refine(scan, Pose2::Zero(), MatchPrior()).inliers, 0);
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -1,0 +1,195 @@
+#include <gtest/gtest.h>
+#include <plumbline/frontend/scan_points.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::FullCircle;
+using testing::Laser;
+using testing::MakeScan;
+using testing::PointsOf;
+using testing::Room;
+
+// A scan of beams 0.1 rad apart from straight ahead on.
+Scan Beams(const std::vector<float>& ranges) {
+  Scan scan;
+  scan.start_angle = 0.0;
+  scan.angle_step = 0.1;
+  scan.maximum_range = 80.0;
+  scan.ranges = ranges;
+  return scan;
+}
+
+ScanPointsOptions Options() {
+  ScanPointsOptions options;
+  options.usable_range = 50.0;
+  options.minimum_range = 0.1;
+  options.gap = 0.15;
+  options.gap_factor = 3.0;
+  options.normal_radius = 0.25;
+  options.normal_tolerance = 0.03;
+  return options;
+}
+
+TEST(ScanPointsTest, PointsAndNormalsOfARoomWithLaserOffset) {
+  // Neither robot nor laser has a special place.
+  const Pose2 robot(0.3, -0.2, 0.4);
+  Laser laser = FullCircle();
+  laser.offset = Pose2(0.2, 0.1, 0.3);
+  const std::vector<ScanPoint> points =
+      PointsOf(MakeScan(Room(6.0, 4.0), robot, laser), Options());
+  ASSERT_EQ(points.size(), 720u);
+  int with_normal = 0;
+  for (const ScanPoint& point : points) {
+    const Eigen::Vector2d p = TransformPoint(robot, point.position);
+    const Eigen::Vector2d n =
+        TransformPoint(Pose2(0.0, 0.0, robot[2]), point.normal);
+    const double to_x = 3.0 - std::abs(p.x());
+    const double to_y = 2.0 - std::abs(p.y());
+    ASSERT_NEAR(std::min(to_x, to_y), 0.0, 1e-6);
+    EXPECT_NEAR((point.position - Eigen::Vector2d(0.2, 0.1)).norm(),
+                point.range, 1e-9);
+    if (std::max(to_x, to_y) < 0.3) continue;  // a corner
+    Eigen::Vector2d expected(0.0, 0.0);
+    if (to_x < to_y) {
+      expected.x() = p.x() > 0.0 ? -1.0 : 1.0;
+    } else {
+      expected.y() = p.y() > 0.0 ? -1.0 : 1.0;
+    }
+    EXPECT_NEAR((n - expected).norm(), 0.0, 1e-5) << p.transpose();
+    ++with_normal;
+  }
+  EXPECT_GT(with_normal, 600);
+}
+
+TEST(ScanPointsTest, HandWorkedPositionAndBeam) {
+  Scan scan = Beams({0.0f, 2.0f});
+  scan.start_angle = 0.0;
+  scan.angle_step = 0.5 * kPi;
+  scan.laser_offset = Pose2(1.0, 0.5, 0.5 * kPi);
+  const std::vector<ScanPoint> points = PointsOf(scan, Options());
+  ASSERT_EQ(points.size(), 1u);
+  // Beam 1 points to the laser's left, which is the robot's back.
+  EXPECT_NEAR(points[0].position.x(), -1.0, 1e-12);
+  EXPECT_NEAR(points[0].position.y(), 0.5, 1e-12);
+  EXPECT_DOUBLE_EQ(points[0].range, 2.0);
+  EXPECT_EQ(points[0].beam, 1);
+  EXPECT_EQ(points[0].normal, Eigen::Vector2d::Zero());
+}
+
+TEST(ScanPointsTest, SkipsWhatIsNoReturnTooNearOrTooFar) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<ScanPoint> points = PointsOf(
+      Beams({0.0f, 1.0f, nan, 0.09f, 0.11f, 49.0f, 51.0f, -1.0f, 3.0f}),
+      Options());
+  ASSERT_EQ(points.size(), 4u);
+  EXPECT_EQ(points[0].beam, 1);
+  EXPECT_EQ(points[1].beam, 4);
+  EXPECT_EQ(points[2].beam, 5);
+  EXPECT_EQ(points[3].beam, 8);
+}
+
+TEST(ScanPointsTest, EmptyScanEmptiesTheVector) {
+  std::vector<ScanPoint> points(3);
+  ExtractScanPoints(Scan(), Options(), &points);
+  EXPECT_TRUE(points.empty());
+  points.resize(2);
+  ExtractScanPoints(Beams({0.0f, 0.0f, 0.0f}), Options(), &points);
+  EXPECT_TRUE(points.empty());
+}
+
+TEST(ScanPointsTest, NoNormalAtACorner) {
+  const std::vector<ScanPoint> points = PointsOf(
+      MakeScan(Room(4.0, 4.0), Pose2::Zero(), FullCircle()), Options());
+  int corners = 0;
+  for (const ScanPoint& point : points) {
+    const Eigen::Vector2d to_wall =
+        Eigen::Vector2d(2.0, 2.0) - point.position.cwiseAbs();
+    if (to_wall.maxCoeff() > 0.03) continue;
+    EXPECT_EQ(point.normal, Eigen::Vector2d::Zero())
+        << point.position.transpose();
+    ++corners;
+  }
+  EXPECT_GE(corners, 4);
+}
+
+TEST(ScanPointsTest, NoNormalOnClutter) {
+  // Ranges jump by half a metre from beam to beam.
+  std::vector<float> ranges;
+  for (int i = 0; i < 60; ++i) ranges.push_back(i % 2 == 0 ? 1.0f : 1.6f);
+  Scan scan = Beams(ranges);
+  scan.angle_step = DegToRad(1.0);
+  for (const ScanPoint& point : PointsOf(scan, Options())) {
+    EXPECT_EQ(point.normal, Eigen::Vector2d::Zero());
+  }
+}
+
+TEST(ScanPointsTest, NoNormalFromOneOrTwoReturns) {
+  Scan scan = Beams({2.0f, 2.0f});
+  scan.angle_step = DegToRad(1.0);
+  for (const ScanPoint& point : PointsOf(scan, Options())) {
+    EXPECT_EQ(point.normal, Eigen::Vector2d::Zero());
+  }
+  scan.ranges = {2.0f, 2.0f, 2.0f};
+  for (const ScanPoint& point : PointsOf(scan, Options())) {
+    EXPECT_NEAR(point.normal.norm(), 1.0, 1e-12);
+  }
+}
+
+TEST(ScanPointsTest, NormalsOfOneSurfaceDoNotBendAtAStep) {
+  // Two walls across the view at x = 2 (left) and x = 2.6 (right).
+  const std::vector<testing::Wall> walls = {{{2.0, 0.0}, {2.0, 3.0}},
+                                            {{2.6, -3.0}, {2.6, 0.0}}};
+  int seen = 0;
+  for (const ScanPoint& point : PointsOf(
+           MakeScan(walls, Pose2(0.0, 0.01, 0.0), FullCircle()), Options())) {
+    ASSERT_NEAR((point.normal - Eigen::Vector2d(-1.0, 0.0)).norm(), 0.0, 1e-4);
+    ++seen;
+  }
+  EXPECT_GT(seen, 100);
+}
+
+TEST(ScanPointsTest, NormalTurnsTowardsTheLaserAndNotTheRobot) {
+  // The wall at x = 0.5 stands between the robot and the laser at x = 1.
+  Laser laser = FullCircle();
+  laser.offset = Pose2(1.0, 0.0, 0.0);
+  const std::vector<ScanPoint> points = PointsOf(
+      MakeScan({{{0.5, -1.0}, {0.5, 1.0}}}, Pose2::Zero(), laser), Options());
+  ASSERT_GT(points.size(), 50u);
+  for (const ScanPoint& point : points) {
+    EXPECT_NEAR((point.normal - Eigen::Vector2d(1.0, 0.0)).norm(), 0.0, 1e-5);
+  }
+}
+
+TEST(ScanPointsTest, LaserUpsideDownSeesTheSameNormals) {
+  Laser laser = FullCircle();
+  laser.start_angle = kPi;
+  laser.angle_step = -laser.angle_step;
+  const std::vector<ScanPoint> points = PointsOf(
+      MakeScan({{{-3.0, 2.0}, {3.0, 2.0}}}, Pose2::Zero(), laser), Options());
+  ASSERT_GT(points.size(), 100u);
+  for (const ScanPoint& point : points) {
+    EXPECT_NEAR(point.position.y(), 2.0, 1e-6);
+    EXPECT_NEAR((point.normal - Eigen::Vector2d(0.0, -1.0)).norm(), 0.0, 1e-5);
+  }
+}
+
+TEST(ScanPointsTest, OneLostBeamDoesNotCostItsNeighboursTheirNormals) {
+  Scan scan =
+      MakeScan({{{2.0, -2.0}, {2.0, 2.0}}}, Pose2::Zero(), FullCircle());
+  // Straight ahead.
+  ASSERT_GT(scan.ranges[360], 0.0f);
+  scan.ranges[360] = 0.0f;
+  for (const ScanPoint& point : PointsOf(scan, Options())) {
+    EXPECT_NEAR(point.normal.norm(), 1.0, 1e-12) << point.beam;
+  }
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -178,13 +178,31 @@ TEST(OdometryRefinerTest, KeepsOdometryAlongAFeaturelessCorridor) {
   }
 }
 
-TEST(OdometryRefinerTest, BackwardsGivenAsForwards) {
-  // Some robots' odometry has no sign.
-  const std::vector<Pose2> motions(12, Pose2(-0.3, 0.0, 0.0));
-  const std::vector<Pose2> reported(12, Pose2(0.3, 0.0, 0.0));
-  const Drive drive = Along(Pose2(3.0, -2.0, 0.2), motions, reported);
+TEST(OdometryRefinerTest, CovarianceIsInTheAxesOfTheKeyScan) {
+  // The corridor runs along +y of the map, the robot looks along it: what is
+  // unknown is still its own x.
+  const Pose2 turn(3.0, 5.0, 0.5 * kPi);
+  const std::vector<Pose2> motions(10, Pose2(0.1, 0.0, 0.0));
+  Laser laser = FullCircle();
+  laser.maximum_range = 8.0;
   const std::vector<RefinedScan> refined =
-      Refine(Hall(), drive, FullCircle(), Options());
+      Refine(testing::Moved(Corridor(), turn), Along(turn, motions, motions),
+             laser, Options());
+  for (std::size_t i = 1; i < refined.size(); ++i) {
+    const Eigen::Matrix3d& covariance = refined[i].since_key.covariance;
+    EXPECT_GT(covariance(0, 0), 4.0 * covariance(1, 1)) << i;
+  }
+}
+
+TEST(OdometryRefinerTest, BackwardsGivenAsForwards) {
+  // Some robots' odometry has no sign: each step is 0.8 m wrong.
+  const std::vector<Pose2> motions(10, Pose2(-0.4, 0.0, 0.0));
+  const std::vector<Pose2> reported(10, Pose2(0.4, 0.0, 0.0));
+  const Drive drive = Along(Pose2(3.0, -2.0, 0.2), motions, reported);
+  OdometryRefinementOptions options = Options();
+  options.search_translation = 0.1;
+  const std::vector<RefinedScan> refined =
+      Refine(Hall(), drive, FullCircle(), options);
   for (std::size_t i = 0; i < refined.size(); ++i) {
     EXPECT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.05) << i;
     EXPECT_LT(HeadingError(refined[i].pose, drive.truth[i]), DegToRad(0.5))

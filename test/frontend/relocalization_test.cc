@@ -173,6 +173,38 @@ TEST_F(RelocalizationTest, AWrongMatchDoesNotBendTheWay) {
   }
 }
 
+TEST_F(RelocalizationTest, OffsetIsObservedAtTheMiddleOfThePiece) {
+  // A wall at y = -1 whose piece 6 m ahead looks turned by `turn` about its
+  // middle, and one across at x = 3 that looks right. Both know the heading
+  // equally well: theta = -turn / 2. The piece's middle stays on its line:
+  // y + 6 theta = 0.
+  Transaction transaction;
+  Feature feature;
+  feature.type = &registry_.GetFeature("segment");
+  feature.parameters = {0.0, -1.0, 0.0};
+  transaction.AddFeature(feature);
+  feature.parameters = {3.0, 0.0, 0.5 * kPi};
+  transaction.AddFeature(feature);
+  const std::vector<FeatureId> ids =
+      graph_.Apply(std::move(transaction)).features;
+  constexpr double kTurn = 0.004;
+  KeyScanRecord record;
+  FeatureMatch match;
+  match.feature = ids[0];
+  match.observation = Observe(Pose2::Zero(), Wall{{5.0, -1.0}, {7.0, -1.0}});
+  match.observation.pose[2] += kTurn;
+  record.matches.push_back(match);
+  match.feature = ids[1];
+  match.observation = Observe(Pose2::Zero(), Wall{{3.0, -1.0}, {3.0, 1.0}});
+  record.matches.push_back(match);
+  records_.push_back(record);
+  const std::vector<Pose2> poses = Relocalize();
+  ASSERT_EQ(poses.size(), 1u);
+  EXPECT_NEAR(poses[0][0], 0.0, 1e-4);
+  EXPECT_NEAR(poses[0][1], 3.0 * kTurn, 1e-4);
+  EXPECT_NEAR(poses[0][2], -0.5 * kTurn, 1e-5);
+}
+
 TEST_F(RelocalizationTest, FeaturesThatAreGoneAreLeftOut) {
   Build(5);
   Transaction transaction;

@@ -2,6 +2,7 @@
 #include <plumbline/frontend/scan_matcher.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <cmath>
 #include <vector>
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/frontend/segment_extraction.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <vector>

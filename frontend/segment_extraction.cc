@@ -92,9 +92,9 @@ class Extractor {
     return fit;
   }
 
-  static double Distance(const LineFit& fit, const Eigen::Vector2d& p) {
+  static double SignedDistance(const LineFit& fit, const Eigen::Vector2d& p) {
     const Eigen::Vector2d d = p - fit.mean;
-    return std::abs(fit.direction.x() * d.y() - fit.direction.y() * d.x());
+    return fit.direction.x() * d.y() - fit.direction.y() * d.x();
   }
 
   void Split(int begin, int end) {
@@ -117,7 +117,7 @@ class Extractor {
         farthest = i;
       }
     }
-    if (farthest_distance <= options_.split_distance || Straight(begin, end)) {
+    if (Straight(begin, end)) {
       runs_.emplace_back(begin, end);
       return;
     }
@@ -136,8 +136,17 @@ class Extractor {
 
   bool Straight(int begin, int end) const {
     const LineFit fit = Fit(begin, end);
+    const int window = std::min(options_.bend_window, end - begin);
+    double sum = 0.0;
     for (int i = begin; i < end; ++i) {
-      if (Distance(fit, points_[i].position) > options_.split_distance) {
+      const double distance = SignedDistance(fit, points_[i].position);
+      if (std::abs(distance) > options_.split_distance) return false;
+      sum += distance;
+      if (i - begin >= window) {
+        sum -= SignedDistance(fit, points_[i - window].position);
+      }
+      if (i - begin >= window - 1 &&
+          std::abs(sum) > options_.bend_distance * window) {
         return false;
       }
     }

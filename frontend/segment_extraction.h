@@ -13,8 +13,13 @@ struct SegmentExtractionOptions {
   /// A segment has at least so many returns and is at least so long, m.
   int min_points = 6;
   double min_length = 0.4;
-  /// Farthest that a return may lie off its segment, m.
-  double split_distance = 0.06;
+  /// Farthest that one return may lie off its segment, m: noise of the laser.
+  double split_distance = 0.05;
+  /// Farthest that the mean of `bend_window` neighbouring returns may lie off,
+  /// m: a door set back by a few centimetres is another piece of wall, and a
+  /// line through both would be turned by degrees.
+  double bend_distance = 0.015;
+  int bend_window = 5;
   /// Neighbouring returns farther apart than this, or than `gap_factor` times
   /// the distance that beams spread, end a segment, m.
   double gap = 0.25;

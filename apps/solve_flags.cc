@@ -1,0 +1,191 @@
+#include <plumbline/apps/solve_flags.h>
+
+#include <gflags/gflags.h>
+#include <plumbline/core/error.h>
+
+#include <charconv>
+#include <cmath>
+#include <set>
+#include <string>
+#include <thread>
+
+DEFINE_string(input, "",
+              "Robot log (CARMEN) or graph (g2o), plain, gzip or bzip2; - reads "
+              "standard input");
+DEFINE_string(output_dir, "", "Folder for the results; made if missing");
+
+DEFINE_bool(structure, true, "Find structure; false: measurements only");
+DEFINE_string(hierarchy, "",
+              "Detectors by level, levels separated by /, detectors of a level "
+              "by commas; empty: by input (a log: "
+              "orientation_mixture/orientation_relation)");
+DEFINE_string(allowed_angles, "0,45,90,135",
+              "Angles between orientations that are looked for, degrees");
+DEFINE_double(angle_resolution, 0.0,
+              "Look for all multiples of this angle in place of "
+              "--allowed_angles, degrees; 0: not set");
+PLUMBLINE_FLAG_RANGE(angle_resolution, 0.0, 90.0);
+DEFINE_double(structure_sigma_segment_orientation, 0.5,
+              "Tolerance of a wall against its orientation, degrees");
+PLUMBLINE_FLAG_RANGE(structure_sigma_segment_orientation, 1e-3, 45.0);
+DEFINE_double(structure_sigma_orientation_orientation, 0.2,
+              "Tolerance of the angle between two orientations, degrees");
+PLUMBLINE_FLAG_RANGE(structure_sigma_orientation_orientation, 1e-3, 45.0);
+
+DEFINE_double(delta_threshold, 0.3,
+              "Break structure whose delta (p-value) is below it");
+PLUMBLINE_FLAG_RANGE(delta_threshold, 0.0, 1.0);
+DEFINE_string(delta_mode, "frozen",
+              "Weighting of structure: frozen, continuous, huber, cauchy, "
+              "tukey, geman_mcclure, dcs");
+PLUMBLINE_FLAG_CHOICES(delta_mode, "frozen", "continuous", "huber", "cauchy",
+                       "tukey", "geman_mcclure", "dcs");
+DEFINE_int32(em_every, 50,
+             "Scans between EM steps while replaying; 0: only at the end");
+PLUMBLINE_FLAG_RANGE(em_every, 0, 1e9);
+DEFINE_int32(em_max_iterations, 50, "Most EM iterations at the end");
+PLUMBLINE_FLAG_RANGE(em_max_iterations, 1, 100000);
+
+DEFINE_bool(odometry_refinement, true,
+            "Match each scan to what was seen last before association");
+DEFINE_double(link_radius, 10.0,
+              "Feature links are kept so far around the robot, m");
+PLUMBLINE_FLAG_RANGE(link_radius, 0.5, 1000.0);
+DEFINE_int32(association_depth, 3,
+             "Links from the robot searched for association");
+PLUMBLINE_FLAG_RANGE(association_depth, 1, 100);
+DEFINE_string(refine, "map",
+              "What the final trajectory is adjusted with: none, or map (every "
+              "scan found again on the final map)");
+PLUMBLINE_FLAG_CHOICES(refine, "none", "map");
+DEFINE_double(usable_range, 50.0, "Returns farther away are left out, m");
+PLUMBLINE_FLAG_RANGE(usable_range, 0.5, 10000.0);
+
+DEFINE_string(laser_start_angle, "",
+              "Direction of the first beam, degrees; empty: as the log says or "
+              "by the number of beams");
+DEFINE_string(laser_step, "",
+              "Angle between beams, degrees; empty: as above");
+DEFINE_string(laser_max_range, "",
+              "Readings from here on are no return, m; empty: as the log says");
+
+DEFINE_uint64(seed, 1, "Seed of everything random");
+DEFINE_int32(num_threads, 0,
+             "Threads; 0: all cores. The results do not depend on it");
+PLUMBLINE_FLAG_RANGE(num_threads, 0, 1024);
+DEFINE_string(plugins, "", "Shared objects to load, separated by commas");
+DEFINE_bool(list_plugins, false,
+            "Print feature types, relations, losses and detectors, and end");
+
+namespace plumbline {
+namespace {
+
+std::optional<double> ParseOptional(const std::string& flag,
+                                    const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  double value = 0.0;
+  const auto result =
+      std::from_chars(text.data(), text.data() + text.size(), value);
+  if (result.ec != std::errc() || result.ptr != text.data() + text.size() ||
+      !std::isfinite(value)) {
+    throw Error("--" + flag, 0, "cannot read '" + text + "'", "a number");
+  }
+  return value;
+}
+
+std::vector<double> ParseList(const std::string& flag,
+                              const std::string& text) {
+  std::vector<double> values;
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    std::size_t end = text.find(',', begin);
+    if (end == std::string::npos) end = text.size();
+    const auto value = ParseOptional(flag, text.substr(begin, end - begin));
+    if (!value) {
+      throw Error("--" + flag, 0, "an empty entry in '" + text + "'",
+                  "numbers separated by commas");
+    }
+    values.push_back(*value);
+    begin = end + 1;
+  }
+  return values;
+}
+
+}  // namespace
+
+std::vector<FlagGroup> SolveFlagGroups() {
+  return {
+      {"Input and output", {"input", "output_dir"}},
+      {"Structure",
+       {"structure", "hierarchy", "allowed_angles", "angle_resolution",
+        "structure_sigma_segment_orientation",
+        "structure_sigma_orientation_orientation"}},
+      {"Expectation maximization",
+       {"delta_threshold", "delta_mode", "em_every", "em_max_iterations"}},
+      {"Front-end",
+       {"odometry_refinement", "link_radius", "association_depth", "refine",
+        "usable_range"}},
+      {"Laser", {"laser_start_angle", "laser_step", "laser_max_range"}},
+      {"Running", {"seed", "num_threads", "plugins", "list_plugins"}},
+  };
+}
+
+LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
+  LogSolverOptions options;
+  options.structure = FLAGS_structure;
+  if (!FLAGS_hierarchy.empty()) options.hierarchy = FLAGS_hierarchy;
+
+  auto set = [&](const std::string& detector, const std::string& name,
+                 double value) {
+    if (registry.FindDetector(detector) != nullptr) {
+      options.detector_parameters[detector][name] = value;
+    }
+  };
+  set("orientation_mixture", "sigma_deg",
+      FLAGS_structure_sigma_segment_orientation);
+  set("orientation_relation", "sigma_deg",
+      FLAGS_structure_sigma_orientation_orientation);
+  if (FLAGS_angle_resolution > 0.0) {
+    set("orientation_relation", "resolution_deg", FLAGS_angle_resolution);
+  } else {
+    const std::vector<double> angles =
+        ParseList("allowed_angles", FLAGS_allowed_angles);
+    for (std::size_t i = 0; i < angles.size(); ++i) {
+      set("orientation_relation", "angle_" + std::to_string(i), angles[i]);
+    }
+  }
+
+  options.odometry.match_scans = FLAGS_odometry_refinement;
+  options.odometry.points.usable_range = FLAGS_usable_range;
+  options.builder.link_radius = FLAGS_link_radius;
+  options.builder.association_depth = FLAGS_association_depth;
+  options.session.delta_mode = FLAGS_delta_mode;
+  options.em.delta_threshold = FLAGS_delta_threshold;
+  options.em.max_iterations = FLAGS_em_max_iterations;
+  options.em.seed = FLAGS_seed;
+  options.em_every = FLAGS_em_every;
+  options.relocalize = FLAGS_refine != "none";
+  return options;
+}
+
+CarmenOptions CarmenOptionsFromFlags() {
+  CarmenOptions options;
+  options.laser_start_angle =
+      ParseOptional("laser_start_angle", FLAGS_laser_start_angle);
+  if (options.laser_start_angle) {
+    options.laser_start_angle = DegToRad(*options.laser_start_angle);
+  }
+  options.laser_step = ParseOptional("laser_step", FLAGS_laser_step);
+  if (options.laser_step) options.laser_step = DegToRad(*options.laser_step);
+  options.laser_max_range =
+      ParseOptional("laser_max_range", FLAGS_laser_max_range);
+  return options;
+}
+
+int NumThreadsFromFlags() {
+  if (FLAGS_num_threads > 0) return FLAGS_num_threads;
+  const unsigned cores = std::thread::hardware_concurrency();
+  return cores > 0 ? static_cast<int>(cores) : 1;
+}
+
+}  // namespace plumbline

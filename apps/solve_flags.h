@@ -1,0 +1,39 @@
+#ifndef PLUMBLINE_APPS_SOLVE_FLAGS_H_
+#define PLUMBLINE_APPS_SOLVE_FLAGS_H_
+
+#include <gflags/gflags_declare.h>
+#include <plumbline/apps/app.h>
+#include <plumbline/apps/log_solver.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/frontend/carmen_reader.h>
+
+#include <vector>
+
+DECLARE_string(input);
+DECLARE_string(output_dir);
+DECLARE_bool(structure);
+DECLARE_string(hierarchy);
+DECLARE_uint64(seed);
+DECLARE_int32(num_threads);
+DECLARE_string(plugins);
+DECLARE_bool(list_plugins);
+
+namespace plumbline {
+
+/// The flags of plumbline_solve in groups, for --help.
+std::vector<FlagGroup> SolveFlagGroups();
+
+/// The one place where flags become options. `registry` gives the detectors
+/// that structure tolerances are handed to. Throws Error for values that do
+/// not fit together or do not parse.
+LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry);
+
+/// Laser flags for the log reader.
+CarmenOptions CarmenOptionsFromFlags();
+
+/// Threads to use: --num_threads, or all cores when it is 0.
+int NumThreadsFromFlags();
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_APPS_SOLVE_FLAGS_H_

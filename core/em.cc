@@ -127,7 +127,7 @@ Hierarchy MakeHierarchy(
   return hierarchy;
 }
 
-struct EmOrchestrator::Impl : public GraphListener {
+struct EmOrchestrator::Impl final : public GraphListener {
   Impl(Graph* graph_in, SolverSession* session_in, const Registry& registry_in,
        Hierarchy hierarchy_in, const EmOptions& options_in)
       : graph(graph_in),
@@ -219,6 +219,7 @@ struct EmOrchestrator::Impl : public GraphListener {
     arguments.sqrt_information = SqrtInformation(information);
     arguments.features = features;
     std::vector<const double*> parameters;
+    parameters.reserve(features.size());
     for (const Feature* feature : features) {
       parameters.push_back(feature->data());
     }

@@ -34,7 +34,7 @@ struct LogSolverOptions {
   /// False: the trajectory is what it was when each scan came in.
   bool relocalize = true;
   /// Scans between EM steps while replaying; 0: only at the end.
-  int em_every = 50;
+  int em_every = 20;
   /// Constraints from the robot that an EM step while replaying reaches.
   int em_depth = 3;
   /// While the map has fewer features than this, EM steps take in all of it:

@@ -25,10 +25,10 @@ DEFINE_double(angle_resolution, 0.0,
               "Look for all multiples of this angle in place of "
               "--allowed_angles, degrees; 0: not set");
 PLUMBLINE_FLAG_RANGE(angle_resolution, 0.0, 90.0);
-DEFINE_double(structure_sigma_segment_orientation, 0.5,
+DEFINE_double(structure_sigma_segment_orientation, 0.1,
               "Tolerance of a wall against its orientation, degrees");
 PLUMBLINE_FLAG_RANGE(structure_sigma_segment_orientation, 1e-3, 45.0);
-DEFINE_double(structure_sigma_orientation_orientation, 0.2,
+DEFINE_double(structure_sigma_orientation_orientation, 0.02,
               "Tolerance of the angle between two orientations, degrees");
 PLUMBLINE_FLAG_RANGE(structure_sigma_orientation_orientation, 1e-3, 45.0);
 
@@ -40,7 +40,7 @@ DEFINE_string(delta_mode, "frozen",
               "tukey, geman_mcclure, dcs");
 PLUMBLINE_FLAG_CHOICES(delta_mode, "frozen", "continuous", "huber", "cauchy",
                        "tukey", "geman_mcclure", "dcs");
-DEFINE_int32(em_every, 50,
+DEFINE_int32(em_every, 20,
              "Scans between EM steps while replaying; 0: only at the end");
 PLUMBLINE_FLAG_RANGE(em_every, 0, 1e9);
 DEFINE_int32(em_max_iterations, 50, "Most EM iterations at the end");

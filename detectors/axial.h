@@ -42,7 +42,7 @@ struct AxialComponent {
 struct AxialMixtureOptions {
   /// A sample nearer than this to a direction belongs to it, and no further
   /// direction is made of it.
-  double gate = DegToRad(5.0);
+  double gate = DegToRad(8.0);
   /// A component with a larger spread is split where it can be. One that
   /// spreads wider than the gate is refused.
   double max_stddev = DegToRad(3.0);

@@ -11,7 +11,7 @@ namespace plumbline {
 
 struct OrientationMixtureOptions {
   /// Tolerance of a wall against its orientation, rad.
-  double sigma = DegToRad(0.5);
+  double sigma = DegToRad(0.1);
   /// Features with a shorter visible part are left out, m. A feature without
   /// extent has an unknown length and counts as one of 1 m.
   double min_length = 0.5;

@@ -18,7 +18,7 @@ struct OrientationRelationOptions {
   /// one, rad.
   double gate = DegToRad(3.0);
   /// Tolerance of the relation, rad.
-  double sigma = DegToRad(0.2);
+  double sigma = DegToRad(0.02);
   /// An orientation is related to at most so many that stood before it. All
   /// pairs of few orientations are related; many get enough for redundancy.
   int max_relations = 4;

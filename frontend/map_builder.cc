@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace plumbline {
@@ -68,17 +69,38 @@ void MapBuilder::Predict(const UncertainPose2& motion) {
   const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
   const Eigen::Matrix3d added = j2 * motion.covariance * j2.transpose();
   robot_ = Compose(robot_, motion.mean);
+  for (auto& link : links_) {
+    Eigen::Matrix3d& covariance = link.second.covariance;
+    covariance = Symmetric(j1 * covariance * j1.transpose() + added);
+  }
+  CutLinks();
+}
+
+void MapBuilder::CutLinks() {
   const Eigen::Vector2d position = robot_.head<2>();
-  for (auto it = links_.begin(); it != links_.end();) {
-    const Feature* feature = graph_->FindFeature(it->first);
+  // Where no wall was recognized for the whole radius the best link stays, far
+  // as it is: without any the map would fall apart.
+  FeatureId best = kNoId;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const auto& link : links_) {
+    const double trace = link.second.covariance.trace();
+    if (graph_->FindFeature(link.first) != nullptr && trace < smallest) {
+      smallest = trace;
+      best = link.first;
+    }
+  }
+  std::vector<FeatureId> far;
+  for (const auto& link : links_) {
+    const Feature* feature = graph_->FindFeature(link.first);
     if (feature == nullptr ||
         DistanceTo(*feature, position) > options_.link_radius) {
-      it = links_.erase(it);
-      continue;
+      far.push_back(link.first);
     }
-    Eigen::Matrix3d& covariance = it->second.covariance;
-    covariance = Symmetric(j1 * covariance * j1.transpose() + added);
-    ++it;
+  }
+  const bool keep_best = far.size() == links_.size();
+  for (const FeatureId id : far) {
+    if (keep_best && id == best) continue;
+    links_.erase(id);
   }
 }
 
@@ -180,7 +202,6 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
           inserted.first->second.covariance = Symmetric(
               (widest.inverse() + localized.observation_information).inverse());
         }
-        inserted.first->second.last_seen = scan;
       }
       break;
     }
@@ -244,18 +265,24 @@ void MapBuilder::SecondLook(const std::vector<FeatureMatch>& matches) {
       if (other == seen.end()) continue;
       const UncertainPose2 relation =
           Compose(Inverse(entry.second), other->second);
-      const Eigen::Matrix3d information =
-          options_.second_look_weight *
-          Symmetric(relation.covariance.inverse());
+      Eigen::Matrix3d information = options_.second_look_weight *
+                                    Symmetric(relation.covariance.inverse());
       const Eigen::Matrix3d before = constraint.information;
       const double floor_position =
           options_.relation_floor_position * options_.relation_floor_position;
       const double floor_angle =
           options_.relation_floor_angle * options_.relation_floor_angle;
-      if (before(2, 2) > 1.0 / floor_angle ||
-          std::max(before(0, 0), before(1, 1)) > 1.0 / floor_position) {
-        continue;
+      // As much of the look as keeps within the floor.
+      double share = 1.0;
+      for (int row = 0; row < 3; ++row) {
+        const double most = 1.0 / (row == 2 ? floor_angle : floor_position);
+        if (information(row, row) > 0.0) {
+          share = std::min(share,
+                           (most - before(row, row)) / information(row, row));
+        }
       }
+      if (share <= 0.0) continue;
+      information *= share;
       const Eigen::Matrix3d fused = Symmetric(before + information);
       Eigen::Vector3d difference = relation.mean - constraint.expected;
       difference[2] = NormalizeAngle(difference[2]);
@@ -267,6 +294,35 @@ void MapBuilder::SecondLook(const std::vector<FeatureMatch>& matches) {
       graph_->UpdateConstraint(id, expected, fused);
     }
   }
+}
+
+std::size_t MapBuilder::PieceOf(
+    const SegmentObservation& observation,
+    const std::vector<SegmentObservation>& observations,
+    const std::vector<int>& fresh,
+    const std::vector<std::size_t>& owner) const {
+  const std::size_t self = owner.size();
+  for (std::size_t j = 0; j < self; ++j) {
+    if (owner[j] != j) continue;
+    const SegmentObservation& other = observations[fresh[j]];
+    AssociationCandidate candidate;
+    candidate.pose = other.pose;
+    candidate.extent_begin = -0.5 * other.length;
+    candidate.extent_end = 0.5 * other.length;
+    // The other piece's own errors, its direction with the lever between the
+    // two.
+    const double lever = Between(other.pose, observation.pose).head<2>().norm();
+    AssociationOptions options = options_.association;
+    options.feature_offset_sigma = std::sqrt(
+        other.covariance(0, 0) + lever * lever * other.covariance(1, 1));
+    options.feature_angle_sigma = std::sqrt(other.covariance(1, 1));
+    options.max_offset = options_.same_scan_offset;
+    if (!Associate(Pose2::Zero(), {observation}, {candidate}, options)
+             .empty()) {
+      return j;
+    }
+  }
+  return self;
 }
 
 void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
@@ -292,6 +348,8 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
 
   Transaction transaction;
   std::vector<FeatureId> provisional;
+  // For each fresh observation the one whose feature it is: itself, mostly.
+  std::vector<std::size_t> owner;
   // The first scan's best segment fixes the gauge.
   int gauge = -1;
   if (links_.empty() && num_created_ == 0) {
@@ -305,6 +363,25 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
   for (std::size_t k = 0; k < fresh.size(); ++k) {
     const SegmentObservation& observation = observations[fresh[k]];
     const Pose2 pose = Compose(robot_, observation.pose);
+    // Another piece of a wall that this scan has just made a feature of (there
+    // is something in front of its middle).
+    const std::size_t piece_of =
+        PieceOf(observation, observations, fresh, owner);
+    owner.push_back(piece_of);
+    if (piece_of != k) {
+      Feature& wall =
+          transaction.added_features()[Transaction::ProvisionalIndex(
+              provisional[piece_of])];
+      const Pose2 relative = Between(
+          Pose2(wall.parameters[0], wall.parameters[1], wall.parameters[2]),
+          pose);
+      wall.extent_begin =
+          std::min(wall.extent_begin, relative[0] - 0.5 * observation.length);
+      wall.extent_end =
+          std::max(wall.extent_end, relative[0] + 0.5 * observation.length);
+      provisional.push_back(provisional[piece_of]);
+      continue;
+    }
     Feature feature;
     feature.type = &segment_type;
     feature.parameters = {pose[0], pose[1], pose[2]};
@@ -341,6 +418,7 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
     // Relations within the scan have no robot in between.
     std::vector<std::pair<double, std::size_t>> neighbors;
     for (std::size_t j = 0; j < k; ++j) {
+      if (owner[j] != j) continue;
       neighbors.emplace_back(
           (observations[fresh[j]].pose.head<2>() - observation.pose.head<2>())
               .norm(),
@@ -370,6 +448,12 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
   const TransactionResult result = graph_->Apply(std::move(transaction));
   for (std::size_t k = 0; k < fresh.size(); ++k) {
     const SegmentObservation& observation = observations[fresh[k]];
+    FeatureMatch match;
+    match.feature =
+        result.features[Transaction::ProvisionalIndex(provisional[k])];
+    match.observation = observation;
+    record->matches.push_back(std::move(match));
+    if (owner[k] != k) continue;
     // The robot relative to the new feature: only the observation's error.
     Link link;
     const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
@@ -379,12 +463,7 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
     link.covariance =
         Symmetric(j * ObservationCovariance(observation, options_.along_sigma) *
                   j.transpose());
-    link.last_seen = record->scan;
-    links_.emplace(result.features[k], link);
-    FeatureMatch match;
-    match.feature = result.features[k];
-    match.observation = observation;
-    record->matches.push_back(std::move(match));
+    links_.emplace(record->matches.back().feature, link);
     ++num_created_;
   }
 }

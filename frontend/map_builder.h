@@ -24,6 +24,8 @@ struct MapBuilderOptions {
   /// and to so many new ones of its own scan.
   int links_per_feature = 5;
   int links_within_scan = 3;
+  /// Two pieces of one scan are one wall only when they are in line to this, m.
+  double same_scan_offset = 0.05;
   /// Standard deviation of a segment's position along itself in the scan that
   /// makes it a feature, m. The position is chosen there, so it is small.
   double along_sigma = 0.01;
@@ -33,7 +35,7 @@ struct MapBuilderOptions {
   /// A relation does not get more certain than this by second looks: across
   /// (m) and direction (rad).
   double relation_floor_position = 0.005;
-  double relation_floor_angle = DegToRad(0.1);
+  double relation_floor_angle = DegToRad(0.3);
 };
 
 /// One observation that was recognized as a feature.
@@ -95,14 +97,17 @@ class MapBuilder {
     // Covariance of the robot's pose relative to the feature, in the axes of
     // the map frame.
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    // Index of the scan that saw it last.
-    int last_seen = 0;
   };
 
   void Predict(const UncertainPose2& motion);
-  void Correct(const std::vector<Association>& associations,
-               const std::vector<SegmentObservation>& observations);
+  void CutLinks();
   void SecondLook(const std::vector<FeatureMatch>& matches);
+  // Index in `fresh` of the first observation whose feature this one is a piece
+  // of; the number of entries in `owner` when there is none.
+  std::size_t PieceOf(const SegmentObservation& observation,
+                      const std::vector<SegmentObservation>& observations,
+                      const std::vector<int>& fresh,
+                      const std::vector<std::size_t>& owner) const;
   void Grow(const std::vector<SegmentObservation>& observations,
             const std::vector<bool>& used, KeyScanRecord* record);
 

@@ -93,14 +93,31 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
       const double s = std::sin(key_pose[2]);
       Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
       rotation.topLeftCorner<2, 2>() << c, s, -s, c;
+      // What the returns leave open is as uncertain as all the odometry since
+      // the key scan, not as that of the last step alone.
       result.since_key.covariance =
-          rotation * match.covariance * rotation.transpose();
+          (rotation * match.information * rotation.transpose() +
+           result.since_key.covariance.inverse())
+              .inverse();
     } else {
       ++refusals_;
     }
   }
 
   since_key_ = result.since_key;
+  if (!result.odometry_only) {
+    const MatchDrift& drift = options_.drift;
+    const double way = result.since_key.mean.head<2>().norm();
+    const double turned = std::abs(result.since_key.mean[2]);
+    const double translation = drift.translation_per_root_metre *
+                               drift.translation_per_root_metre * way;
+    const double rotation =
+        drift.rotation_per_root_metre * drift.rotation_per_root_metre * way +
+        drift.rotation_per_root_radian * drift.rotation_per_root_radian *
+            turned;
+    result.since_key.covariance.diagonal() +=
+        Eigen::Vector3d(translation, translation, rotation);
+  }
   if (result.since_key.mean.head<2>().norm() >= options_.key_distance ||
       std::abs(result.since_key.mean[2]) >= options_.key_rotation) {
     result.is_key = true;

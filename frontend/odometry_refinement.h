@@ -31,6 +31,17 @@ struct OdometryNoise {
 Eigen::Matrix3d OdometryCovariance(const Pose2& motion,
                                    const OdometryNoise& noise);
 
+/// Errors of scan matching that the returns do not tell of: what neighbouring
+/// matches share (bent surfaces, beams that are not quite where they should be)
+/// adds up along the way like a random walk.
+struct MatchDrift {
+  /// Standard deviations after one metre: m, and rad.
+  double translation_per_root_metre = 0.01;
+  double rotation_per_root_metre = DegToRad(0.1);
+  /// After a turn of one radian, rad.
+  double rotation_per_root_radian = DegToRad(0.7);
+};
+
 struct OdometryRefinementOptions {
   /// False: scans are taken as keys by the same rule, but poses are the raw
   /// odometry's (the paper's method).
@@ -38,6 +49,7 @@ struct OdometryRefinementOptions {
   ScanPointsOptions points;
   ScanMatcherOptions matcher;
   OdometryNoise noise;
+  MatchDrift drift;
   /// A new key scan is taken after so much motion, m and rad.
   double key_distance = 0.3;
   double key_rotation = 0.15;

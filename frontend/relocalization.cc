@@ -69,7 +69,6 @@ std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
     problem.SetParameterBlockConstant(entry.second.data());
   }
   if (!anchored) {
-    problem.SetParameterBlockConstant(poses.front().data());
     // Nothing to find the poses on: odometry as it stands.
     return poses;
   }
@@ -95,6 +94,10 @@ std::vector<Pose2> InterpolateScans(const std::vector<RefinedScan>& refined,
                                     const std::vector<KeyScanRecord>& records,
                                     const std::vector<Pose2>& key_poses) {
   std::vector<Pose2> poses(refined.size(), Pose2::Zero());
+  if (records.empty()) {
+    for (std::size_t i = 0; i < refined.size(); ++i) poses[i] = refined[i].pose;
+    return poses;
+  }
   for (std::size_t k = 0; k < records.size(); ++k) {
     const std::size_t begin = records[k].scan;
     const bool last = k + 1 == records.size();

@@ -11,7 +11,7 @@ namespace {
 
 // Beyond this the reference is dropped, so that one wild return cannot blow up
 // the grids, m.
-constexpr double kReferenceReach = 60.0;
+constexpr double kReferenceReach = 120.0;
 
 // Distance at which a return's likelihood in the search has fallen to
 // exp(-1/2), in cells.
@@ -25,21 +25,36 @@ ScanMatcher::ScanMatcher(const ScanMatcherOptions& options)
 
 void ScanMatcher::SetReference(std::vector<ScanPoint> points) {
   reference_.clear();
+  bucket_begin_.assign(1, 0);
+  bucket_columns_ = 0;
+  bucket_rows_ = 0;
   field_valid_ = false;
   if (points.empty()) return;
-  Eigen::Vector2d minimum = points.front().position;
-  Eigen::Vector2d maximum = minimum;
+  // The grids reach so far around the middle of the points: one wild return
+  // cannot blow them up.
+  std::vector<double> xs, ys;
+  xs.reserve(points.size());
+  ys.reserve(points.size());
+  for (const ScanPoint& point : points) {
+    xs.push_back(point.position.x());
+    ys.push_back(point.position.y());
+  }
+  const auto middle = static_cast<std::ptrdiff_t>(points.size() / 2);
+  std::nth_element(xs.begin(), xs.begin() + middle, xs.end());
+  std::nth_element(ys.begin(), ys.begin() + middle, ys.end());
+  const Eigen::Vector2d center(xs[middle], ys[middle]);
+  const Eigen::Vector2d reach = Eigen::Vector2d::Constant(kReferenceReach);
+  Eigen::Vector2d minimum = center;
+  Eigen::Vector2d maximum = center;
   for (const ScanPoint& point : points) {
     minimum = minimum.cwiseMin(point.position);
     maximum = maximum.cwiseMax(point.position);
   }
+  minimum = minimum.cwiseMax(center - reach);
+  maximum = maximum.cwiseMin(center + reach);
   const double margin = 1.0;
   origin_ = minimum.array() - margin;
-  const Eigen::Vector2d size =
-      (maximum - minimum)
-          .cwiseMin(Eigen::Vector2d::Constant(4.0 * kReferenceReach))
-          .array() +
-      2.0 * margin;
+  const Eigen::Vector2d size = (maximum - minimum).array() + 2.0 * margin;
   bucket_columns_ = static_cast<int>(std::ceil(size.x() / bucket_size_)) + 1;
   bucket_rows_ = static_cast<int>(std::ceil(size.y() / bucket_size_)) + 1;
   const std::size_t cells =
@@ -48,12 +63,12 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points) {
   std::vector<int> cell_of(points.size(), -1);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2d local = (points[i].position - origin_) / bucket_size_;
-    const int column = static_cast<int>(local.x());
-    const int row = static_cast<int>(local.y());
-    if (column < 0 || row < 0 || column >= bucket_columns_ ||
-        row >= bucket_rows_) {
+    if (!(local.x() >= 0.0 && local.y() >= 0.0 && local.x() < bucket_columns_ &&
+          local.y() < bucket_rows_)) {
       continue;
     }
+    const int column = static_cast<int>(local.x());
+    const int row = static_cast<int>(local.y());
     cell_of[i] = row * bucket_columns_ + column;
     ++bucket_begin_[cell_of[i] + 1];
   }
@@ -219,6 +234,8 @@ void ScanMatcher::BuildField() const {
 Pose2 ScanMatcher::Search(const std::vector<ScanPoint>& scan,
                           const Pose2& center, double translation_window,
                           double rotation_window, double* score) const {
+  if (score != nullptr) *score = 0.0;
+  if (reference_.empty()) return center;
   if (!field_valid_) BuildField();
   // Thin the scan out: near walls carry many returns that say the same.
   std::vector<Eigen::Vector2d> points;
@@ -229,7 +246,6 @@ Pose2 ScanMatcher::Search(const std::vector<ScanPoint>& scan,
       points.push_back(point.position);
     }
   }
-  if (score != nullptr) *score = 0.0;
   if (points.empty()) return center;
 
   const double resolution = options_.grid_resolution;
@@ -238,7 +254,8 @@ Pose2 ScanMatcher::Search(const std::vector<ScanPoint>& scan,
   const int steps = static_cast<int>(
       std::ceil(translation_window / options_.search_step - 1e-9));
   Pose2 best = center;
-  double best_score = -1.0;
+  // Where nothing fits at all the prediction stands.
+  double best_score = 0.0;
   std::vector<Eigen::Vector2d> rotated(points.size());
   const double normalization = 1.0 / (255.0 * points.size());
   for (int k = -rotations; k <= rotations; ++k) {

@@ -137,6 +137,20 @@ class Extractor {
   bool Straight(int begin, int end) const {
     const LineFit fit = Fit(begin, end);
     const int window = std::min(options_.bend_window, end - begin);
+    // The laser's noise as this run shows it from return to return, which a
+    // step or bend hardly changes: means that noise explains are no bends.
+    double squares = 0.0;
+    double previous = SignedDistance(fit, points_[begin].position);
+    for (int i = begin + 1; i < end; ++i) {
+      const double distance = SignedDistance(fit, points_[i].position);
+      squares += (distance - previous) * (distance - previous);
+      previous = distance;
+    }
+    const double noise =
+        std::sqrt(0.5 * squares / std::max(1, end - begin - 1));
+    const double bend_limit =
+        std::max(options_.bend_distance,
+                 options_.bend_sigmas * noise / std::sqrt(window));
     double sum = 0.0;
     for (int i = begin; i < end; ++i) {
       const double distance = SignedDistance(fit, points_[i].position);
@@ -145,8 +159,7 @@ class Extractor {
       if (i - begin >= window) {
         sum -= SignedDistance(fit, points_[i - window].position);
       }
-      if (i - begin >= window - 1 &&
-          std::abs(sum) > options_.bend_distance * window) {
+      if (i - begin >= window - 1 && std::abs(sum) > bend_limit * window) {
         return false;
       }
     }
@@ -201,6 +214,10 @@ class Extractor {
     const double variance =
         std::max(options_.point_sigma * options_.point_sigma,
                  fit.across * count / std::max(1, count - 2));
+    if (variance / fit.along_sum * length * length >
+        options_.max_end_sigma * options_.max_end_sigma) {
+      return;
+    }
     const double bend = options_.bias_sigma / length;
     segment.covariance(0, 0) =
         variance / count + options_.bias_sigma * options_.bias_sigma;

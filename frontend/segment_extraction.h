@@ -18,8 +18,15 @@ struct SegmentExtractionOptions {
   /// Farthest that the mean of `bend_window` neighbouring returns may lie off,
   /// m: a door set back by a few centimetres is another piece of wall, and a
   /// line through both would be turned by degrees.
-  double bend_distance = 0.015;
+  double bend_distance = 0.01;
   int bend_window = 5;
+  /// Or so many standard deviations of that mean, where the returns are
+  /// noisier.
+  double bend_sigmas = 2.0;
+  /// Pieces whose ends swing by more across the wall, as the direction is that
+  /// uncertain (standard deviation over the whole length, m), are left out: too
+  /// few returns with too much scatter, often two surfaces in one.
+  double max_end_sigma = 0.013;
   /// Neighbouring returns farther apart than this, or than `gap_factor` times
   /// the distance that beams spread, end a segment, m.
   double gap = 0.25;
@@ -31,7 +38,7 @@ struct SegmentExtractionOptions {
   /// of a segment, m, and bend over its length, m.
   double bias_sigma = 0.008;
   /// rad.
-  double angle_bias_sigma = DegToRad(0.15);
+  double angle_bias_sigma = DegToRad(0.4);
 };
 
 /// A straight piece of wall as one scan sees it, in the robot's frame. Its

@@ -1,5 +1,8 @@
 #include <plumbline/core/builtins.h>
 #include <plumbline/detectors/builtins.h>
+#include <plumbline/detectors/center_cluster.h>
+#include <plumbline/detectors/circle_ransac.h>
+#include <plumbline/detectors/line_ransac.h>
 #include <plumbline/detectors/orientation_mixture.h>
 #include <plumbline/detectors/orientation_relation.h>
 
@@ -9,7 +12,8 @@ namespace plumbline {
 
 void RegisterBuiltinDetectors(Registry* registry) {
   for (DetectorType type :
-       {OrientationMixtureType(), OrientationRelationType()}) {
+       {CenterClusterType(), CircleRansacType(), LineRansacType(),
+        OrientationMixtureType(), OrientationRelationType()}) {
     if (registry->FindDetector(type.name) == nullptr) {
       registry->Register(std::move(type));
     }

@@ -1,0 +1,256 @@
+#include <plumbline/detectors/center_cluster.h>
+#include <plumbline/detectors/parameters.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+constexpr char kName[] = "center_cluster";
+// Rounds of assigning circles and moving centres; centres settle in few.
+constexpr int kRounds = 5;
+
+struct Circle {
+  FeatureId id;
+  Eigen::Vector2d center;
+  // How far the common centre may be.
+  double gate;
+  // Index of the common centre, -1 for none.
+  int common = -1;
+};
+
+// Positions that are looked up by place.
+class Centers {
+ public:
+  explicit Centers(double cell) : cell_(cell) {}
+
+  int Add(const Eigen::Vector2d& position) {
+    positions_.push_back(position);
+    const int index = static_cast<int>(positions_.size()) - 1;
+    cells_[CellOf(position)].push_back(index);
+    return index;
+  }
+
+  // The nearest within `gate`, which is at most the cell; -1 for none.
+  int FindNearest(const Eigen::Vector2d& position, double gate) const {
+    const Cell center = CellOf(position);
+    int nearest = -1;
+    double smallest = gate;
+    for (std::int64_t x = center.first - 1; x <= center.first + 1; ++x) {
+      for (std::int64_t y = center.second - 1; y <= center.second + 1; ++y) {
+        const auto found = cells_.find({x, y});
+        if (found == cells_.end()) continue;
+        for (const int index : found->second) {
+          const double distance =
+              (positions_[static_cast<std::size_t>(index)] - position).norm();
+          if (distance > smallest ||
+              (distance == smallest && nearest >= 0 && index > nearest)) {
+            continue;
+          }
+          smallest = distance;
+          nearest = index;
+        }
+      }
+    }
+    return nearest;
+  }
+
+  int size() const { return static_cast<int>(positions_.size()); }
+  const Eigen::Vector2d& position(int index) const {
+    return positions_[static_cast<std::size_t>(index)];
+  }
+
+ private:
+  using Cell = std::pair<std::int64_t, std::int64_t>;
+
+  Cell CellOf(const Eigen::Vector2d& position) const {
+    return {static_cast<std::int64_t>(std::floor(position.x() / cell_)),
+            static_cast<std::int64_t>(std::floor(position.y() / cell_))};
+  }
+
+  double cell_;
+  std::vector<Eigen::Vector2d> positions_;
+  std::map<Cell, std::vector<int>> cells_;
+};
+
+// Centres of gravity of the circles without a common centre that are near to
+// each other, at least `minimum` in a cluster.
+std::vector<Eigen::Vector2d> Cluster(const std::vector<Circle>& circles,
+                                     double gate, std::size_t minimum) {
+  std::vector<Eigen::Vector2d> means;
+  for (int round = 0; round <= kRounds; ++round) {
+    Centers centers(gate);
+    for (const Eigen::Vector2d& mean : means) centers.Add(mean);
+    std::vector<Eigen::Vector2d> sums(means.size(), Eigen::Vector2d::Zero());
+    std::vector<std::size_t> counts(means.size(), 0);
+    for (const Circle& circle : circles) {
+      if (circle.common >= 0) continue;
+      int index = centers.FindNearest(circle.center, circle.gate);
+      if (index < 0) {
+        index = centers.Add(circle.center);
+        sums.emplace_back(Eigen::Vector2d::Zero());
+        counts.push_back(0);
+      }
+      sums[static_cast<std::size_t>(index)] += circle.center;
+      ++counts[static_cast<std::size_t>(index)];
+    }
+    means.clear();
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      if (counts[i] == 0) continue;
+      // In the last round the small ones go.
+      if (round == kRounds && counts[i] < minimum) continue;
+      means.emplace_back(sums[i] / static_cast<double>(counts[i]));
+    }
+  }
+  return means;
+}
+
+}  // namespace
+
+CenterCluster::CenterCluster(const CenterClusterOptions& options)
+    : options_(options) {}
+
+const std::string& CenterCluster::name() const {
+  static const std::string name = kName;
+  return name;
+}
+
+Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
+                                  const DetectionScope& scope) const {
+  std::vector<Circle> circles;
+  const auto consider = [&](const Feature& feature) {
+    if (feature.level != scope.level || feature.type->name != "circle") return;
+    for (const ConstraintId id : graph.ConstraintsOf(feature.id)) {
+      const Constraint& constraint = graph.GetConstraint(id);
+      if (constraint.state != ConstraintState::kLive ||
+          constraint.kind != ConstraintClass::kStructure ||
+          constraint.type->name != "point_point_coincidence") {
+        continue;
+      }
+      for (const FeatureId other_id : constraint.features) {
+        const Feature& other = graph.GetFeature(other_id);
+        if (other.is_virtual && other.level == scope.level + 1) return;
+      }
+    }
+    Circle circle;
+    circle.id = feature.id;
+    circle.center = {feature.parameters[0], feature.parameters[1]};
+    // Columns side by side are not concentric.
+    circle.gate =
+        std::min(options_.gate, 0.5 * std::abs(feature.parameters[2]));
+    if (!circle.center.allFinite() || !std::isfinite(circle.gate)) return;
+    circles.push_back(circle);
+  };
+  if (scope.features != nullptr) {
+    for (const FeatureId id : *scope.features) {
+      const Feature* feature = graph.FindFeature(id);
+      if (feature != nullptr) consider(*feature);
+    }
+  } else if (scope.level > 0) {
+    for (const FeatureId id : graph.VirtualFeatures(scope.level)) {
+      consider(graph.GetFeature(id));
+    }
+  } else {
+    for (const Feature* feature : graph.Features()) consider(*feature);
+  }
+  Transaction transaction;
+  if (circles.empty()) return transaction;
+
+  Centers centers(options_.gate);
+  std::vector<FeatureId> ids;
+  for (const FeatureId id : graph.VirtualFeatures(scope.level + 1)) {
+    const Feature& feature = graph.GetFeature(id);
+    const Eigen::Vector2d position(feature.parameters[0],
+                                   feature.parameters[1]);
+    if (feature.type->name != "point" || !position.allFinite()) continue;
+    centers.Add(position);
+    ids.push_back(id);
+  }
+  const int num_existing = centers.size();
+  std::vector<int> members(ids.size(), 0);
+  const auto assign = [&] {
+    bool has_assigned = false;
+    members.resize(static_cast<std::size_t>(centers.size()), 0);
+    for (Circle& circle : circles) {
+      if (circle.common >= 0) continue;
+      circle.common = centers.FindNearest(circle.center, circle.gate);
+      if (circle.common < 0) continue;
+      ++members[static_cast<std::size_t>(circle.common)];
+      has_assigned = true;
+    }
+    return has_assigned;
+  };
+  assign();
+  // Until nothing is left that a later call would find.
+  for (bool has_assigned = true; has_assigned;) {
+    for (const Eigen::Vector2d& mean :
+         Cluster(circles, options_.gate,
+                 static_cast<std::size_t>(options_.minimum_support))) {
+      centers.Add(mean);
+    }
+    has_assigned = assign();
+  }
+
+  ids.resize(static_cast<std::size_t>(centers.size()), kNoId);
+  for (int i = num_existing; i < centers.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (members[k] < options_.minimum_support) continue;
+    Feature feature;
+    feature.type = &registry.GetFeature("point");
+    feature.level = scope.level + 1;
+    feature.is_virtual = true;
+    feature.parameters[0] = centers.position(i).x();
+    feature.parameters[1] = centers.position(i).y();
+    feature.source = kName;
+    ids[k] = transaction.AddFeature(std::move(feature));
+  }
+  for (const Circle& circle : circles) {
+    if (circle.common < 0) continue;
+    const FeatureId common = ids[static_cast<std::size_t>(circle.common)];
+    if (common == kNoId) continue;
+    Constraint constraint;
+    constraint.type = &registry.GetRelation("point_point_coincidence");
+    constraint.features = {circle.id, common};
+    constraint.expected = Eigen::VectorXd::Zero(2);
+    constraint.information =
+        Eigen::MatrixXd::Identity(2, 2) / (options_.sigma * options_.sigma);
+    constraint.kind = ConstraintClass::kStructure;
+    constraint.source = kName;
+    transaction.AddConstraint(std::move(constraint));
+  }
+  return transaction;
+}
+
+DetectorType CenterClusterType() {
+  const CenterClusterOptions defaults;
+  DetectorType type;
+  type.name = kName;
+  type.description =
+      "Common centres of circles: clusters within the gate, each tied to its "
+      "centre of gravity";
+  type.reads = {"circle"};
+  type.makes = {"point"};
+  type.defaults = {
+      {"gate", defaults.gate},
+      {"sigma", defaults.sigma},
+      {"minimum_support", static_cast<double>(defaults.minimum_support)},
+  };
+  type.make = [known = type.defaults](const DetectorParameters& given) {
+    const ParameterReader reader(kName, known, given);
+    CenterClusterOptions options;
+    options.gate = reader.Get("gate", 1e-6);
+    options.sigma = reader.Get("sigma", 1e-6);
+    options.minimum_support = reader.GetInt("minimum_support", 2);
+    return std::make_unique<CenterCluster>(options);
+  };
+  return type;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,35 @@
+#ifndef PLUMBLINE_DETECTORS_CIRCLE_RANSAC_H_
+#define PLUMBLINE_DETECTORS_CIRCLE_RANSAC_H_
+
+#include <plumbline/core/detector.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/detectors/curve_search.h>
+
+#include <string>
+
+namespace plumbline {
+
+/// Circles through connected "point" features of a level (method.md, section
+/// 6): makes virtual "circle" features one level up with point_circle_distance
+/// constraints (expected 0) of the standard deviation sigma. See SearchCurves
+/// for how they are found and DetectCurves for how they are extended.
+class CircleRansac : public StructureDetector {
+ public:
+  explicit CircleRansac(const CurveSearchOptions& options);
+
+  const std::string& name() const override;
+  /// Three points are always on a circle.
+  int minimum_support() const override { return 4; }
+  Transaction Detect(const Graph& graph, const Registry& registry,
+                     const DetectionScope& scope) const override;
+
+ private:
+  CurveSearchOptions options_;
+};
+
+/// "circle_ransac" with its parameters (m, degrees).
+DetectorType CircleRansacType();
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_CIRCLE_RANSAC_H_

@@ -1,0 +1,36 @@
+#ifndef PLUMBLINE_DETECTORS_CURVE_DETECTION_H_
+#define PLUMBLINE_DETECTORS_CURVE_DETECTION_H_
+
+#include <plumbline/core/detector.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/detectors/curve_search.h>
+#include <plumbline/detectors/parameters.h>
+
+#include <string>
+
+namespace plumbline {
+
+/// What line_ransac and circle_ransac have in common. Both look for lines and
+/// circles, so that neither takes one for the other, and propose their own.
+///
+/// Points that support a curve of the graph (a live structure constraint ties
+/// them), those that are left over of it and its outliers (a broken one does)
+/// make no further curve, but may join one. A point
+/// that is connected with the support of a curve of the detector's kind joins
+/// it when it is within 2 sigma; when it supports another curve already (the
+/// corner of two walls), within sigma. This is repeated until nothing is
+/// found, so applying the result and detecting again gives an empty
+/// transaction.
+Transaction DetectCurves(const Graph& graph, const Registry& registry,
+                         const DetectionScope& scope, CurveKind kind,
+                         const std::string& source,
+                         const CurveSearchOptions& options);
+
+/// The parameters that both detectors have, with their defaults, and the
+/// options that they give. Angles in degrees.
+DetectorParameters CurveSearchDefaults();
+CurveSearchOptions ReadCurveSearchOptions(const ParameterReader& reader);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_CURVE_DETECTION_H_

@@ -1,0 +1,88 @@
+#ifndef PLUMBLINE_DETECTORS_CURVE_SEARCH_H_
+#define PLUMBLINE_DETECTORS_CURVE_SEARCH_H_
+
+#include <plumbline/detectors/planar_curve.h>
+#include <plumbline/detectors/point_graph.h>
+#include <plumbline/factors/angle.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace plumbline {
+
+/// How to find lines and circles among points. Lengths in m, angles in rad.
+struct CurveSearchOptions {
+  /// Points farther from a curve never support it when it is found. Smaller
+  /// distances are tried as well, down to a fortieth, and the one that makes
+  /// the curve most significant is taken.
+  double tolerance = 0.3;
+  /// Bends of less than this are none: tolerance of the building.
+  double sigma = 0.05;
+  /// Log10 of the expected number of curves of the kind that the whole graph
+  /// would show by chance, at which one is accepted.
+  double max_log_false_alarms = -0.5;
+  /// Points that support a curve are connected with each other past at most so
+  /// many points that do not.
+  int max_gap_points = 2;
+  /// A line is cut where it has no point for this length, or for four times its
+  /// usual spacing where that is longer.
+  double max_gap = 1.0;
+  int min_line_points = 4;
+  int min_circle_points = 5;
+  /// The points of a circle reach over at least this angle; on a shorter arc
+  /// they are on a line as well.
+  double min_arc = DegToRad(90.0);
+  /// Lines that touch at a smaller angle are one that drift has bent.
+  double min_corner = DegToRad(15.0);
+  /// Larger circles are not looked for.
+  double max_radius = 50.0;
+};
+
+/// A curve and what tells that it is there.
+struct FoundCurve {
+  PlanarCurve curve;
+  /// Indices of the points that support it, ascending.
+  std::vector<int> support;
+  /// Minus log10 of the expected number of such curves by chance.
+  double significance = 0.0;
+};
+
+/// Finds the lines and circles in a graph of points, by RANSAC over
+/// interconnected points (method.md, section 6). Each point supports at most
+/// one of the result; claimed points support none and count for nothing.
+///
+/// 1. Hypotheses. From each point the neighbourhood along the edges is grown;
+///    pairs and triples of it are drawn, and the best line and the best circle
+///    are extended over connected points near the curve, refitted by least
+///    squares, and extended again until nothing changes.
+/// 2. Significance. In the background model each point lies in a random
+///    direction from the one before it at the spacing S, so it is within e of
+///    a given curve with probability p = 2/pi asin(e/S). Points nearer than
+///    2 e to each other along the curve count as one, which keeps p <= 1/3
+///    and makes the test independent of the density. With k of n connected
+///    points near the curve within e, the chance is at most
+///    exp(-n KL(k/n || p)) (Chernoff), times the number of curves that the
+///    graph could show at this resolution (a-contrario testing; Desolneux,
+///    Moisan and Morel 2008). The tolerance e is the one with the fewest
+///    expected false alarms.
+/// 3. Selection between lines and circles. The most significant curve takes its
+///    points, the others are judged by what is left. A curve gives way to
+///    others on its points when they are more significant together: four walls
+///    are not a circle, and a circle is not many short walls. Pieces of one
+///    curve that touch are put together where one curve fits them about as well
+///    as each has its own.
+///
+/// 4. What is left over of a more significant curve that it touches, or of a
+///    `known` one (curve and support matter), is no curve of its own; nor is a
+///    line that goes on at less than min_corner where another ends.
+///
+/// The same seed gives the same result. The most significant first.
+std::vector<FoundCurve> SearchCurves(const PointGraph& points,
+                                     const std::vector<bool>& is_claimed,
+                                     const std::vector<FoundCurve>& known,
+                                     std::uint64_t seed,
+                                     const CurveSearchOptions& options);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_CURVE_SEARCH_H_

@@ -1,0 +1,43 @@
+#include <plumbline/detectors/curve_detection.h>
+#include <plumbline/detectors/line_ransac.h>
+#include <plumbline/detectors/parameters.h>
+
+#include <memory>
+
+namespace plumbline {
+namespace {
+
+constexpr char kName[] = "line_ransac";
+
+}  // namespace
+
+LineRansac::LineRansac(const CurveSearchOptions& options) : options_(options) {}
+
+const std::string& LineRansac::name() const {
+  static const std::string name = kName;
+  return name;
+}
+
+Transaction LineRansac::Detect(const Graph& graph, const Registry& registry,
+                               const DetectionScope& scope) const {
+  return DetectCurves(graph, registry, scope, CurveKind::kLine, kName,
+                      options_);
+}
+
+DetectorType LineRansacType() {
+  DetectorType type;
+  type.name = kName;
+  type.description =
+      "Lines through connected points: RANSAC, kept when few would "
+      "be expected by chance";
+  type.reads = {"point"};
+  type.makes = {"line"};
+  type.defaults = CurveSearchDefaults();
+  type.make = [known = type.defaults](const DetectorParameters& given) {
+    const ParameterReader reader(kName, known, given);
+    return std::make_unique<LineRansac>(ReadCurveSearchOptions(reader));
+  };
+  return type;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,37 @@
+#ifndef PLUMBLINE_DETECTORS_LINE_RANSAC_H_
+#define PLUMBLINE_DETECTORS_LINE_RANSAC_H_
+
+#include <plumbline/core/detector.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/detectors/curve_search.h>
+
+#include <string>
+
+namespace plumbline {
+
+/// Lines through connected "point" features of a level (method.md, section 6):
+/// makes virtual "line" features one level up, anchored at the middle of their
+/// points, with point_line_distance constraints (expected 0) of the standard
+/// deviation sigma. See SearchCurves for how they are found and DetectCurves
+/// for how they are extended. Virtual points (circle centres) are connected as
+/// PointGraph says.
+class LineRansac : public StructureDetector {
+ public:
+  explicit LineRansac(const CurveSearchOptions& options);
+
+  const std::string& name() const override;
+  /// Two points are always on a line.
+  int minimum_support() const override { return 3; }
+  Transaction Detect(const Graph& graph, const Registry& registry,
+                     const DetectionScope& scope) const override;
+
+ private:
+  CurveSearchOptions options_;
+};
+
+/// "line_ransac" with its parameters (m, degrees).
+DetectorType LineRansacType();
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_LINE_RANSAC_H_

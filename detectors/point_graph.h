@@ -1,0 +1,53 @@
+#ifndef PLUMBLINE_DETECTORS_POINT_GRAPH_H_
+#define PLUMBLINE_DETECTORS_POINT_GRAPH_H_
+
+#include <plumbline/core/detector.h>
+#include <plumbline/core/graph.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace plumbline {
+
+/// The "point" features that a detector looks at and what connects them, by
+/// index. Indices are in the order of ids.
+class PointGraph {
+ public:
+  /// Points of scope.level with finite coordinates. With a list in the scope:
+  /// the points listed and those that are connected to them by at most `reach`
+  /// constraints, at a cost that depends on these only.
+  ///
+  /// Points are connected by live measurements between them. Virtual points
+  /// (level 1 and up) have none: then all of up to 64 of them are connected
+  /// with each other, of more each with its 8 nearest.
+  PointGraph(const Graph& graph, const DetectionScope& scope, int reach);
+
+  int size() const { return static_cast<int>(ids_.size()); }
+  FeatureId id(int i) const { return ids_[static_cast<std::size_t>(i)]; }
+  const Eigen::Vector2d& position(int i) const {
+    return positions_[static_cast<std::size_t>(i)];
+  }
+  /// Indices of the points connected with the i-th, ascending.
+  const std::vector<int>& neighbors(int i) const {
+    return neighbors_[static_cast<std::size_t>(i)];
+  }
+  /// Whether the scope lists the i-th point (all do without a list).
+  bool is_listed(int i) const {
+    return is_listed_[static_cast<std::size_t>(i)];
+  }
+  /// Index of a feature; -1 when it is not among the points.
+  int Find(FeatureId id) const;
+
+ private:
+  void Connect(const Graph& graph);
+  void ConnectNearest();
+
+  std::vector<FeatureId> ids_;
+  std::vector<Eigen::Vector2d> positions_;
+  std::vector<std::vector<int>> neighbors_;
+  std::vector<bool> is_listed_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_POINT_GRAPH_H_

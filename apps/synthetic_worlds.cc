@@ -28,10 +28,13 @@ constexpr int kTies = 70;
 // random point may be, m, and the links that it gets.
 constexpr double kOutlierClearance = 0.5;
 constexpr int kOutlierLinks = 3;
-// S5, m.
+// S5, m: between the centre lines of walls; of trees from their row's line,
+// varied so that those on one side are on no line either.
+constexpr int kWalls = 3;
+constexpr int kTrees = 30;
+constexpr double kStreetWidth = 9.5;
 constexpr double kTreeDeviation = 0.1;
-constexpr double kStreetWidth = 8.0;
-constexpr int kTreesBetweenTies = 4;
+constexpr double kTreeVariation = 0.05;
 // S6.
 constexpr int kConcentricCircles = 6;
 constexpr double kOutlierNearest = 0.2;
@@ -294,40 +297,43 @@ void AddOutliers(int count, std::uint64_t seed, Layout* layout) {
   }
 }
 
-// S5: three double walls along x and between them two rows of trees.
-void AddStreets(Layout* layout) {
-  constexpr double kLength = 24.0;
-  layout->truth().orientations = {0.0};
-  std::vector<std::array<std::vector<int>, 2>> walls;
-  for (int k = 0; k < 3; ++k) {
-    walls.push_back(layout->AddCorridor({0.0, k * kStreetWidth},
-                                        {kLength, k * kStreetWidth}, 0));
-  }
-  for (int k = 0; k < 2; ++k) {
+// S5: double walls along x with a row of trees between one and the next.
+void AddStreets(std::uint64_t seed, Layout* layout) {
+  SimulationRandom random = Stream(seed, kOutlierStream);
+  SyntheticTruth& truth = layout->truth();
+  truth.orientations = {0.0};
+  const auto add_wall = [layout](double y) {
+    return layout->AddCorridor({0.0, y}, {kTrees, y}, 0);
+  };
+  std::vector<int> wall = add_wall(0.0)[1];
+  for (int k = 1; k < kWalls; ++k) {
+    const double y = k * kStreetWidth;
+    const std::array<std::vector<int>, 2> next = add_wall(y);
     std::vector<int> trees;
-    for (int i = 0; i < static_cast<int>(kLength); ++i) {
-      const double side = i % 2 == 0 ? -kTreeDeviation : kTreeDeviation;
-      trees.push_back(
-          layout->AddPoint({i + 0.5, (k + 0.5) * kStreetWidth + side}));
-      layout->truth().outliers.push_back(trees.back());
+    for (int i = 0; i < kTrees; ++i) {
+      const double deviation = random.Uniform(kTreeDeviation - kTreeVariation,
+                                              kTreeDeviation + kTreeVariation);
+      trees.push_back(layout->AddPoint(
+          {i + 0.5,
+           y - kStreetWidth / 2 + (i % 2 == 0 ? -deviation : deviation)}));
+      truth.outliers.push_back(trees.back());
     }
-    const int n = static_cast<int>(trees.size());
     for (const int step : {1, 2}) {
-      for (int i = step; i < n; ++i) {
+      for (int i = step; i < kTrees; ++i) {
         layout->AddDistance(trees[i - step], trees[i]);
       }
     }
-    for (int i = 0; i < n; i += kTreesBetweenTies) {
-      // The rows of the walls that face the trees; tree i stands between the
-      // points i and i + 1 of a wall's first row and beside point i of its
-      // second, whose neighbour it takes as well.
-      const int other =
-          i + 1 < static_cast<int>(walls[k][1].size()) ? i + 1 : i - 1;
-      layout->AddDistance(walls[k][1][i], trees[i]);
-      layout->AddDistance(walls[k][1][other], trees[i]);
-      layout->AddDistance(walls[k + 1][0][i], trees[i]);
-      layout->AddDistance(walls[k + 1][0][i + 1], trees[i]);
+    // Tree i stands beside point i of the first wall and between the points i
+    // and i + 1 of the next. The second of its distances to a wall leans
+    // forwards and backwards in turn.
+    for (int i = 0; i < kTrees; ++i) {
+      const int ahead = i % 2 == 0 ? i + 1 : i - 1;
+      layout->AddDistance(trees[i], wall[i]);
+      layout->AddDistance(trees[i], wall[ahead]);
+      layout->AddDistance(trees[i], next[0][i]);
+      layout->AddDistance(trees[i], next[0][ahead]);
     }
+    wall = next[1];
   }
 }
 
@@ -488,7 +494,7 @@ SyntheticWorld MakeSyntheticWorld(const std::string& name,
   if (name == "S6") return MakeConcentricCircles(options, seed, registry);
   Layout layout;
   if (name == "S5") {
-    AddStreets(&layout);
+    AddStreets(seed, &layout);
   } else if (name == "S1" || name == "S2" || name == "S3" || name == "S4") {
     AddBuilding(&layout);
   } else {

@@ -83,7 +83,7 @@ const std::vector<std::string>& SyntheticWorldNames();
 SyntheticOptions DefaultSyntheticOptions(const std::string& name);
 
 /// The paper's synthetic worlds as graphs (method.md, section 8). The layout is
-/// fixed; `seed` draws the noise and outliers.
+/// fixed; `seed` draws the noise and what belongs to no structure.
 ///
 ///   S1 to S4  572 points and 1193 distances: a building of four rooms, each
 ///             with a round hall. Seven corridors (two walls 1.5 m apart, so 14
@@ -94,10 +94,10 @@ SyntheticOptions DefaultSyntheticOptions(const std::string& name);
 ///             than it takes. A point a metre is what the paper's noise allows:
 ///             closer, an initial noise of 0.25 to 0.3 m turns triangles over,
 ///             and distances alone cannot turn them back.
-///   S5        three pairs of parallel walls with two rows of trees between
-///             them, which stand 0.1 m to the left and right of a line in turn.
-///             Every tree has distances to its two neighbours either way, every
-///             fourth to the walls.
+///   S5        three pairs of parallel walls with two rows of 30 trees between
+///             them, which stand to the left and right of a line in turn, 0.05
+///             to 0.15 m off (drawn from `seed`). Every tree has distances to
+///             its two neighbours either way and two to each wall.
 ///   S6        a fixed point at the origin and seven circles with measured
 ///             centres, six of them concentric at the origin; the seventh, at
 ///             a place in the order that is drawn, is 0.2 to 0.5 m off on x

@@ -240,13 +240,16 @@ TEST_F(SyntheticWorldsTest, S5TreesStandBesideALineInTurn) {
   EXPECT_EQ(world.truth.lines.size(), 6u);
   EXPECT_EQ(world.truth.orientations.size(), 1u);
   EXPECT_TRUE(world.truth.circles.empty());
-  ASSERT_EQ(world.truth.outliers.size(), 48u);
-  EXPECT_EQ(world.graph->num_features(), 3u * 49u + 48u);
-  for (std::size_t i = 0; i < 24; ++i) {
+  EXPECT_EQ(world.graph->num_features(), 3u * 61u + 2u * 30u);
+  ASSERT_EQ(world.truth.outliers.size(), 60u);
+  for (int i = 0; i < 60; ++i) {
     const Eigen::Vector2d& tree =
         world.truth.positions[world.truth.outliers[i]];
-    EXPECT_NEAR(tree.x(), i + 0.5, 1e-12);
-    EXPECT_NEAR(tree.y(), i % 2 == 0 ? 3.9 : 4.1, 1e-12);
+    EXPECT_NEAR(tree.x(), i % 30 + 0.5, 1e-12);
+    const double deviation = tree.y() - (i < 30 ? 4.75 : 14.25);
+    EXPECT_EQ(deviation > 0.0, i % 2 == 1);
+    EXPECT_GE(std::abs(deviation), 0.05);
+    EXPECT_LE(std::abs(deviation), 0.15);
   }
   EXPECT_EQ(Reachable(world), world.graph->num_features());
   EXPECT_GT(SmallestPivot(world), 1e-4);

@@ -1,0 +1,330 @@
+#include <plumbline/apps/line_plot.h>
+#include <plumbline/core/error.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <sstream>
+
+namespace plumbline {
+namespace {
+
+// Colours that people with colour blindness tell apart (Okabe and Ito 2008).
+constexpr std::array<const char*, 7> kColors = {"#0072B2", "#D55E00", "#009E73",
+                                                "#CC79A7", "#E69F00", "#56B4E9",
+                                                "#000000"};
+constexpr int kLeft = 74;
+constexpr int kRight = 24;
+constexpr int kTop = 40;
+constexpr int kBottom = 56;
+// Words under the axis are written upwards and need more space.
+constexpr int kBottomWithWords = 124;
+constexpr int kLegendRow = 20;
+
+std::string Number(double value, const char* format = "%.2f") {
+  char text[64];
+  std::snprintf(text, sizeof(text), format, value);
+  return text;
+}
+
+// As a person writes it: 0.25, 10, 1e-05.
+std::string Label(double value) {
+  if (std::abs(value) < 1e-12) return "0";
+  return Number(value, "%.6g");
+}
+
+std::string Escaped(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+struct Range {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void Add(double value) {
+    if (!std::isfinite(value)) return;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  // At least a little wide.
+  void Settle() {
+    if (!(low <= high)) low = 0.0, high = 1.0;
+    if (high - low <= 1e-9 * std::max(std::abs(low), std::abs(high))) {
+      const double half = low == 0.0 ? 0.5 : 0.5 * std::abs(low);
+      low -= half;
+      high += half;
+    }
+  }
+};
+
+void CheckSizes(const PlotSeries& series) {
+  const bool has_band = !series.low.empty() || !series.high.empty();
+  if (series.x.size() != series.y.size() ||
+      (has_band && (series.low.size() != series.y.size() ||
+                    series.high.size() != series.y.size()))) {
+    throw PLUMBLINE_ERROR(
+        "sizes of x, y, low and high of '" + series.name + "' disagree",
+        "as many of each");
+  }
+}
+
+class PlotWriter {
+ public:
+  PlotWriter(const LinePlot& plot, int top, std::ostringstream* output)
+      : plot_(plot), output_(*output) {
+    for (const PlotSeries& series : plot.series) {
+      CheckSizes(series);
+      for (const double x : series.x) x_.Add(x);
+      for (const double y : series.y) y_.Add(y);
+      for (const double y : series.low) y_.Add(y);
+      for (const double y : series.high) y_.Add(y);
+    }
+    x_.Settle();
+    y_.low = std::min(y_.low, 0.0);
+    y_.Settle();
+    const double margin = 0.05 * (y_.high - y_.low);
+    y_.high += margin;
+    if (y_.low < 0.0) y_.low -= margin;
+    left_ = kLeft;
+    right_ = plot.width - kRight;
+    top_ = top + kTop;
+    bottom_ =
+        top + plot.height - (plot.x_ticks.empty() ? kBottom : kBottomWithWords);
+  }
+
+  void Write() {
+    Text((left_ + right_) / 2.0, top_ - 16, "middle", 15, plot_.title, true);
+    WriteAxes();
+    int next_color = 0;
+    std::vector<int> colors;
+    for (const PlotSeries& series : plot_.series) {
+      colors.push_back(series.color >= 0 ? series.color : next_color++);
+    }
+    for (std::size_t i = 0; i < colors.size(); ++i) {
+      WriteBand(plot_.series[i], Color(colors[i]));
+    }
+    for (std::size_t i = 0; i < colors.size(); ++i) {
+      WriteLine(plot_.series[i], Color(colors[i]));
+    }
+    WriteLegend(colors);
+  }
+
+ private:
+  static const char* Color(int index) {
+    return kColors[static_cast<std::size_t>(index) % kColors.size()];
+  }
+
+  double X(double x) const {
+    return left_ + (x - x_.low) / (x_.high - x_.low) * (right_ - left_);
+  }
+  double Y(double y) const {
+    return bottom_ - (y - y_.low) / (y_.high - y_.low) * (bottom_ - top_);
+  }
+
+  void Line(double x1, double y1, double x2, double y2,
+            const std::string& style) {
+    output_ << "<line x1=\"" << Number(x1) << "\" y1=\"" << Number(y1)
+            << "\" x2=\"" << Number(x2) << "\" y2=\"" << Number(y2) << "\" "
+            << style << "/>\n";
+  }
+
+  void Text(double x, double y, const char* anchor, int size,
+            const std::string& text, bool bold = false, double turn = 0.0) {
+    output_ << "<text x=\"" << Number(x) << "\" y=\"" << Number(y)
+            << "\" font-size=\"" << size << "\" text-anchor=\"" << anchor
+            << '"';
+    if (bold) output_ << " font-weight=\"bold\"";
+    if (turn != 0.0) {
+      output_ << " transform=\"rotate(" << Number(turn, "%g") << ' '
+              << Number(x) << ' ' << Number(y) << ")\"";
+    }
+    output_ << '>' << Escaped(text) << "</text>\n";
+  }
+
+  void WriteAxes() {
+    for (const double y : RoundTicks(y_.low, y_.high, 8)) {
+      Line(left_, Y(y), right_, Y(y), "stroke=\"#dddddd\"");
+      Text(left_ - 8, Y(y) + 4, "end", 12, Label(y));
+    }
+    if (plot_.x_ticks.empty()) {
+      for (const double x : RoundTicks(x_.low, x_.high, 10)) {
+        Line(X(x), bottom_, X(x), bottom_ + 5, "stroke=\"black\"");
+        Text(X(x), bottom_ + 19, "middle", 12, Label(x));
+      }
+    }
+    for (const auto& [x, word] : plot_.x_ticks) {
+      if (x < x_.low || x > x_.high) continue;
+      Line(X(x), bottom_, X(x), bottom_ + 5, "stroke=\"black\"");
+      Text(X(x) + 4, bottom_ + 10, "end", 11, word, false, -90.0);
+    }
+    output_ << "<rect x=\"" << left_ << "\" y=\"" << top_ << "\" width=\""
+            << right_ - left_ << "\" height=\"" << bottom_ - top_
+            << "\" fill=\"none\" stroke=\"black\"/>\n";
+    const int label_y =
+        bottom_ + (plot_.x_ticks.empty() ? kBottom : kBottomWithWords) - 14;
+    Text((left_ + right_) / 2.0, label_y, "middle", 13, plot_.x_label);
+    Text(18, (top_ + bottom_) / 2.0, "middle", 13, plot_.y_label, false, -90.0);
+  }
+
+  void WriteBand(const PlotSeries& series, const char* color) {
+    std::string forward;
+    std::string backward;
+    for (std::size_t i = 0; i < series.low.size(); ++i) {
+      if (!std::isfinite(series.x[i]) || !std::isfinite(series.low[i]) ||
+          !std::isfinite(series.high[i])) {
+        continue;
+      }
+      const std::string x = Number(X(series.x[i]));
+      forward += x + ',' + Number(Y(series.high[i])) + ' ';
+      backward = x + ',' + Number(Y(series.low[i])) + ' ' + backward;
+    }
+    if (forward.empty()) return;
+    output_ << "<polygon points=\"" << forward << backward << "\" fill=\""
+            << color << "\" fill-opacity=\"0.15\"/>\n";
+  }
+
+  void WriteLine(const PlotSeries& series, const char* color) {
+    std::string points;
+    for (std::size_t i = 0; i < series.y.size(); ++i) {
+      if (!std::isfinite(series.x[i]) || !std::isfinite(series.y[i])) continue;
+      const std::string x = Number(X(series.x[i]));
+      const std::string y = Number(Y(series.y[i]));
+      points += x + ',' + y + ' ';
+      if (series.markers) {
+        output_ << "<circle cx=\"" << x << "\" cy=\"" << y
+                << "\" r=\"3\" fill=\"" << color << "\"/>\n";
+      }
+    }
+    if (points.empty()) return;
+    output_ << "<polyline points=\"" << points << "\" fill=\"none\" stroke=\""
+            << color << "\" stroke-width=\"2\""
+            << (series.dashed ? " stroke-dasharray=\"7 4\"" : "") << "/>\n";
+  }
+
+  // In the corner where the fewest points would be covered.
+  void WriteLegend(const std::vector<int>& colors) {
+    std::size_t longest = 0;
+    int rows = 0;
+    for (const PlotSeries& series : plot_.series) {
+      if (series.name.empty()) continue;
+      longest = std::max(longest, series.name.size());
+      ++rows;
+    }
+    if (rows == 0) return;
+    const double width = 46.0 + 6.8 * static_cast<double>(longest);
+    const double height = 8.0 + kLegendRow * rows;
+    const std::array<std::pair<double, double>, 4> corners = {
+        {{right_ - width - 8, top_ + 8.0},
+         {left_ + 8.0, top_ + 8.0},
+         {right_ - width - 8, bottom_ - height - 8},
+         {left_ + 8.0, bottom_ - height - 8}}};
+    std::size_t best = 0;
+    int fewest = std::numeric_limits<int>::max();
+    for (std::size_t corner = 0; corner < corners.size(); ++corner) {
+      int covered = 0;
+      for (const PlotSeries& series : plot_.series) {
+        for (std::size_t i = 0; i < series.y.size(); ++i) {
+          const double x = X(series.x[i]) - corners[corner].first;
+          const double y = Y(series.y[i]) - corners[corner].second;
+          if (x > -4 && x < width + 4 && y > -4 && y < height + 4) ++covered;
+        }
+      }
+      if (covered < fewest) {
+        fewest = covered;
+        best = corner;
+      }
+    }
+    const auto [x, y] = corners[best];
+    output_ << "<rect x=\"" << Number(x) << "\" y=\"" << Number(y)
+            << "\" width=\"" << Number(width) << "\" height=\""
+            << Number(height)
+            << "\" fill=\"white\" fill-opacity=\"0.85\" stroke=\"#bbbbbb\"/>\n";
+    int row = 0;
+    for (std::size_t i = 0; i < colors.size(); ++i) {
+      const PlotSeries& series = plot_.series[i];
+      if (series.name.empty()) continue;
+      const double middle = y + 4 + kLegendRow * (row++ + 0.5);
+      Line(x + 8, middle, x + 34, middle,
+           std::string("stroke=\"") + Color(colors[i]) +
+               "\" stroke-width=\"2\"" +
+               (series.dashed ? " stroke-dasharray=\"7 4\"" : ""));
+      Text(x + 40, middle + 4, "start", 12, series.name);
+    }
+  }
+
+  const LinePlot& plot_;
+  std::ostringstream& output_;
+  Range x_;
+  Range y_;
+  int left_ = 0;
+  int right_ = 0;
+  int top_ = 0;
+  int bottom_ = 0;
+};
+
+}  // namespace
+
+std::vector<double> RoundTicks(double low, double high, int count) {
+  std::vector<double> ticks;
+  if (!(high > low) || !std::isfinite(low) || !std::isfinite(high)) {
+    return {low};
+  }
+  count = std::max(count, 2);
+  const double wanted = (high - low) / (count - 1);
+  const double power = std::pow(10.0, std::floor(std::log10(wanted)));
+  double step = 10.0 * power;
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= wanted * (1 - 1e-9)) {
+      step = factor * power;
+      break;
+    }
+  }
+  const double first = std::ceil(low / step - 1e-9);
+  const double last = std::floor(high / step + 1e-9);
+  for (double k = first; k <= last; k += 1.0) ticks.push_back(k * step);
+  return ticks;
+}
+
+std::string PlotSvg(const std::vector<LinePlot>& plots) {
+  int width = 0;
+  int height = 0;
+  for (const LinePlot& plot : plots) {
+    width = std::max(width, plot.width);
+    height += plot.height;
+  }
+  std::ostringstream output;
+  output << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << width
+         << "\" height=\"" << height << "\" viewBox=\"0 0 " << width << ' '
+         << height << "\" font-family=\"sans-serif\">\n"
+         << "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
+  int top = 0;
+  for (const LinePlot& plot : plots) {
+    PlotWriter(plot, top, &output).Write();
+    top += plot.height;
+  }
+  output << "</svg>\n";
+  return output.str();
+}
+
+}  // namespace plumbline

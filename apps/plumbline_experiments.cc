@@ -1,0 +1,130 @@
+// Runs the paper's experiments and writes their tables and figures.
+
+#include <gflags/gflags.h>
+#include <plumbline/apps/app.h>
+#include <plumbline/apps/experiments.h>
+#include <plumbline/apps/progress.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/detectors/builtins.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+DEFINE_string(experiment, "", "S1, S2, S3, S4, S5, S6, R1, R2 or all.");
+DEFINE_int32(trials, 20, "Trials of each condition (R1, R2: one).");
+PLUMBLINE_FLAG_RANGE(trials, 1, 100000);
+DEFINE_uint64(seed, 1, "Seed of the first trial; the next have the next ones.");
+DEFINE_int32(num_threads, 0,
+             "Trials at a time; 0: all cores. Results do not depend on it.");
+PLUMBLINE_FLAG_RANGE(num_threads, 0, 1024);
+DEFINE_string(output_dir, "", "Folder for the results; made when missing.");
+DEFINE_string(delta_mode, "frozen",
+              "Weighting of structure: frozen (the paper), continuous, huber, "
+              "cauchy, tukey, geman_mcclure or dcs.");
+PLUMBLINE_FLAG_CHOICES(delta_mode, "frozen", "continuous", "huber", "cauchy",
+                       "tukey", "geman_mcclure", "dcs");
+DEFINE_double(delta_threshold, 0.3,
+              "Structure constraints with a smaller delta are broken.");
+PLUMBLINE_FLAG_RANGE(delta_threshold, 0, 1);
+DEFINE_string(hierarchy, plumbline::kSyntheticHierarchy,
+              "Detectors by level in the synthetic experiments.");
+
+namespace plumbline {
+namespace {
+
+std::vector<std::string> SelectedExperiments() {
+  const std::vector<std::string>& names = ExperimentNames();
+  if (FLAGS_experiment == "all") return names;
+  if (std::find(names.begin(), names.end(), FLAGS_experiment) == names.end()) {
+    throw Error("--experiment", 0,
+                FLAGS_experiment.empty()
+                    ? "it is missing"
+                    : "there is no experiment '" + FLAGS_experiment + "'",
+                "S1, S2, S3, S4, S5, S6, R1, R2 or all");
+  }
+  return {FLAGS_experiment};
+}
+
+int Run() {
+  const std::vector<std::string> selected = SelectedExperiments();
+  if (FLAGS_output_dir.empty()) {
+    throw Error("--output_dir", 0, "it is missing", "a folder");
+  }
+  std::error_code error;
+  std::filesystem::create_directories(FLAGS_output_dir, error);
+  if (!std::filesystem::is_directory(FLAGS_output_dir)) {
+    throw Error("--output_dir", 0, "cannot make '" + FLAGS_output_dir + "'",
+                "a folder that can be written to");
+  }
+  Registry registry;
+  RegisterBuiltins(&registry);
+  ExperimentOptions options;
+  options.trials = FLAGS_trials;
+  options.seed = FLAGS_seed;
+  options.num_threads =
+      FLAGS_num_threads > 0
+          ? FLAGS_num_threads
+          : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  options.delta_mode = FLAGS_delta_mode;
+  options.delta_threshold = FLAGS_delta_threshold;
+  options.hierarchy = FLAGS_hierarchy;
+  if (const char* datasets = std::getenv("PLUMBLINE_DATASETS")) {
+    options.datasets = datasets;
+  }
+  options.stop = [] { return InterruptRequested(); };
+  for (const std::string& id : selected) {
+    std::unique_ptr<Progress> progress;
+    options.progress = [&](int done, int total) {
+      if (progress == nullptr) {
+        progress = std::make_unique<Progress>(id, "runs", total);
+      }
+      progress->Update(done);
+    };
+    const ExperimentResult result = RunExperiment(id, options, &registry);
+    progress.reset();
+    WriteExperiment(result, FLAGS_output_dir);
+    std::cout << id << ": " << result.title << '\n';
+    if (!result.skipped.empty()) {
+      std::cout << "  skipped: " << result.skipped << '\n';
+    }
+    for (const Claim& claim : result.claims) {
+      std::cout << (claim.holds ? "  holds  " : "  FAILS  ") << claim.text
+                << ": " << claim.measured.value << " [" << claim.measured.low
+                << ", " << claim.measured.high << "], required "
+                << claim.required << '\n';
+    }
+    std::cout.flush();
+    if (InterruptRequested()) break;
+  }
+  return kExitSuccess;
+}
+
+}  // namespace
+}  // namespace plumbline
+
+int main(int argc, char** argv) {
+  plumbline::AppInfo info;
+  info.name = "plumbline_experiments";
+  info.summary =
+      "Runs the experiments of the paper and writes, for each, a CSV of every "
+      "trial, a summary against the paper's claim with confidence intervals, "
+      "and the figures as SVG. R1 and R2 need the public logs: the environment "
+      "variable PLUMBLINE_DATASETS names their folder.";
+  info.usage = {"--experiment=S1|...|S6|R1|R2|all --output_dir=DIR [flags]"};
+  info.example =
+      "plumbline_experiments --experiment=S1 --trials=20 --output_dir=results";
+  info.groups = {
+      {"Experiment", {"experiment", "trials", "seed", "num_threads"}},
+      {"Method", {"delta_mode", "delta_threshold", "hierarchy"}},
+      {"Output", {"output_dir", "quiet"}}};
+  plumbline::ParseFlags(info, argc, argv);
+  return plumbline::RunMain(plumbline::Run);
+}

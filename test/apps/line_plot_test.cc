@@ -1,0 +1,115 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/apps/line_plot.h>
+#include <plumbline/core/error.h>
+
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+using testing::DoubleNear;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+using testing::Pointwise;
+
+LinePlot TwoPoints() {
+  LinePlot plot;
+  plot.title = "a < b & c";
+  plot.x_label = "time, s";
+  plot.y_label = "error, m";
+  PlotSeries series;
+  series.name = "line";
+  series.x = {0.0, 1.0};
+  series.y = {0.0, 1.0};
+  plot.series.push_back(series);
+  return plot;
+}
+
+TEST(LinePlotTest, RoundTicks) {
+  EXPECT_THAT(RoundTicks(0.0, 1.0, 6),
+              Pointwise(DoubleNear(1e-12),
+                        std::vector<double>{0.0, 0.2, 0.4, 0.6, 0.8, 1.0}));
+  EXPECT_THAT(
+      RoundTicks(0.0, 0.37, 8),
+      Pointwise(DoubleNear(1e-12), std::vector<double>{0.0, 0.1, 0.2, 0.3}));
+  EXPECT_THAT(RoundTicks(-30.0, 40.0, 5),
+              Pointwise(DoubleNear(1e-12),
+                        std::vector<double>{-20.0, 0.0, 20.0, 40.0}));
+  EXPECT_THAT(RoundTicks(2.0, 2.0, 5), ElementsAre(2.0));
+}
+
+TEST(LinePlotTest, PutsPointsWhereTheyBelong) {
+  const std::string svg = PlotSvg({TwoPoints()});
+  EXPECT_THAT(svg, HasSubstr("width=\"760\" height=\"460\""));
+  // The axes go from (74, 404) to (736, 40); y ends 5 % above the largest.
+  EXPECT_THAT(svg,
+              HasSubstr("<polyline points=\"74.00,404.00 736.00,57.33 \""));
+  EXPECT_THAT(svg, HasSubstr("a &lt; b &amp; c"));
+  EXPECT_THAT(svg, HasSubstr(">error, m</text>"));
+  EXPECT_THAT(svg, HasSubstr(">0.2</text>"));
+}
+
+TEST(LinePlotTest, PlotsStandBelowEachOther) {
+  const std::string svg = PlotSvg({TwoPoints(), TwoPoints()});
+  EXPECT_THAT(svg, HasSubstr("width=\"760\" height=\"920\""));
+  EXPECT_THAT(svg, HasSubstr("74.00,404.00 736.00,57.33"));
+  EXPECT_THAT(svg, HasSubstr("74.00,864.00 736.00,517.33"));
+}
+
+TEST(LinePlotTest, WordsInPlaceOfNumbers) {
+  LinePlot plot = TwoPoints();
+  plot.x_ticks = {{0.0, "start"}, {1.0, "end"}, {7.0, "beyond"}};
+  const std::string svg = PlotSvg({plot});
+  EXPECT_THAT(svg, HasSubstr(">start</text>"));
+  EXPECT_THAT(svg, HasSubstr(">end</text>"));
+  EXPECT_THAT(svg, Not(HasSubstr("beyond")));
+}
+
+TEST(LinePlotTest, BandsDashesAndMarkers) {
+  LinePlot plot = TwoPoints();
+  plot.series[0].low = {0.0, 0.9};
+  plot.series[0].high = {0.1, 1.0};
+  plot.series[0].dashed = true;
+  plot.series[0].markers = true;
+  const std::string svg = PlotSvg({plot});
+  EXPECT_THAT(svg, HasSubstr("<polygon points=\"74.00,369.33 736.00,57.33 "
+                             "736.00,92.00 74.00,404.00 \""));
+  EXPECT_THAT(svg, HasSubstr("stroke-dasharray"));
+  EXPECT_THAT(svg, HasSubstr("<circle cx=\"736.00\" cy=\"57.33\""));
+}
+
+TEST(LinePlotTest, PassesOverWhatIsNoNumber) {
+  LinePlot plot = TwoPoints();
+  plot.series[0].x.push_back(std::numeric_limits<double>::infinity());
+  plot.series[0].y.push_back(std::numeric_limits<double>::quiet_NaN());
+  const std::string svg = PlotSvg({plot});
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  EXPECT_THAT(svg, Not(HasSubstr("inf")));
+  EXPECT_THAT(svg, HasSubstr("74.00,404.00 736.00,57.33"));
+}
+
+TEST(LinePlotTest, EmptyAndConstantPlots) {
+  EXPECT_THAT(PlotSvg({}), HasSubstr("</svg>"));
+  LinePlot plot;
+  EXPECT_THAT(PlotSvg({plot}), Not(HasSubstr("nan")));
+  plot = TwoPoints();
+  plot.series[0].x = {3.0, 3.0};
+  plot.series[0].y = {0.0, 0.0};
+  EXPECT_THAT(PlotSvg({plot}), Not(HasSubstr("nan")));
+}
+
+TEST(LinePlotTest, RefusesSizesThatDisagree) {
+  LinePlot plot = TwoPoints();
+  plot.series[0].y.pop_back();
+  EXPECT_THROW(PlotSvg({plot}), Error);
+  plot = TwoPoints();
+  plot.series[0].low = {0.0, 0.0};
+  EXPECT_THROW(PlotSvg({plot}), Error);
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -6,6 +6,7 @@
 #include <deque>
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace {
 
 // With a list of features, points so many constraints away are looked at too.
 constexpr int kReach = 8;
+constexpr int kMaxRounds = 50;
 
 // A curve with the points that support it, those that are proposed included.
 struct Entry {
@@ -22,6 +24,8 @@ struct Entry {
   FoundCurve found;
   // Points of found.support that are not tied to it yet.
   std::vector<int> joining;
+  // It may be taken out when it turns out to be the same as another.
+  bool may_go = true;
 };
 
 class CurveDetection {
@@ -33,17 +37,30 @@ class CurveDetection {
         kind_(kind),
         curves_of_(static_cast<std::size_t>(points_.size()), 0) {
     Load(graph);
-    for (;;) {
+    // Until a further call would find nothing.
+    for (int round = 0; round < kMaxRounds; ++round) {
+      bool has_changed = Merge();
       for (Entry& entry : entries_) {
-        if (entry.found.curve.kind == kind_) Extend(&entry);
+        if (entry.found.curve.kind == kind_ && Extend(&entry)) {
+          has_changed = true;
+        }
       }
-      if (!Search(scope.seed)) break;
+      if (!has_changed && !Search(scope.seed)) break;
     }
   }
 
-  Transaction Propose(const Registry& registry, int level,
+  Transaction Propose(const Graph& graph, const Registry& registry, int level,
                       const std::string& source) const {
     Transaction transaction;
+    for (const FeatureId id : removed_) {
+      for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
+        if (graph.FindConstraint(constraint_id)->state ==
+            ConstraintState::kLive) {
+          transaction.RemoveConstraint(constraint_id);
+        }
+      }
+      transaction.RemoveFeature(id);
+    }
     const bool is_line = kind_ == CurveKind::kLine;
     for (const Entry& entry : entries_) {
       if (entry.joining.empty()) continue;
@@ -117,7 +134,26 @@ class CurveDetection {
         ++curves_of_[static_cast<std::size_t>(i)];
       }
     }
-    for (auto& [id, entry] : entries) entries_.push_back(std::move(entry));
+    for (auto& [id, entry] : entries) {
+      entry.may_go = MayGo(graph, entry);
+      entries_.push_back(std::move(entry));
+    }
+  }
+
+  // A curve that nothing but structure holds and whose points are all known.
+  static bool MayGo(const Graph& graph, const Entry& entry) {
+    const Feature& feature = graph.GetFeature(entry.id);
+    if (!feature.is_virtual || feature.fixed) return false;
+    std::size_t from_below = 0;
+    for (const ConstraintId id : graph.ConstraintsOf(entry.id)) {
+      const Constraint& constraint = *graph.FindConstraint(id);
+      if (constraint.state != ConstraintState::kLive) continue;
+      if (constraint.kind == ConstraintClass::kMeasurement) return false;
+      if (graph.GetFeature(constraint.features[0]).level < feature.level) {
+        ++from_below;
+      }
+    }
+    return from_below == entry.found.support.size();
   }
 
   double GapLimit(const FoundCurve& found) const {
@@ -134,12 +170,78 @@ class CurveDetection {
     const auto middle =
         gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
     std::nth_element(gaps.begin(), middle, gaps.end());
-    return std::max(options_.max_gap, 4.0 * *middle);
+    return std::max(options_.max_gap, 3.0 * *middle);
   }
 
-  // Adds connected points near the curve to its support.
-  void Extend(Entry* entry) {
+  // Takes out curves that have become the same as another one with more
+  // support. True when there were any.
+  bool Merge() {
+    std::vector<std::vector<std::size_t>> entries_of(curves_of_.size());
+    for (std::size_t e = 0; e < entries_.size(); ++e) {
+      if (entries_[e].found.curve.kind != kind_) continue;
+      for (const int i : entries_[e].found.support) {
+        entries_of[static_cast<std::size_t>(i)].push_back(e);
+      }
+    }
+    std::vector<bool> is_merged(entries_.size(), false);
+    for (std::size_t e = 0; e < entries_.size(); ++e) {
+      const Entry& entry = entries_[e];
+      if (entry.found.curve.kind != kind_ || !entry.may_go) continue;
+      // Curves that touch this one.
+      std::set<std::size_t> others;
+      for (const int i : entry.found.support) {
+        const auto& own = entries_of[static_cast<std::size_t>(i)];
+        others.insert(own.begin(), own.end());
+        for (const int j : points_.neighbors(i)) {
+          const auto& next = entries_of[static_cast<std::size_t>(j)];
+          others.insert(next.begin(), next.end());
+        }
+      }
+      others.erase(e);
+      for (const std::size_t o : others) {
+        const Entry& other = entries_[o];
+        const std::size_t size = entry.found.support.size();
+        const std::size_t other_size = other.found.support.size();
+        if (is_merged[o] || size > other_size ||
+            (size == other_size && e < o) || !IsSame(entry, other)) {
+          continue;
+        }
+        is_merged[e] = true;
+        break;
+      }
+    }
+    bool has_merged = false;
+    for (std::size_t e = entries_.size(); e-- > 0;) {
+      if (!is_merged[e]) continue;
+      has_merged = true;
+      for (const int i : entries_[e].found.support) {
+        --curves_of_[static_cast<std::size_t>(i)];
+      }
+      if (entries_[e].id != kNoId) removed_.push_back(entries_[e].id);
+      entries_.erase(entries_.begin() + static_cast<std::ptrdiff_t>(e));
+    }
+    return has_merged;
+  }
+
+  // Whether the support of a curve lies on the other as well as it should on
+  // its own.
+  bool IsSame(const Entry& entry, const Entry& other) const {
+    double sum = 0.0;
+    for (const int i : entry.found.support) {
+      const double distance =
+          std::abs(other.found.curve.SignedDistance(points_.position(i)));
+      if (distance > 2.0 * options_.sigma) return false;
+      sum += distance * distance;
+    }
+    const auto count = static_cast<double>(entry.found.support.size());
+    return sum <= count * options_.sigma * options_.sigma;
+  }
+
+  // Adds connected points near the curve to its support; false when there are
+  // none.
+  bool Extend(Entry* entry) {
     FoundCurve& found = entry->found;
+    const std::size_t before = found.support.size();
     const double limit = GapLimit(found);
     std::vector<bool> is_support(curves_of_.size(), false);
     struct Step {
@@ -185,6 +287,7 @@ class CurveDetection {
       }
     }
     std::sort(found.support.begin(), found.support.end());
+    return found.support.size() > before;
   }
 
   // Points that support a curve or are left over of one.
@@ -273,6 +376,8 @@ class CurveDetection {
   const CurveSearchOptions& options_;
   const CurveKind kind_;
   std::vector<Entry> entries_;
+  // Curves of the graph that are the same as another.
+  std::vector<FeatureId> removed_;
   // Points with a broken constraint to a curve that is still there.
   std::vector<int> outliers_;
   // How many of them each point supports.
@@ -286,7 +391,7 @@ Transaction DetectCurves(const Graph& graph, const Registry& registry,
                          const std::string& source,
                          const CurveSearchOptions& options) {
   return CurveDetection(graph, scope, kind, options)
-      .Propose(registry, scope.level, source);
+      .Propose(graph, registry, scope.level, source);
 }
 
 DetectorParameters CurveSearchDefaults() {

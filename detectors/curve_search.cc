@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <map>
 #include <queue>
 #include <random>
 #include <set>
@@ -30,7 +31,7 @@ constexpr int kMaxRefits = 8;
 // Points that so many hypotheses explain are not grown from any more.
 constexpr int kEnoughHypotheses = 2;
 // Gaps longer than so many times the usual spacing end a line.
-constexpr double kGapPerSpacing = 4.0;
+constexpr double kGapPerSpacing = 3.0;
 
 // Connected points within so many tolerances of a curve are its outliers.
 constexpr double kShade = 1.5;
@@ -183,7 +184,9 @@ class CurveSearcher {
     std::vector<int> all(hypotheses_.size());
     for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
     std::vector<int> selected = Select(all);
-    selected = Prune(Join(Exchange(std::move(selected))));
+    selected = Exchange(std::move(selected));
+    Reassign(&selected);
+    selected = Prune(Join(std::move(selected)));
 
     std::vector<FoundCurve> result;
     for (const int index : selected) {
@@ -757,6 +760,59 @@ class CurveSearcher {
     return sum;
   }
 
+  // Gives each point to the curve near it that has most of its neighbours:
+  // where curves cross, the first one took points of the others.
+  void Reassign(std::vector<int>* selected) {
+    std::vector<int> owner(is_free_.size(), -1);
+    for (const int index : *selected) {
+      for (const int i : owned_[static_cast<std::size_t>(index)]) {
+        owner[static_cast<std::size_t>(i)] = index;
+      }
+    }
+    std::vector<int> next = owner;
+    std::map<int, int> votes;
+    for (int i = 0; i < points_.size(); ++i) {
+      const int own = owner[static_cast<std::size_t>(i)];
+      if (own < 0) continue;
+      votes.clear();
+      for (const int j : points_.neighbors(i)) {
+        const int other = owner[static_cast<std::size_t>(j)];
+        if (other >= 0) ++votes[other];
+      }
+      int best = own;
+      for (const auto& [other, count] : votes) {
+        const Hypothesis& hypothesis =
+            hypotheses_[static_cast<std::size_t>(other)];
+        if (count > votes[best] &&
+            std::abs(hypothesis.curve.SignedDistance(points_.position(i))) <=
+                kShade * hypothesis.tolerance) {
+          best = other;
+        }
+      }
+      next[static_cast<std::size_t>(i)] = best;
+    }
+    for (const int index : *selected) {
+      owned_[static_cast<std::size_t>(index)].clear();
+    }
+    for (int i = 0; i < points_.size(); ++i) {
+      const int own = next[static_cast<std::size_t>(i)];
+      if (own >= 0) owned_[static_cast<std::size_t>(own)].push_back(i);
+    }
+    // What is left of some is too little.
+    std::vector<int> kept;
+    for (const int index : *selected) {
+      Hypothesis& hypothesis = hypotheses_[static_cast<std::size_t>(index)];
+      std::vector<int>& owned = owned_[static_cast<std::size_t>(index)];
+      hypothesis.inliers.swap(owned);
+      if (hypothesis.curve.kind == CurveKind::kLine) CutAtGaps(&hypothesis);
+      owned = hypothesis.inliers;
+      if (owned.size() >= MinPoints(hypothesis.curve.kind)) {
+        kept.push_back(index);
+      }
+    }
+    selected->swap(kept);
+  }
+
   // Puts pieces of one curve together. Drift bends long walls, and a piece with
   // a small tolerance is more significant than the whole with a large one.
   std::vector<int> Join(std::vector<int> selected) {
@@ -878,6 +934,21 @@ class CurveSearcher {
                options_.min_corner;
   }
 
+  // Distance from a line of the point of another's support that is nearest to
+  // the middle of its own.
+  double DistanceOfNearEnd(const Hypothesis& line,
+                           const Hypothesis& other) const {
+    double nearest = std::numeric_limits<double>::infinity();
+    double distance = 0.0;
+    for (const int i : other.inliers) {
+      const double along = std::abs(line.curve.Along(points_.position(i)));
+      if (along >= nearest) continue;
+      nearest = along;
+      distance = std::abs(line.curve.SignedDistance(points_.position(i)));
+    }
+    return distance;
+  }
+
   bool TryJoin(int index, int other) {
     const Hypothesis& a = hypotheses_[static_cast<std::size_t>(index)];
     const Hypothesis& b = hypotheses_[static_cast<std::size_t>(other)];
@@ -898,6 +969,12 @@ class CurveSearcher {
         count);
     const double together =
         std::sqrt(SquaredSum(both.curve, both.inliers) / count);
+    // Pieces of a bent line meet; lines beside each other do not.
+    if (a.curve.kind == CurveKind::kLine &&
+        (DistanceOfNearEnd(a, b) > options_.tolerance ||
+         DistanceOfNearEnd(b, a) > options_.tolerance)) {
+      return false;
+    }
     if (together > std::max(options_.sigma, kJoinRatio * apart)) {
       return false;
     }

@@ -20,12 +20,12 @@ struct CurveSearchOptions {
   double sigma = 0.05;
   /// Log10 of the expected number of curves of the kind that the whole graph
   /// would show by chance, at which one is accepted.
-  double max_log_false_alarms = -0.5;
+  double max_log_false_alarms = 0.0;
   /// Points that support a curve are connected with each other past at most so
   /// many points that do not.
   int max_gap_points = 2;
-  /// A line is cut where it has no point for this length, or for four times its
-  /// usual spacing where that is longer.
+  /// A line is cut where it has no point for this length, or for three times
+  /// its usual spacing where that is longer.
   double max_gap = 1.0;
   int min_line_points = 4;
   int min_circle_points = 5;

@@ -88,22 +88,44 @@ LogSolverResult LogSolver::Run(
   result.em = em_->Run(stop);
   builder.ReadRobot();
   result.final_cost = session_->Cost();
+
+  auto trajectory = [&] {
+    const double relocalization_begin = Now();
+    std::vector<Pose2> keys;
+    if (options_.relocalize) {
+      keys = RelocalizeKeyScans(graph_, builder.records(),
+                                options_.relocalization);
+    } else {
+      for (const KeyScanRecord& record : builder.records()) {
+        keys.push_back(record.pose);
+      }
+    }
+    std::vector<Pose2> poses =
+        InterpolateScans(refined, builder.records(), keys);
+    result.relocalization_seconds += Now() - relocalization_begin;
+    return poses;
+  };
+  result.trajectory = trajectory();
+
+  if (options_.complete_walls && options_.relocalize && !result.interrupted) {
+    const double completion_begin = Now();
+    Transaction walls = FindGlimpsedWalls(
+        graph_, registry_, log.scans, result.trajectory, options_.completion);
+    result.glimpsed_walls =
+        static_cast<std::int64_t>(walls.added_features().size());
+    result.completion_seconds = Now() - completion_begin;
+    if (!walls.empty()) {
+      graph_.Apply(std::move(walls));
+      const EmReport again = em_->Run(stop);
+      result.em.iterations += again.iterations;
+      result.em.converged = again.converged;
+      builder.ReadRobot();
+      result.final_cost = session_->Cost();
+      result.trajectory = trajectory();
+    }
+  }
   result.detect_seconds = em_->totals().detect_seconds;
   result.solve_seconds = em_->totals().solve_seconds;
-
-  const double relocalization_begin = Now();
-  if (options_.relocalize) {
-    result.trajectory = InterpolateScans(
-        refined, builder.records(),
-        RelocalizeKeyScans(graph_, builder.records(), options_.relocalization));
-  } else {
-    std::vector<Pose2> keys;
-    for (const KeyScanRecord& record : builder.records()) {
-      keys.push_back(record.pose);
-    }
-    result.trajectory = InterpolateScans(refined, builder.records(), keys);
-  }
-  result.relocalization_seconds = Now() - relocalization_begin;
 
   result.key_scans = static_cast<std::int64_t>(builder.records().size());
   result.wide_searches = refiner.wide_searches();

@@ -10,6 +10,7 @@
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/segment_extraction.h>
+#include <plumbline/frontend/wall_completion.h>
 
 #include <functional>
 #include <map>
@@ -31,6 +32,9 @@ struct LogSolverOptions {
   SessionOptions session;
   EmOptions em;
   RelocalizationOptions relocalization;
+  /// Add walls that no single scan saw well, in the end.
+  bool complete_walls = true;
+  WallCompletionOptions completion;
   /// False: the trajectory is what it was when each scan came in.
   bool relocalize = true;
   /// Scans between EM steps while replaying; 0: only at the end.
@@ -52,6 +56,8 @@ struct LogSolverResult {
   double detect_seconds = 0.0;
   double solve_seconds = 0.0;
   double relocalization_seconds = 0.0;
+  double completion_seconds = 0.0;
+  std::int64_t glimpsed_walls = 0;
   /// Seconds that each scan took, EM steps included.
   std::vector<float> scan_seconds;
   std::int64_t key_scans = 0;

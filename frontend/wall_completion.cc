@@ -1,0 +1,433 @@
+#include <plumbline/frontend/wall_completion.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <unordered_map>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr double kIndexCell = 1.0;
+constexpr double kCoveragePiece = 0.1;
+
+std::int64_t CellKey(std::int64_t column, std::int64_t row) {
+  return (column << 32) ^ (row & 0xffffffff);
+}
+
+struct Wall {
+  FeatureId id;
+  Pose2 pose;
+  double begin, end;
+};
+
+// Walls by the index cells that they pass through.
+class WallIndex {
+ public:
+  WallIndex(const Graph& graph, double reach) {
+    for (const Feature* feature : graph.Features()) {
+      if (feature->type->name != "segment" || feature->is_virtual) continue;
+      Wall wall;
+      wall.id = feature->id;
+      wall.pose = Pose2(feature->parameters[0], feature->parameters[1],
+                        feature->parameters[2]);
+      wall.begin = feature->extent_begin;
+      wall.end = feature->extent_end;
+      walls_.push_back(wall);
+    }
+    for (std::size_t i = 0; i < walls_.size(); ++i) {
+      const Wall& wall = walls_[i];
+      const double c = std::cos(wall.pose[2]);
+      const double s = std::sin(wall.pose[2]);
+      const double begin = wall.begin - reach;
+      const double end = wall.end + reach;
+      const int steps =
+          static_cast<int>(std::ceil((end - begin) / (0.5 * kIndexCell)));
+      for (int k = 0; k <= steps; ++k) {
+        const double t = begin + (end - begin) * k / std::max(1, steps);
+        const auto column = static_cast<std::int64_t>(
+            std::floor((wall.pose[0] + t * c) / kIndexCell));
+        const auto row = static_cast<std::int64_t>(
+            std::floor((wall.pose[1] + t * s) / kIndexCell));
+        for (int dy = -1; dy <= 1; ++dy) {
+          for (int dx = -1; dx <= 1; ++dx) {
+            std::vector<int>& cell = cells_[CellKey(column + dx, row + dy)];
+            if (cell.empty() || cell.back() != static_cast<int>(i)) {
+              cell.push_back(static_cast<int>(i));
+            }
+          }
+        }
+      }
+    }
+  }
+
+  bool Explains(const Eigen::Vector2d& point, double offset, double gap) const {
+    const auto found = cells_.find(
+        CellKey(static_cast<std::int64_t>(std::floor(point.x() / kIndexCell)),
+                static_cast<std::int64_t>(std::floor(point.y() / kIndexCell))));
+    if (found == cells_.end()) return false;
+    for (int index : found->second) {
+      const Wall& wall = walls_[index];
+      const double c = std::cos(wall.pose[2]);
+      const double s = std::sin(wall.pose[2]);
+      const double dx = point.x() - wall.pose[0];
+      const double dy = point.y() - wall.pose[1];
+      if (std::abs(-s * dx + c * dy) > offset) continue;
+      const double along = c * dx + s * dy;
+      if (along >= wall.begin - gap && along <= wall.end + gap) return true;
+    }
+    return false;
+  }
+
+  const std::vector<Wall>& walls() const { return walls_; }
+
+ private:
+  std::vector<Wall> walls_;
+  std::unordered_map<std::int64_t, std::vector<int>> cells_;
+};
+
+// Returns gathered in one cell.
+struct Cell {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  // Towards the lasers that saw it.
+  Eigen::Vector2d view = Eigen::Vector2d::Zero();
+  int returns = 0;
+  // Direction of the surface; only where it is straight.
+  Eigen::Vector2d direction = Eigen::Vector2d::Zero();
+  double straightness = 0.0;
+  bool used = false;
+
+  Eigen::Vector2d mean() const { return sum / returns; }
+};
+
+// Total least squares line through cells, each with the weight of its returns.
+struct Fit {
+  double n = 0.0;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double xx = 0.0, xy = 0.0, yy = 0.0;
+
+  void Add(const Eigen::Vector2d& p, double weight) {
+    n += weight;
+    sum += weight * p;
+    xx += weight * p.x() * p.x();
+    xy += weight * p.x() * p.y();
+    yy += weight * p.y() * p.y();
+  }
+  void Solve(Eigen::Vector2d* mean, Eigen::Vector2d* direction, double* across,
+             double* along) const {
+    *mean = sum / n;
+    const double sxx = xx / n - mean->x() * mean->x();
+    const double sxy = xy / n - mean->x() * mean->y();
+    const double syy = yy / n - mean->y() * mean->y();
+    const double angle = 0.5 * std::atan2(2.0 * sxy, sxx - syy);
+    const double radical = std::hypot(0.5 * (sxx - syy), sxy);
+    *direction = {std::cos(angle), std::sin(angle)};
+    *across = std::max(0.0, 0.5 * (sxx + syy) - radical);
+    *along = 0.5 * (sxx + syy) + radical;
+  }
+};
+
+class Completion {
+ public:
+  Completion(const Graph& graph, const Registry& registry,
+             const WallCompletionOptions& options)
+      : registry_(registry),
+        options_(options),
+        index_(graph, options.explained_gap) {}
+
+  Transaction Run(const std::vector<Scan>& scans,
+                  const std::vector<Pose2>& poses) {
+    Gather(scans, poses);
+    FillBuckets();
+    FitDirections();
+    // The straightest surroundings first; ties by place.
+    std::vector<int> order;
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      if (cells_[i].straightness > 0.0) order.push_back(static_cast<int>(i));
+    }
+    std::sort(order.begin(), order.end(), [this](int a, int b) {
+      return cells_[a].straightness != cells_[b].straightness
+                 ? cells_[a].straightness > cells_[b].straightness
+                 : a < b;
+    });
+    // Sharp walls first; then those that scans from poses less exact have
+    // smeared.
+    for (const double smear : {1.0, 2.0}) {
+      scatter_ = smear * options_.max_scatter;
+      for (int seed : order) {
+        if (!cells_[seed].used) Grow(seed);
+      }
+    }
+    return std::move(transaction_);
+  }
+
+ private:
+  void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses) {
+    std::vector<ScanPoint> points;
+    for (std::size_t i = 0; i < scans.size() && i < poses.size(); ++i) {
+      const Scan& scan = scans[i];
+      const Pose2 laser = Compose(poses[i], scan.laser_offset);
+      for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
+        const double range = scan.ranges[beam];
+        if (!(range >= options_.points.minimum_range) ||
+            range > options_.points.usable_range) {
+          continue;
+        }
+        const double angle =
+            laser[2] + scan.start_angle + beam * scan.angle_step;
+        const Eigen::Vector2d ray(std::cos(angle), std::sin(angle));
+        const Eigen::Vector2d point = laser.head<2>() + range * ray;
+        if (index_.Explains(point, options_.explained_offset,
+                            options_.explained_gap)) {
+          continue;
+        }
+        const auto column = static_cast<std::int64_t>(
+            std::floor(point.x() / options_.cell_size));
+        const auto row = static_cast<std::int64_t>(
+            std::floor(point.y() / options_.cell_size));
+        const auto inserted = cell_of_.emplace(CellKey(column, row),
+                                               static_cast<int>(cells_.size()));
+        if (inserted.second) {
+          cells_.emplace_back();
+        }
+        Cell& cell = cells_[inserted.first->second];
+        cell.sum += point;
+        cell.view -= ray;
+        ++cell.returns;
+      }
+    }
+  }
+
+  // Cells by buckets as wide as the largest neighbourhood asked for.
+  void FillBuckets() {
+    bucket_size_ = std::max(options_.normal_radius, options_.max_gap);
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      const Eigen::Vector2d p = cells_[i].mean() / bucket_size_;
+      buckets_[CellKey(static_cast<std::int64_t>(std::floor(p.x())),
+                       static_cast<std::int64_t>(std::floor(p.y())))]
+          .push_back(static_cast<int>(i));
+    }
+  }
+
+  template <typename Function>
+  void ForNeighbors(const Eigen::Vector2d& center, double radius,
+                    Function function) const {
+    const auto column =
+        static_cast<std::int64_t>(std::floor(center.x() / bucket_size_));
+    const auto row =
+        static_cast<std::int64_t>(std::floor(center.y() / bucket_size_));
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const auto found = buckets_.find(CellKey(column + dx, row + dy));
+        if (found == buckets_.end()) continue;
+        for (int index : found->second) {
+          if ((cells_[index].mean() - center).squaredNorm() <=
+              radius * radius) {
+            function(index);
+          }
+        }
+      }
+    }
+  }
+
+  void FitDirections() {
+    for (Cell& cell : cells_) {
+      Fit fit;
+      int count = 0;
+      const Eigen::Vector2d origin = cell.mean();
+      ForNeighbors(origin, options_.normal_radius, [&](int index) {
+        fit.Add(cells_[index].mean() - origin, 1.0);
+        ++count;
+      });
+      if (count < 4) continue;
+      Eigen::Vector2d mean, direction;
+      double across, along;
+      fit.Solve(&mean, &direction, &across, &along);
+      if (along <= 0.0 || across > 0.08 * along) continue;
+      cell.direction = direction;
+      cell.straightness = along - 10.0 * across;
+    }
+  }
+
+  void Grow(int seed) {
+    std::vector<int> members = {seed};
+    std::vector<int> marked = {seed};
+    std::vector<char>& in = in_;
+    in.resize(cells_.size(), 0);
+    in[seed] = 1;
+    Fit fit;
+    const Eigen::Vector2d origin = cells_[seed].mean();
+    fit.Add(Eigen::Vector2d::Zero(), 1.0);
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    Eigen::Vector2d direction = cells_[seed].direction;
+    double across = 0.0, along = 0.0;
+    const double cos_turn = std::cos(options_.max_turn);
+    const double reach_across = 2.5 * scatter_;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      const Eigen::Vector2d center = cells_[members[k]].mean();
+      ForNeighbors(center, options_.max_gap, [&](int index) {
+        Cell& other = cells_[index];
+        if (in[index] || other.used) return;
+        // Seen from the same side.
+        if (other.view.dot(cells_[seed].view) < 0.0) return;
+        if (other.direction.squaredNorm() > 0.0 &&
+            std::abs(other.direction.dot(direction)) < cos_turn) {
+          return;
+        }
+        const Eigen::Vector2d d = other.mean() - origin - mean;
+        if (std::abs(direction.x() * d.y() - direction.y() * d.x()) >
+            reach_across) {
+          return;
+        }
+        in[index] = 1;
+        marked.push_back(index);
+        members.push_back(index);
+        fit.Add(other.mean() - origin, 1.0);
+      });
+      if (members.size() >= 6) fit.Solve(&mean, &direction, &across, &along);
+    }
+    for (int index : marked) in[index] = 0;
+    if (members.size() < 6) return;
+
+    // Once more with what lies on the line that was found.
+    Fit final_fit;
+    int returns = 0;
+    std::vector<int> on;
+    for (int index : members) {
+      const Eigen::Vector2d d = cells_[index].mean() - origin - mean;
+      if (std::abs(direction.x() * d.y() - direction.y() * d.x()) >
+          reach_across) {
+        continue;
+      }
+      final_fit.Add(cells_[index].mean() - origin, cells_[index].returns);
+      returns += cells_[index].returns;
+      on.push_back(index);
+    }
+    if (on.size() < 6 || returns < options_.min_returns) return;
+    final_fit.Solve(&mean, &direction, &across, &along);
+    if (across > scatter_ * scatter_) return;
+    std::vector<double> places;
+    Eigen::Vector2d view = Eigen::Vector2d::Zero();
+    for (int index : on) {
+      places.push_back(direction.dot(cells_[index].mean() - origin - mean));
+      view += cells_[index].view;
+    }
+    std::sort(places.begin(), places.end());
+    const double length = places.back() - places.front();
+    if (length < options_.min_length) return;
+    int pieces = 0;
+    std::int64_t last = -1;
+    for (double place : places) {
+      const auto piece =
+          static_cast<std::int64_t>((place - places.front()) / kCoveragePiece);
+      if (piece != last) ++pieces;
+      last = piece;
+    }
+    if (pieces < options_.min_coverage * (length / kCoveragePiece)) return;
+    // The direction must be as certain as that of any other wall.
+    const double end_variance =
+        across * length * length / (static_cast<double>(on.size()) * along);
+    if (end_variance > options_.max_end_sigma * options_.max_end_sigma *
+                           (scatter_ / options_.max_scatter))
+      return;
+    for (int index : on) cells_[index].used = true;
+    UseUp(origin + mean, direction, places.front(), places.back());
+
+    if (Eigen::Vector2d(-direction.y(), direction.x()).dot(view) < 0.0) {
+      direction = -direction;
+      std::reverse(places.begin(), places.end());
+      for (double& place : places) place = -place;
+    }
+    const double middle = 0.5 * (places.front() + places.back());
+    const Eigen::Vector2d position = origin + mean + middle * direction;
+    Add(Pose2(position.x(), position.y(),
+              std::atan2(direction.y(), direction.x())),
+        length, returns);
+  }
+
+  // What the new wall explains is no other wall.
+  void UseUp(const Eigen::Vector2d& point, const Eigen::Vector2d& direction,
+             double begin, double end) {
+    const double step = 0.5 * bucket_size_;
+    const int steps = static_cast<int>(std::ceil((end - begin) / step));
+    for (int k = 0; k <= steps; ++k) {
+      const Eigen::Vector2d center =
+          point + (begin + std::min(end - begin, k * step)) * direction;
+      ForNeighbors(center, bucket_size_, [&](int index) {
+        const Eigen::Vector2d d = cells_[index].mean() - point;
+        const double along = direction.dot(d);
+        if (std::abs(direction.x() * d.y() - direction.y() * d.x()) <=
+                options_.explained_offset &&
+            along >= begin - options_.explained_gap &&
+            along <= end + options_.explained_gap) {
+          cells_[index].used = true;
+        }
+      });
+    }
+  }
+
+  void Add(const Pose2& pose, double length, int returns) {
+    std::vector<std::pair<double, const Wall*>> nearest;
+    for (const Wall& wall : index_.walls()) {
+      const Eigen::Vector2d middle = TransformPoint(
+          wall.pose, Eigen::Vector2d(0.5 * (wall.begin + wall.end), 0.0));
+      nearest.emplace_back((middle - pose.head<2>()).norm(), &wall);
+    }
+    if (nearest.empty()) return;
+    const std::size_t links =
+        std::min<std::size_t>(nearest.size(), options_.links);
+    std::partial_sort(nearest.begin(), nearest.begin() + links, nearest.end(),
+                      [](const auto& a, const auto& b) {
+                        return a.first != b.first ? a.first < b.first
+                                                  : a.second->id < b.second->id;
+                      });
+    Feature feature;
+    feature.type = &registry_.GetFeature("segment");
+    feature.parameters = {pose[0], pose[1], pose[2]};
+    feature.extent_begin = -0.5 * length;
+    feature.extent_end = 0.5 * length;
+    feature.observations = returns;
+    feature.source = "wall_completion";
+    const FeatureId id = transaction_.AddFeature(feature);
+    for (std::size_t k = 0; k < links; ++k) {
+      const Wall& wall = *nearest[k].second;
+      Constraint constraint;
+      constraint.type = &registry_.GetRelation("pose_pose");
+      constraint.features = std::vector<FeatureId>{wall.id, id};
+      constraint.expected = Between(wall.pose, pose);
+      const double offset =
+          options_.link_offset_sigma * options_.link_offset_sigma;
+      const double angle =
+          options_.link_angle_sigma * options_.link_angle_sigma;
+      constraint.information =
+          Eigen::Vector3d(1.0 / offset, 1.0 / offset, 1.0 / angle).asDiagonal();
+      constraint.information /= static_cast<double>(links);
+      constraint.source = "wall_completion";
+      transaction_.AddConstraint(std::move(constraint));
+    }
+  }
+
+  const Registry& registry_;
+  const WallCompletionOptions options_;
+  const WallIndex index_;
+  std::vector<Cell> cells_;
+  std::unordered_map<std::int64_t, int> cell_of_;
+  double scatter_ = 0.0;
+  double bucket_size_ = 0.0;
+  std::unordered_map<std::int64_t, std::vector<int>> buckets_;
+  std::vector<char> in_;
+  Transaction transaction_;
+};
+
+}  // namespace
+
+Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
+                              const std::vector<Scan>& scans,
+                              const std::vector<Pose2>& poses,
+                              const WallCompletionOptions& options) {
+  return Completion(graph, registry, options).Run(scans, poses);
+}
+
+}  // namespace plumbline

@@ -1,0 +1,59 @@
+#ifndef PLUMBLINE_FRONTEND_WALL_COMPLETION_H_
+#define PLUMBLINE_FRONTEND_WALL_COMPLETION_H_
+
+#include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/core/transaction.h>
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/scan.h>
+#include <plumbline/frontend/scan_points.h>
+
+#include <vector>
+
+namespace plumbline {
+
+struct WallCompletionOptions {
+  ScanPointsOptions points;
+  /// Returns so near to a wall of the map (across, and beyond its ends, m) are
+  /// explained by it.
+  double explained_offset = 0.12;
+  double explained_gap = 0.3;
+  /// Returns are gathered in cells of this size, m.
+  double cell_size = 0.05;
+  /// Neighbourhood in which a cell's direction is fitted, m.
+  double normal_radius = 0.3;
+  /// How far off a wall its returns lie (standard deviation, m), and one cell's
+  /// direction off the wall's, rad.
+  double max_scatter = 0.015;
+  double max_turn = DegToRad(15.0);
+  /// Its ends swing by no more across it, as its direction is that uncertain
+  /// (standard deviation over the whole length, m).
+  double max_end_sigma = 0.008;
+  /// A wall is at least so long (m), is made of so many returns, has no gap
+  /// longer than this (m), and returns on this share of its length (in pieces
+  /// of 0.1 m).
+  double min_length = 0.8;
+  int min_returns = 20;
+  double max_gap = 0.4;
+  double min_coverage = 0.75;
+  /// A wall is bound to so many walls of the map, nearest first, with this
+  /// covariance: m across and along, rad.
+  int links = 3;
+  double link_offset_sigma = 0.03;
+  double link_angle_sigma = DegToRad(0.7);
+};
+
+/// Finds walls that no single scan saw well enough: glimpsed through doors, a
+/// few beams at a time. Gathers the returns of all scans, at their final
+/// poses, that no wall of the map explains, and grows straight pieces in them.
+/// Returns the transaction that adds them as segments of level 0, bound to
+/// their neighbours by measurements; the graph is not changed. One pose a scan
+/// (map frame). Cost: linear in the returns.
+Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
+                              const std::vector<Scan>& scans,
+                              const std::vector<Pose2>& poses,
+                              const WallCompletionOptions& options);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_WALL_COMPLETION_H_

@@ -35,7 +35,8 @@ class CurveDetection {
       : points_(graph, scope, kReach),
         options_(options),
         kind_(kind),
-        curves_of_(static_cast<std::size_t>(points_.size()), 0) {
+        curves_of_(static_cast<std::size_t>(points_.size()), 0),
+        support_stamp_(curves_of_.size(), 0) {
     Load(graph);
     // Until a further call would find nothing.
     for (int round = 0; round < kMaxRounds; ++round) {
@@ -243,7 +244,7 @@ class CurveDetection {
     FoundCurve& found = entry->found;
     const std::size_t before = found.support.size();
     const double limit = GapLimit(found);
-    std::vector<bool> is_support(curves_of_.size(), false);
+    ++stamp_;
     struct Step {
       int point;
       // The last one on the curve on the way, and the points off it since.
@@ -252,7 +253,7 @@ class CurveDetection {
     };
     std::deque<Step> queue;
     for (const int i : found.support) {
-      is_support[static_cast<std::size_t>(i)] = true;
+      support_stamp_[static_cast<std::size_t>(i)] = stamp_;
       queue.push_back({i, i, 0});
     }
     std::map<int, int> gaps;
@@ -261,7 +262,7 @@ class CurveDetection {
       queue.pop_front();
       for (const int i : points_.neighbors(step.point)) {
         const auto k = static_cast<std::size_t>(i);
-        if (is_support[k]) continue;
+        if (support_stamp_[k] == stamp_) continue;
         const double distance =
             std::abs(found.curve.SignedDistance(points_.position(i)));
         const double gate =
@@ -269,7 +270,7 @@ class CurveDetection {
         if (distance <= gate &&
             (points_.position(i) - points_.position(step.from)).norm() <=
                 limit) {
-          is_support[k] = true;
+          support_stamp_[k] = stamp_;
           ++curves_of_[k];
           found.support.push_back(i);
           entry->joining.push_back(i);
@@ -382,6 +383,9 @@ class CurveDetection {
   std::vector<int> outliers_;
   // How many of them each point supports.
   std::vector<int> curves_of_;
+  // Scratch of Extend: equal to stamp_ for the support of the curve.
+  std::vector<int> support_stamp_;
+  int stamp_ = 0;
 };
 
 }  // namespace

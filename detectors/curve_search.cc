@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <map>
 #include <queue>
@@ -690,6 +691,10 @@ class CurveSearcher {
             static_cast<int>(h));
       }
     }
+    std::vector<bool> is_taken(hypotheses_.size(), false);
+    for (const int index : selected) {
+      is_taken[static_cast<std::size_t>(index)] = true;
+    }
     std::vector<int> kept;
     for (const int index : selected) {
       const std::vector<int> points = owned_[static_cast<std::size_t>(index)];
@@ -705,14 +710,12 @@ class CurveSearcher {
       std::sort(rivals.begin(), rivals.end());
       rivals.erase(std::unique(rivals.begin(), rivals.end()), rivals.end());
       // Those selected own points and are not available.
-      rivals.erase(std::remove_if(
-                       rivals.begin(), rivals.end(),
-                       [&](int rival) {
-                         return std::count(selected.begin(), selected.end(),
-                                           rival) > 0 ||
-                                std::count(kept.begin(), kept.end(), rival) > 0;
-                       }),
-                   rivals.end());
+      rivals.erase(
+          std::remove_if(rivals.begin(), rivals.end(),
+                         [&](int rival) {
+                           return is_taken[static_cast<std::size_t>(rival)];
+                         }),
+          rivals.end());
       Disown(index);
       const std::vector<int> others = Select(rivals);
       double sum = 0.0;
@@ -720,6 +723,9 @@ class CurveSearcher {
         sum += selected_significance_[static_cast<std::size_t>(other)];
       }
       if (sum > selected_significance_[static_cast<std::size_t>(index)]) {
+        for (const int other : others) {
+          is_taken[static_cast<std::size_t>(other)] = true;
+        }
         kept.insert(kept.end(), others.begin(), others.end());
         continue;
       }
@@ -900,9 +906,9 @@ class CurveSearcher {
   }
 
   bool IsKnown(const FoundCurve& curve) const {
-    return std::any_of(
-        known_.begin(), known_.end(),
-        [&curve](const FoundCurve& known) { return &known == &curve; });
+    const std::less<const FoundCurve*> before;
+    return !before(&curve, known_.data()) &&
+           before(&curve, known_.data() + known_.size());
   }
 
   double Spread(const FoundCurve& found) const {

@@ -277,6 +277,55 @@ TEST_F(CurveRansacTest, ExactBuilding) {
   EXPECT_TRUE(Detect("circle_ransac").empty());
 }
 
+// However noisy, a second look finds nothing.
+TEST_F(CurveRansacTest, NothingIsProposedTwice) {
+  for (int seed = 1; seed <= 4; ++seed) {
+    Graph graph;
+    PointWorld world(seed);
+    world.AddBuilding(0.34);
+    for (int i = 0; i < 30; ++i) {
+      world.AddPoint(12.0 + world.Noise(12.0), 6.0 + world.Noise(6.0));
+    }
+    world.Build(registry_, 0.15, 0.03, 5, &graph);
+    for (const char* name : {"line_ransac", "circle_ransac"}) {
+      const auto detector = registry_.GetDetector(name).make({});
+      Transaction transaction = detector->Detect(graph, registry_, {});
+      EXPECT_FALSE(transaction.empty());
+      graph.Apply(std::move(transaction));
+      EXPECT_TRUE(detector->Detect(graph, registry_, {}).empty())
+          << name << " seed " << seed;
+    }
+  }
+}
+
+TEST_F(CurveRansacTest, EqualCurvesAreMerged) {
+  std::vector<std::array<double, 2>> positions;
+  for (int i = 0; i <= 20; ++i) {
+    // The second half turned away, and has been brought back since.
+    positions.push_back({0.4 * i, i <= 10 ? 0.0 : 0.3 * (i - 10)});
+  }
+  AddChain(positions, true);
+  const TransactionResult pieces = graph_.Apply(Detect("line_ransac"));
+  ASSERT_EQ(pieces.features.size(), 2u);
+  for (int i = 0; i <= 20; ++i) graph_.GetFeature(i).parameters[1] = 0.0;
+  for (const FeatureId id : pieces.features) {
+    Feature& line = graph_.GetFeature(id);
+    line.anchor[1] = 0.0;
+    line.parameters = {0.0, 0.0};
+  }
+  Transaction transaction = Detect("line_ransac");
+  ASSERT_EQ(transaction.removed_features().size(), 1u);
+  EXPECT_TRUE(transaction.added_features().empty());
+  graph_.Apply(std::move(transaction));
+  EXPECT_TRUE(Detect("line_ransac").empty());
+  int lines = 0;
+  for (const FeatureId id : graph_.VirtualFeatures(1)) {
+    EXPECT_EQ(graph_.ConstraintsOf(id).size(), 21u);
+    ++lines;
+  }
+  EXPECT_EQ(lines, 1);
+}
+
 TEST_F(CurveRansacTest, DensePoints) {
   PointWorld world(3);
   world.AddBuilding(0.1);

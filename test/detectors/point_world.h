@@ -90,6 +90,40 @@ class PointWorld {
     AddCircle(21.0, 2.5, 2.4, spacing);
   }
 
+  // Seven corridors of two walls each, 1.5 m apart, around four round halls of
+  // two concentric circles each, with a point about every metre: 14 lines in 2
+  // directions, 8 circles, 4 centres. With links of up to 1.8 m and five links
+  // a point, walls are triangulated and the whole is nearly rigid.
+  void AddCorridors() {
+    max_link_length_ = 1.8;
+    constexpr double kInset = 1.65;
+    const auto add_corridor = [this](double x1, double y1, double x2,
+                                     double y2) {
+      const double length = std::hypot(x2 - x1, y2 - y1);
+      const double ux = (x2 - x1) / length, uy = (y2 - y1) / length;
+      // One wall starts half a spacing later, so that triangles result.
+      AddWall(x1 - 0.75 * uy, y1 + 0.75 * ux, x2 - 0.75 * uy, y2 + 0.75 * ux,
+              1.0);
+      AddWall(x1 + 0.75 * uy + 0.5 * ux, y1 - 0.75 * ux + 0.5 * uy,
+              x2 + 0.75 * uy - 0.5 * ux, y2 - 0.75 * ux - 0.5 * uy, 1.0);
+    };
+    add_corridor(-0.75, 0.0, 30.75, 0.0);
+    add_corridor(-0.75, 28.0, 30.75, 28.0);
+    for (const double x : {0.0, 15.0, 30.0}) {
+      add_corridor(x, kInset, x, 28.0 - kInset);
+    }
+    add_corridor(kInset, 15.0, 15.0 - kInset, 15.0);
+    add_corridor(15.0 + kInset, 13.0, 30.0 - kInset, 13.0);
+    const auto add_hall = [this](double x, double y, double radius) {
+      AddCircle(x, y, radius, 1.0);
+      AddCircle(x, y, radius - 1.5, 1.0, 5.0);
+    };
+    add_hall(7.5, 7.5, 5.85);
+    add_hall(7.5, 21.5, 4.85);
+    add_hall(22.5, 6.5, 4.85);
+    add_hall(22.5, 20.5, 5.85);
+  }
+
   // Adds the points, each with noise on x and y, and distances with noise
   // between the nearest pairs, no point with more than `max_links` of them;
   // parts that stay apart are joined by their nearest pair. Returns the ids.
@@ -163,7 +197,7 @@ class PointWorld {
     };
     for (const Pair& pair : pairs) {
       if (degree[pair.i] >= max_links || degree[pair.j] >= max_links ||
-          pair.distance > 1.5) {
+          pair.distance > max_link_length_) {
         continue;
       }
       ++degree[pair.i];
@@ -180,6 +214,7 @@ class PointWorld {
   }
 
   std::mt19937_64 engine_;
+  double max_link_length_ = 1.5;
   std::vector<Position> truth_;
   std::vector<int> curve_of_;
   std::vector<bool> is_circle_;

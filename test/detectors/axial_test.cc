@@ -163,6 +163,8 @@ TEST(AxialTest, PoorDirectionsWeighLess) {
 // The tails of a smeared direction reach beyond the gate: they are shoulders
 // and not directions, also once the peak itself is known and taken out.
 TEST(AxialTest, ShouldersAreNotDirections) {
+  AxialMixtureOptions options;
+  options.gate = DegToRad(5.0);
   for (int seed = 0; seed < 10; ++seed) {
     WallSampler sampler(seed);
     std::vector<AxialSample> gauss, laplace;
@@ -175,10 +177,10 @@ TEST(AxialTest, ShouldersAreNotDirections) {
     }
     sampler.AddClutter(300, 0.5, &laplace);
     for (const auto& samples : {gauss, laplace}) {
-      const auto components = FindAxialComponents(samples, {}, {});
+      const auto components = FindAxialComponents(samples, {}, options);
       ASSERT_EQ(components.size(), 1u) << "seed " << seed;
       EXPECT_NEAR(RadToDeg(components[0].mean), 0.0, 0.5);
-      EXPECT_TRUE(FindAxialComponents(samples, {0.0}, {}).empty());
+      EXPECT_TRUE(FindAxialComponents(samples, {0.0}, options).empty());
     }
   }
 }

@@ -83,7 +83,8 @@ TEST_F(OrientationMixtureTest, MakesOrientationsOneLevelUp) {
     AddSegment(110.4 - 0.1 * i, 3.0);
   }
   const FeatureId oblique = AddSegment(60.0, 3.0);
-  const Transaction transaction = Detect();
+  const Transaction transaction =
+      Detect(nullptr, 0, {{"sigma_deg", 0.5}, {"gate_deg", 5.0}});
   ASSERT_EQ(transaction.added_features().size(), 2u);
   std::vector<double> directions;
   for (const Feature& feature : transaction.added_features()) {
@@ -184,7 +185,8 @@ TEST_F(OrientationMixtureTest, ExtendsWhatIsThere) {
   for (const double direction : {0.2, 3.0, -91.5, 87.0, 184.0, 40.0, 6.0}) {
     segments.push_back(AddSegment(direction, 2.0));
   }
-  const Transaction transaction = Detect();
+  // The last one is beyond the gate.
+  const Transaction transaction = Detect(nullptr, 0, {{"gate_deg", 5.0}});
   EXPECT_TRUE(transaction.added_features().empty());
   ASSERT_EQ(transaction.added_constraints().size(), 5u);
   const std::vector<FeatureId> expected = {first, first, second, second, first};

@@ -46,7 +46,7 @@ TEST_F(OrientationRelationTest, NearestAllowedAngle) {
   AddOrientation(-78.0);  // 88 degrees from the first, the other way round
   AddOrientation(54.5);   // 44.5 from the first, 132.5 from the second
   AddOrientation(30.0);   // 20 from the first
-  const Transaction transaction = Detect();
+  const Transaction transaction = Detect({{"sigma_deg", 0.2}});
   EXPECT_TRUE(transaction.added_features().empty());
   ASSERT_EQ(transaction.added_constraints().size(), 3u);
   const Constraint& right = transaction.added_constraints()[0];

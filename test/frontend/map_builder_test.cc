@@ -4,6 +4,7 @@
 #include <plumbline/frontend/map_builder.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -297,6 +298,82 @@ TEST_F(MapBuilderTest, ExtentsGrowAndNeverShrink) {
   EXPECT_LT((look(-2.0, -0.5) - Eigen::Vector2d(-2.0, 3.0)).norm(), 1e-6);
 }
 
+TEST_F(MapBuilderTest, TheLastLinkStaysWhenAllAreBeyondTheRadius) {
+  MapBuilder builder(&graph_, registry_, Options());
+  builder.AddKeyScan(0, Motion(Pose2::Zero()),
+                     ObserveAll(Pose2::Zero(), {{{-1.0, 1.0}, {1.0, 1.0}},
+                                                {{-1.0, -1.0}, {1.0, -1.0}}}),
+                     Pose2::Zero());
+  // Nothing is recognized for 20 m.
+  for (int i = 1; i <= 10; ++i) {
+    builder.AddKeyScan(i, Motion(Pose2(2.0, 0.0, 0.0)), {}, Pose2::Zero());
+    EXPECT_EQ(builder.Neighborhood(1).size(), i <= 5 ? 2u : 1u) << i;
+  }
+  builder.WriteRobot();
+  const std::vector<ConstraintId> links =
+      graph_.ConstraintsOf(builder.robot_id());
+  ASSERT_EQ(links.size(), 1u);
+  // Blind for 20 m: 10 steps of 3 cm, and their headings.
+  const Eigen::MatrixXd covariance =
+      graph_.GetConstraint(links[0]).information.inverse();
+  EXPECT_GT(covariance(0, 0), 10.0 * 0.03 * 0.03);
+  EXPECT_GT(covariance(2, 2), 10.0 * DegToRad(1.0) * DegToRad(1.0));
+
+  // What comes next is bound to what was seen before.
+  const std::size_t before = Relations().size();
+  builder.AddKeyScan(11, Motion(Pose2::Zero()),
+                     ObserveAll(builder.robot(), {{{19.0, 1.0}, {21.0, 1.0}}}),
+                     Pose2::Zero());
+  ASSERT_EQ(Segments().size(), 3u);
+  const std::vector<const Constraint*> relations = Relations();
+  ASSERT_EQ(relations.size(), before + 1);
+  EXPECT_LT(relations.back()->features[0], 2);
+  EXPECT_EQ(relations.back()->features[1], Segments().back()->id);
+  // With the new wall near, the old one's link goes.
+  builder.AddKeyScan(12, Motion(Pose2(0.1, 0.0, 0.0)), {}, Pose2::Zero());
+  const std::vector<FeatureId> linked = builder.Neighborhood(1);
+  EXPECT_EQ(std::count(linked.begin(), linked.end(), Segments().back()->id), 1);
+  EXPECT_EQ(std::count(linked.begin(), linked.end(), 0), 0);
+  EXPECT_EQ(std::count(linked.begin(), linked.end(), 1), 0);
+}
+
+// The scan begins in the middle of a wall, or a column hides it.
+TEST_F(MapBuilderTest, TwoPiecesOfAWallInTheFirstScanAreOneFeature) {
+  MapBuilder builder(&graph_, registry_, Options());
+  const Pose2 robot(0.0, 2.0, 0.0);
+  const std::vector<SegmentObservation> pieces =
+      ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
+                         {{0.05, 0.0}, {2.0, 0.0}},
+                         {{-2.0, 4.0}, {2.0, 4.0}}});
+  for (int i = 0; i < 5; ++i) {
+    builder.AddKeyScan(i, Motion(Pose2::Zero()), pieces, robot);
+  }
+  const std::vector<const Feature*> segments = Segments();
+  ASSERT_EQ(segments.size(), 2u);
+  EXPECT_EQ(builder.num_created(), 2);
+  EXPECT_EQ(builder.num_matches(), 12);
+  EXPECT_NEAR(segments[0]->extent_end - segments[0]->extent_begin, 4.0, 1e-3);
+  // Both pieces are on record as that wall, and no relation binds it to itself.
+  ASSERT_EQ(builder.records()[0].matches.size(), 3u);
+  EXPECT_EQ(builder.records()[0].matches[0].feature, segments[0]->id);
+  EXPECT_EQ(builder.records()[0].matches[1].feature, segments[0]->id);
+  ASSERT_EQ(Relations().size(), 1u);
+  EXPECT_THAT(Relations()[0]->features,
+              ElementsAre(segments[0]->id, segments[1]->id));
+}
+
+// A door leaf 10 cm behind its wall, or a wall at an angle, is another feature.
+TEST_F(MapBuilderTest, WhatIsNotInLineInTheFirstScanStaysApart) {
+  MapBuilder builder(&graph_, registry_, Options());
+  const Pose2 robot(0.0, 2.0, 0.0);
+  builder.AddKeyScan(0, Motion(Pose2::Zero()),
+                     ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
+                                        {{0.05, -0.1}, {2.0, -0.1}},
+                                        {{2.1, 0.0}, {4.0, 0.35}}}),
+                     robot);
+  EXPECT_EQ(Segments().size(), 3u);
+}
+
 TEST_F(MapBuilderTest, PiecesOfAWallBehindAColumnAreOneFeature) {
   MapBuilder builder(&graph_, registry_, Options());
   const Pose2 robot(0.0, 2.0, 0.0);
@@ -429,7 +506,7 @@ TEST_F(MapBuilderTest, SecondLooksRaiseTheInformation) {
   }
 }
 
-TEST_F(MapBuilderTest, SecondLooksEndNearTheFloor) {
+TEST_F(MapBuilderTest, SecondLooksNeverPassTheFloor) {
   MapBuilderOptions options = Options();
   options.second_look_weight = 0.2;
   options.relation_floor_angle = DegToRad(0.2);
@@ -447,12 +524,14 @@ TEST_F(MapBuilderTest, SecondLooksEndNearTheFloor) {
     }
   }
   const double limit = 1.0 / (DegToRad(0.2) * DegToRad(0.2));
-  // One look tells at most 0.2 / (2 x (0.3 degrees)^2) of the angle.
-  const double look = 0.1 / (DegToRad(0.3) * DegToRad(0.3));
+  const double limit_position = 1.0 / (0.005 * 0.005);
   const std::vector<const Constraint*> relations = Relations();
   ASSERT_EQ(relations.size(), 6u);
   for (std::size_t i = 0; i < relations.size(); ++i) {
-    EXPECT_LE(relations[i]->information(2, 2), limit + 1.01 * look);
+    const Eigen::MatrixXd& information = relations[i]->information;
+    EXPECT_LE(information(2, 2), limit * (1.0 + 1e-9));
+    EXPECT_LE(information(0, 0), limit_position * (1.0 + 1e-9));
+    EXPECT_LE(information(1, 1), limit_position * (1.0 + 1e-9));
     EXPECT_EQ(relations[i]->information.norm(), before[i]);
   }
 }

@@ -194,6 +194,36 @@ TEST(OdometryRefinerTest, CovarianceIsInTheAxesOfTheKeyScan) {
   }
 }
 
+TEST(OdometryRefinerTest, CovarianceGrowsAlongACorridor) {
+  // What the walls leave open is as uncertain as all the odometry since the key
+  // scan together, however many scans have been matched on the way.
+  const Pose2 step(0.03, 0.0, 0.0);
+  const std::vector<Pose2> motions(9, step);
+  Laser laser = FullCircle();
+  laser.maximum_range = 8.0;
+  const OdometryRefinementOptions options = Options();
+  const std::vector<RefinedScan> refined = Refine(
+      Corridor(), Along(Pose2::Zero(), motions, motions), laser, options);
+  UncertainPose2 odometry;
+  double before = 0.0;
+  for (std::size_t i = 1; i < refined.size(); ++i) {
+    SCOPED_TRACE(i);
+    ASSERT_FALSE(refined[i].is_key);
+    ASSERT_FALSE(refined[i].odometry_only);
+    odometry =
+        Compose(odometry, {step, OdometryCovariance(step, options.noise)});
+    const double along = refined[i].since_key.covariance(0, 0);
+    EXPECT_GT(along, before);
+    EXPECT_GT(along, 0.5 * odometry.covariance(0, 0));
+    EXPECT_LT(along, 2.0 * odometry.covariance(0, 0));
+    before = along;
+  }
+  // Across and in heading the walls speak.
+  const Eigen::Matrix3d& last = refined.back().since_key.covariance;
+  EXPECT_LT(last(1, 1), 0.2 * odometry.covariance(1, 1));
+  EXPECT_LT(last(2, 2), 0.2 * odometry.covariance(2, 2));
+}
+
 TEST(OdometryRefinerTest, BackwardsGivenAsForwards) {
   // Some robots' odometry has no sign: each step is 0.8 m wrong.
   const std::vector<Pose2> motions(10, Pose2(-0.4, 0.0, 0.0));

@@ -261,6 +261,72 @@ TEST(ScanMatcherTest, EmptyReferenceLeavesTheGuess) {
   EXPECT_EQ(match.information, Eigen::Matrix3d::Zero());
 }
 
+TEST(ScanMatcherTest, EmptyReferenceAfterAFullOne) {
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
+  ScanMatcher matcher(Options());
+  matcher.SetReference(scan);
+  EXPECT_FALSE(matcher.empty());
+  EXPECT_GT(matcher.Refine(scan, Pose2::Zero(), MatchPrior()).inliers, 500);
+  matcher.Search(scan, Pose2::Zero(), 0.1, 0.1, nullptr);
+  matcher.SetReference({});
+  EXPECT_TRUE(matcher.empty());
+  EXPECT_EQ(matcher.Refine(scan, Pose2::Zero(), MatchPrior()).inliers, 0);
+  double score = -1.0;
+  EXPECT_EQ(matcher.Search(scan, Pose2::Zero(), 0.3, 0.1, &score),
+            Pose2::Zero());
+  EXPECT_EQ(score, 0.0);
+}
+
+TEST(ScanMatcherTest, SearchWithNothingToScoreReturnsTheCenter) {
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
+  const Pose2 center(100.0, 2.0, 0.5);
+  ScanMatcher matcher(Options());
+  double score = -1.0;
+  EXPECT_EQ(matcher.Search(scan, center, 0.45, 0.1, &score), center);
+  EXPECT_EQ(score, 0.0);
+  // A reference, but nowhere near.
+  matcher.SetReference(scan);
+  score = -1.0;
+  EXPECT_EQ(matcher.Search(scan, center, 0.45, 0.1, &score), center);
+  EXPECT_EQ(score, 0.0);
+}
+
+TEST(ScanMatcherTest, WildPointsInTheReferenceDoNotMatter) {
+  const std::vector<ScanPoint> reference =
+      Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1));
+  const Pose2 truth(-0.2, 0.3, 0.25);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
+  const Pose2 guess = truth + Pose2(0.1, -0.1, DegToRad(3.0));
+  ScanMatcher clean(Options());
+  clean.SetReference(reference);
+  const MatchResult expected = clean.Refine(scan, guess, MatchPrior());
+  EXPECT_GT(expected.inliers, 500);
+  const Eigen::Vector2d wilds[] = {
+      {-1e4, 0.0}, {1e4, 1e4}, {0.0, -1e9}, {1e300, -1e300}};
+  for (const Eigen::Vector2d& wild : wilds) {
+    for (const bool first : {true, false}) {
+      SCOPED_TRACE(::testing::Message() << wild.transpose() << " " << first);
+      std::vector<ScanPoint> points = reference;
+      ScanPoint point = reference.front();
+      point.position = wild;
+      points.insert(first ? points.begin() : points.end(), point);
+      ScanMatcher matcher(Options());
+      matcher.SetReference(points);
+      const MatchResult match = matcher.Refine(scan, guess, MatchPrior());
+      EXPECT_EQ(match.inliers, expected.inliers);
+      EXPECT_LT((match.pose - expected.pose).norm(), 1e-6);
+      double score = 0.0;
+      const Pose2 found =
+          matcher.Search(scan, guess, 0.3, DegToRad(6.0), &score);
+      EXPECT_LT(PositionError(found, truth), 0.15);
+      EXPECT_GT(score, 0.6);
+    }
+  }
+}
+
 TEST(ScanMatcherTest, EmptyScanLeavesTheGuess) {
   ScanMatcher matcher(Options());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));

@@ -135,6 +135,12 @@ std::string Format(const char* format, double value) {
   return text;
 }
 
+std::string FormatEstimate(const Estimate& estimate) {
+  if (!std::isfinite(estimate.value)) return "-";
+  return Format("%.4g", estimate.value) + " [" + Format("%.4g", estimate.low) +
+         ", " + Format("%.4g", estimate.high) + "]";
+}
+
 std::string ErrorName(const std::string& name) { return "error_" + name; }
 
 void AddCounts(const std::string& name, const MatchCount& count,
@@ -144,11 +150,12 @@ void AddCounts(const std::string& name, const MatchCount& count,
   values->emplace_back(name + "_false", count.wrong);
 }
 
-Values ValuesOf(const SyntheticRun& run, double oracle_error) {
+Values ValuesOf(const SyntheticRun& run, const OracleErrors& oracle) {
   Values values = {{ErrorName("start"), run.start_error},
                    {ErrorName("distances"), run.distances_error},
                    {ErrorName("structure"), run.final_error},
-                   {ErrorName("oracle"), oracle_error}};
+                   {ErrorName("oracle"), oracle.full},
+                   {ErrorName("oracle_weighted"), oracle.weighted}};
   AddCounts("virtual", run.match.all(), &values);
   AddCounts("lines", run.match.lines, &values);
   AddCounts("circles", run.match.circles, &values);
@@ -344,7 +351,7 @@ void RunCase(const Case& the_case, const ExperimentOptions& options,
   const SyntheticRun run = RunOnWorld(registry, run_options, &world);
   if (draws) draw("structure", the_case.world + ": with structure");
   world = make();
-  const double oracle = RunOracle(registry, run_options, &world);
+  const OracleErrors oracle = RunOracle(registry, run_options, &world);
   if (draws) {
     world = make();
     MakeSession(run_options, registry, world.graph.get())->SolveGlobal();
@@ -399,6 +406,14 @@ void RunS1(const ExperimentOptions& options, const Registry& registry,
            RatioEstimate(structure, oracle), 1.1, result);
   AddBound("error with structure / error with distances only",
            RatioEstimate(structure, distances), 0.6, result);
+  const auto weighted = Column(*result, name, ErrorName("oracle_weighted"));
+  result->notes.push_back(
+      "The oracle's structure has its full weight. Structure that was found "
+      "is "
+      "weighed by delta, which is below 1 for right structure, too: against "
+      "an "
+      "oracle whose structure is weighed the same way, the error is " +
+      FormatEstimate(RatioEstimate(structure, weighted)) + " times as large.");
   LinePlot plot =
       EvolutionPlot(jobs, {name},
                     "S1: error with structure, " +
@@ -407,6 +422,7 @@ void RunS1(const ExperimentOptions& options, const Registry& registry,
   plot.series[0].name = "with structure";
   AddLevel("distances only", Mean(distances), 1, &plot);
   AddLevel("true structure given", Mean(oracle), 2, &plot);
+  AddLevel("the same, weighed by delta", Mean(weighted), 3, &plot);
   result->plots.push_back(std::move(plot));
 }
 
@@ -831,12 +847,6 @@ const std::vector<std::pair<std::string, Runner>>& Runners() {
   return runners;
 }
 
-std::string FormatEstimate(const Estimate& estimate) {
-  if (!std::isfinite(estimate.value)) return "-";
-  return Format("%.4g", estimate.value) + " [" + Format("%.4g", estimate.low) +
-         ", " + Format("%.4g", estimate.high) + "]";
-}
-
 // Empty for what is not a number.
 std::string CsvNumber(double value) {
   return std::isfinite(value) ? Format("%.9g", value) : std::string();
@@ -921,8 +931,9 @@ SyntheticRun RunOnWorld(const Registry& registry,
   return run;
 }
 
-double RunOracle(const Registry& registry, const SyntheticRunOptions& options,
-                 SyntheticWorld* world) {
+OracleErrors RunOracle(const Registry& registry,
+                       const SyntheticRunOptions& options,
+                       SyntheticWorld* world) {
   const auto session = MakeSession(options, registry, world->graph.get());
   session->SolveGlobal();
   TrueStructureTolerances tolerances;
@@ -939,7 +950,17 @@ double RunOracle(const Registry& registry, const SyntheticRunOptions& options,
                                            RadToDeg(tolerances.relation)));
   AddTrueStructure(world->truth, tolerances, registry, world->graph.get());
   session->SolveGlobal();
-  return MeanPositionError(*world->graph, world->truth, options.with_outliers);
+  OracleErrors errors;
+  errors.full =
+      MeanPositionError(*world->graph, world->truth, options.with_outliers);
+  EmOptions em_options;
+  em_options.break_constraints = false;
+  EmOrchestrator em(world->graph.get(), session.get(), registry, Hierarchy(),
+                    em_options);
+  em.Run(options.stop);
+  errors.weighted =
+      MeanPositionError(*world->graph, world->truth, options.with_outliers);
+  return errors;
 }
 
 void AddConcentricity(Concentricity method, double sigma,

@@ -151,11 +151,21 @@ SyntheticRun RunOnWorld(const Registry& registry,
                         const SyntheticRunOptions& options,
                         SyntheticWorld* world);
 
+/// Mean position errors of an oracle, m.
+struct OracleErrors {
+  /// With the structure at its full weight.
+  double full = 0.0;
+  /// With the structure weighed by delta until that has settled, as found
+  /// structure is, but none broken.
+  double weighted = 0.0;
+};
+
 /// The oracle: solves the distances, then adds the true structure with the
 /// tolerances that the detectors would use (AddTrueStructure), and solves again
-/// with the same solver. Returns the mean position error, m.
-double RunOracle(const Registry& registry, const SyntheticRunOptions& options,
-                 SyntheticWorld* world);
+/// with the same solver.
+OracleErrors RunOracle(const Registry& registry,
+                       const SyntheticRunOptions& options,
+                       SyntheticWorld* world);
 
 /// How S6 says that circles have one centre.
 enum class Concentricity {

@@ -20,7 +20,7 @@ constexpr int kRight = 24;
 constexpr int kTop = 40;
 constexpr int kBottom = 56;
 // Words under the axis are written upwards and need more space.
-constexpr int kBottomWithWords = 124;
+constexpr int kBottomWithWords = 140;
 constexpr int kLegendRow = 20;
 
 std::string Number(double value, const char* format = "%.2f") {
@@ -107,7 +107,7 @@ class PlotWriter {
     y_.high += margin;
     if (y_.low < 0.0) y_.low -= margin;
     left_ = kLeft;
-    right_ = plot.width - kRight;
+    right_ = plot.width - kRight - static_cast<int>(LegendWidth(plot));
     top_ = top + kTop;
     bottom_ =
         top + plot.height - (plot.x_ticks.empty() ? kBottom : kBottomWithWords);
@@ -222,54 +222,27 @@ class PlotWriter {
             << (series.dashed ? " stroke-dasharray=\"7 4\"" : "") << "/>\n";
   }
 
-  // In the corner where the fewest points would be covered.
-  void WriteLegend(const std::vector<int>& colors) {
+  // Width of the legend; 0 when no line has a name.
+  static double LegendWidth(const LinePlot& plot) {
     std::size_t longest = 0;
-    int rows = 0;
-    for (const PlotSeries& series : plot_.series) {
-      if (series.name.empty()) continue;
+    for (const PlotSeries& series : plot.series) {
       longest = std::max(longest, series.name.size());
-      ++rows;
     }
-    if (rows == 0) return;
-    const double width = 46.0 + 6.8 * static_cast<double>(longest);
-    const double height = 8.0 + kLegendRow * rows;
-    const std::array<std::pair<double, double>, 4> corners = {
-        {{right_ - width - 8, top_ + 8.0},
-         {left_ + 8.0, top_ + 8.0},
-         {right_ - width - 8, bottom_ - height - 8},
-         {left_ + 8.0, bottom_ - height - 8}}};
-    std::size_t best = 0;
-    int fewest = std::numeric_limits<int>::max();
-    for (std::size_t corner = 0; corner < corners.size(); ++corner) {
-      int covered = 0;
-      for (const PlotSeries& series : plot_.series) {
-        for (std::size_t i = 0; i < series.y.size(); ++i) {
-          const double x = X(series.x[i]) - corners[corner].first;
-          const double y = Y(series.y[i]) - corners[corner].second;
-          if (x > -4 && x < width + 4 && y > -4 && y < height + 4) ++covered;
-        }
-      }
-      if (covered < fewest) {
-        fewest = covered;
-        best = corner;
-      }
-    }
-    const auto [x, y] = corners[best];
-    output_ << "<rect x=\"" << Number(x) << "\" y=\"" << Number(y)
-            << "\" width=\"" << Number(width) << "\" height=\""
-            << Number(height)
-            << "\" fill=\"white\" fill-opacity=\"0.85\" stroke=\"#bbbbbb\"/>\n";
+    return longest == 0 ? 0.0 : 40.0 + 6.8 * static_cast<double>(longest);
+  }
+
+  // To the right of the axes, where it covers nothing.
+  void WriteLegend(const std::vector<int>& colors) {
     int row = 0;
     for (std::size_t i = 0; i < colors.size(); ++i) {
       const PlotSeries& series = plot_.series[i];
       if (series.name.empty()) continue;
-      const double middle = y + 4 + kLegendRow * (row++ + 0.5);
-      Line(x + 8, middle, x + 34, middle,
+      const double middle = top_ + kLegendRow * (row++ + 0.5);
+      Line(right_ + 10, middle, right_ + 36, middle,
            std::string("stroke=\"") + Color(colors[i]) +
                "\" stroke-width=\"2\"" +
                (series.dashed ? " stroke-dasharray=\"7 4\"" : ""));
-      Text(x + 40, middle + 4, "start", 12, series.name);
+      Text(right_ + 42, middle + 4, "start", 12, series.name);
     }
   }
 

@@ -32,8 +32,8 @@ struct LinePlot {
   /// Words under the x axis in the place of numbers, where they belong; written
   /// upwards. Empty: numbers.
   std::vector<std::pair<double, std::string>> x_ticks;
-  /// px.
-  int width = 760;
+  /// px, with the legend to the right of the axes.
+  int width = 900;
   int height = 460;
 };
 

@@ -116,7 +116,10 @@ TEST_F(ExperimentsTest, OracleOnPerfectDistances) {
   world_options.distance_noise = 0.0;
   SyntheticWorld world = MakeSyntheticWorld("S1", world_options, 1, registry_);
   EXPECT_GT(MeanPositionError(*world.graph, world.truth), 0.03);
-  EXPECT_LT(RunOracle(registry_, SyntheticRunOptions(), &world), 1e-6);
+  const OracleErrors errors =
+      RunOracle(registry_, SyntheticRunOptions(), &world);
+  EXPECT_LT(errors.full, 1e-6);
+  EXPECT_LT(errors.weighted, 1e-6);
 }
 
 TEST_F(ExperimentsTest, StructureAndTheOracleBeatDistances) {
@@ -125,8 +128,10 @@ TEST_F(ExperimentsTest, StructureAndTheOracleBeatDistances) {
   SyntheticWorld world = MakeSyntheticWorld("S1", world_options, 3, registry_);
   const SyntheticRun run = RunOnWorld(registry_, options, &world);
   world = MakeSyntheticWorld("S1", world_options, 3, registry_);
-  const double oracle = RunOracle(registry_, options, &world);
-  EXPECT_LT(oracle, 0.6 * run.distances_error);
+  const OracleErrors oracle = RunOracle(registry_, options, &world);
+  EXPECT_LT(oracle.full, 0.6 * run.distances_error);
+  EXPECT_LT(oracle.weighted, 0.6 * run.distances_error);
+  EXPECT_NE(oracle.weighted, oracle.full);
   EXPECT_LT(run.final_error, run.distances_error);
   EXPECT_GT(run.match.all().found, 14);
   ASSERT_GE(run.phases.size(), 3u);

@@ -44,10 +44,10 @@ TEST(LinePlotTest, RoundTicks) {
 
 TEST(LinePlotTest, PutsPointsWhereTheyBelong) {
   const std::string svg = PlotSvg({TwoPoints()});
-  EXPECT_THAT(svg, HasSubstr("width=\"760\" height=\"460\""));
-  // The axes go from (74, 404) to (736, 40); y ends 5 % above the largest.
+  EXPECT_THAT(svg, HasSubstr("width=\"900\" height=\"460\""));
+  // The axes go from (74, 404) to (809, 40); y ends 5 % above the largest.
   EXPECT_THAT(svg,
-              HasSubstr("<polyline points=\"74.00,404.00 736.00,57.33 \""));
+              HasSubstr("<polyline points=\"74.00,404.00 809.00,57.33 \""));
   EXPECT_THAT(svg, HasSubstr("a &lt; b &amp; c"));
   EXPECT_THAT(svg, HasSubstr(">error, m</text>"));
   EXPECT_THAT(svg, HasSubstr(">0.2</text>"));
@@ -55,9 +55,9 @@ TEST(LinePlotTest, PutsPointsWhereTheyBelong) {
 
 TEST(LinePlotTest, PlotsStandBelowEachOther) {
   const std::string svg = PlotSvg({TwoPoints(), TwoPoints()});
-  EXPECT_THAT(svg, HasSubstr("width=\"760\" height=\"920\""));
-  EXPECT_THAT(svg, HasSubstr("74.00,404.00 736.00,57.33"));
-  EXPECT_THAT(svg, HasSubstr("74.00,864.00 736.00,517.33"));
+  EXPECT_THAT(svg, HasSubstr("width=\"900\" height=\"920\""));
+  EXPECT_THAT(svg, HasSubstr("74.00,404.00 809.00,57.33"));
+  EXPECT_THAT(svg, HasSubstr("74.00,864.00 809.00,517.33"));
 }
 
 TEST(LinePlotTest, WordsInPlaceOfNumbers) {
@@ -76,10 +76,10 @@ TEST(LinePlotTest, BandsDashesAndMarkers) {
   plot.series[0].dashed = true;
   plot.series[0].markers = true;
   const std::string svg = PlotSvg({plot});
-  EXPECT_THAT(svg, HasSubstr("<polygon points=\"74.00,369.33 736.00,57.33 "
-                             "736.00,92.00 74.00,404.00 \""));
+  EXPECT_THAT(svg, HasSubstr("<polygon points=\"74.00,369.33 809.00,57.33 "
+                             "809.00,92.00 74.00,404.00 \""));
   EXPECT_THAT(svg, HasSubstr("stroke-dasharray"));
-  EXPECT_THAT(svg, HasSubstr("<circle cx=\"736.00\" cy=\"57.33\""));
+  EXPECT_THAT(svg, HasSubstr("<circle cx=\"809.00\" cy=\"57.33\""));
 }
 
 TEST(LinePlotTest, PassesOverWhatIsNoNumber) {
@@ -89,7 +89,7 @@ TEST(LinePlotTest, PassesOverWhatIsNoNumber) {
   const std::string svg = PlotSvg({plot});
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
   EXPECT_THAT(svg, Not(HasSubstr("inf")));
-  EXPECT_THAT(svg, HasSubstr("74.00,404.00 736.00,57.33"));
+  EXPECT_THAT(svg, HasSubstr("74.00,404.00 809.00,57.33"));
 }
 
 TEST(LinePlotTest, EmptyAndConstantPlots) {

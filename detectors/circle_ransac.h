@@ -18,8 +18,8 @@ class CircleRansac : public StructureDetector {
   explicit CircleRansac(const CurveSearchOptions& options);
 
   const std::string& name() const override;
-  /// Three points are always on a circle.
-  int minimum_support() const override { return 4; }
+  /// As many as it takes to be found.
+  int minimum_support() const override { return options_.min_circle_points; }
   Transaction Detect(const Graph& graph, const Registry& registry,
                      const DetectionScope& scope) const override;
 

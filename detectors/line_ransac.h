@@ -20,8 +20,8 @@ class LineRansac : public StructureDetector {
   explicit LineRansac(const CurveSearchOptions& options);
 
   const std::string& name() const override;
-  /// Two points are always on a line.
-  int minimum_support() const override { return 3; }
+  /// As many as it takes to be found.
+  int minimum_support() const override { return options_.min_line_points; }
   Transaction Detect(const Graph& graph, const Registry& registry,
                      const DetectionScope& scope) const override;
 

@@ -501,9 +501,11 @@ TEST_F(CurveRansacTest, Parameters) {
                   .information(0, 0),
               100.0, 1e-9);
   EXPECT_EQ(registry_.GetDetector("line_ransac").make({})->minimum_support(),
-            3);
-  EXPECT_EQ(registry_.GetDetector("circle_ransac").make({})->minimum_support(),
             4);
+  EXPECT_EQ(registry_.GetDetector("circle_ransac")
+                .make({{"min_circle_points", 7.0}})
+                ->minimum_support(),
+            7);
   EXPECT_THROW(Detect("line_ransac", nullptr, 0, {{"sigma", 0.0}}), Error);
   EXPECT_THROW(Detect("line_ransac", nullptr, 0, {{"min_line_points", 2.0}}),
                Error);

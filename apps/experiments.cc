@@ -137,6 +137,9 @@ std::string Format(const char* format, double value) {
 
 std::string FormatEstimate(const Estimate& estimate) {
   if (!std::isfinite(estimate.value)) return "-";
+  if (estimate.low == estimate.value && estimate.high == estimate.value) {
+    return Format("%.4g", estimate.value);
+  }
   return Format("%.4g", estimate.value) + " [" + Format("%.4g", estimate.low) +
          ", " + Format("%.4g", estimate.high) + "]";
 }
@@ -408,12 +411,10 @@ void RunS1(const ExperimentOptions& options, const Registry& registry,
            RatioEstimate(structure, distances), 0.6, result);
   const auto weighted = Column(*result, name, ErrorName("oracle_weighted"));
   result->notes.push_back(
-      "The oracle's structure has its full weight. Structure that was found "
-      "is "
-      "weighed by delta, which is below 1 for right structure, too: against "
-      "an "
-      "oracle whose structure is weighed the same way, the error is " +
-      FormatEstimate(RatioEstimate(structure, weighted)) + " times as large.");
+      "The oracle's structure has its full weight. What was found is weighed "
+      "by delta, which is below 1 for right structure, too. Against an oracle "
+      "whose structure is weighed the same way the error is, as a ratio, " +
+      FormatEstimate(RatioEstimate(structure, weighted)) + ".");
   LinePlot plot =
       EvolutionPlot(jobs, {name},
                     "S1: error with structure, " +

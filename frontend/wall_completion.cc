@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <unordered_map>
 #include <utility>
 
@@ -26,7 +27,7 @@ struct Wall {
 // Walls by the index cells that they pass through.
 class WallIndex {
  public:
-  WallIndex(const Graph& graph, double reach) {
+  WallIndex(const Graph& graph, double reach) : reach_(reach) {
     for (const Feature* feature : graph.Features()) {
       if (feature->type->name != "segment" || feature->is_virtual) continue;
       Wall wall;
@@ -35,14 +36,19 @@ class WallIndex {
                         feature->parameters[2]);
       wall.begin = feature->extent_begin;
       wall.end = feature->extent_end;
-      walls_.push_back(wall);
+      Insert(wall);
     }
-    for (std::size_t i = 0; i < walls_.size(); ++i) {
-      const Wall& wall = walls_[i];
+    num_known_ = walls_.size();
+  }
+
+  void Insert(const Wall& wall) {
+    walls_.push_back(wall);
+    const int i = static_cast<int>(walls_.size()) - 1;
+    {
       const double c = std::cos(wall.pose[2]);
       const double s = std::sin(wall.pose[2]);
-      const double begin = wall.begin - reach;
-      const double end = wall.end + reach;
+      const double begin = wall.begin - reach_;
+      const double end = wall.end + reach_;
       const int steps =
           static_cast<int>(std::ceil((end - begin) / (0.5 * kIndexCell)));
       for (int k = 0; k <= steps; ++k) {
@@ -54,9 +60,7 @@ class WallIndex {
         for (int dy = -1; dy <= 1; ++dy) {
           for (int dx = -1; dx <= 1; ++dx) {
             std::vector<int>& cell = cells_[CellKey(column + dx, row + dy)];
-            if (cell.empty() || cell.back() != static_cast<int>(i)) {
-              cell.push_back(static_cast<int>(i));
-            }
+            if (cell.empty() || cell.back() != i) cell.push_back(i);
           }
         }
       }
@@ -82,8 +86,12 @@ class WallIndex {
   }
 
   const std::vector<Wall>& walls() const { return walls_; }
+  // The first so many are features of the graph, the others are new.
+  std::size_t num_known() const { return num_known_; }
 
  private:
+  const double reach_;
+  std::size_t num_known_ = 0;
   std::vector<Wall> walls_;
   std::unordered_map<std::int64_t, std::vector<int>> cells_;
 };
@@ -139,10 +147,38 @@ class Completion {
 
   Transaction Run(const std::vector<Scan>& scans,
                   const std::vector<Pose2>& poses) {
-    Gather(scans, poses);
+    const std::size_t count = std::min(scans.size(), poses.size());
+    // Stretch by stretch first: poses of one visit agree better with each
+    // other than with those of the next. Stretches overlap by half.
+    std::vector<std::size_t> half_way = {0};
+    double way = 0.0;
+    for (std::size_t i = 1; i < count; ++i) {
+      way += (poses[i] - poses[i - 1]).head<2>().norm();
+      if (way >= 0.5 * options_.stretch) {
+        half_way.push_back(i);
+        way = 0.0;
+      }
+    }
+    half_way.push_back(count);
+    for (std::size_t k = 0; k + 2 < half_way.size(); ++k) {
+      Look(scans, poses, half_way[k], half_way[k + 2], {1.0});
+    }
+    // Then all together, also what scans from poses less exact have smeared.
+    Look(scans, poses, 0, count, {1.0, 2.0});
+    return std::move(transaction_);
+  }
+
+ private:
+  void Look(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
+            std::size_t begin, std::size_t end,
+            std::initializer_list<double> smears) {
+    cells_.clear();
+    cell_of_.clear();
+    buckets_.clear();
+    Gather(scans, poses, begin, end);
     FillBuckets();
     FitDirections();
-    // The straightest surroundings first; ties by place.
+    // The straightest surroundings first; ties by the order of scans.
     std::vector<int> order;
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       if (cells_[i].straightness > 0.0) order.push_back(static_cast<int>(i));
@@ -152,21 +188,17 @@ class Completion {
                  ? cells_[a].straightness > cells_[b].straightness
                  : a < b;
     });
-    // Sharp walls first; then those that scans from poses less exact have
-    // smeared.
-    for (const double smear : {1.0, 2.0}) {
+    for (const double smear : smears) {
       scatter_ = smear * options_.max_scatter;
       for (int seed : order) {
         if (!cells_[seed].used) Grow(seed);
       }
     }
-    return std::move(transaction_);
   }
 
- private:
-  void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses) {
-    std::vector<ScanPoint> points;
-    for (std::size_t i = 0; i < scans.size() && i < poses.size(); ++i) {
+  void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
+              std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
       const Scan& scan = scans[i];
       const Pose2 laser = Compose(poses[i], scan.laser_offset);
       for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
@@ -370,7 +402,8 @@ class Completion {
 
   void Add(const Pose2& pose, double length, int returns) {
     std::vector<std::pair<double, const Wall*>> nearest;
-    for (const Wall& wall : index_.walls()) {
+    for (std::size_t k = 0; k < index_.num_known(); ++k) {
+      const Wall& wall = index_.walls()[k];
       const Eigen::Vector2d middle = TransformPoint(
           wall.pose, Eigen::Vector2d(0.5 * (wall.begin + wall.end), 0.0));
       nearest.emplace_back((middle - pose.head<2>()).norm(), &wall);
@@ -407,11 +440,12 @@ class Completion {
       constraint.source = "wall_completion";
       transaction_.AddConstraint(std::move(constraint));
     }
+    index_.Insert({id, pose, -0.5 * length, 0.5 * length});
   }
 
   const Registry& registry_;
   const WallCompletionOptions options_;
-  const WallIndex index_;
+  WallIndex index_;
   std::vector<Cell> cells_;
   std::unordered_map<std::int64_t, int> cell_of_;
   double scatter_ = 0.0;

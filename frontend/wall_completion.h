@@ -18,6 +18,9 @@ struct WallCompletionOptions {
   /// explained by it.
   double explained_offset = 0.12;
   double explained_gap = 0.3;
+  /// Way of the robot over which returns are looked at together before all are,
+  /// m.
+  double stretch = 20.0;
   /// Returns are gathered in cells of this size, m.
   double cell_size = 0.05;
   /// Neighbourhood in which a cell's direction is fitted, m.
@@ -28,11 +31,11 @@ struct WallCompletionOptions {
   double max_turn = DegToRad(15.0);
   /// Its ends swing by no more across it, as its direction is that uncertain
   /// (standard deviation over the whole length, m).
-  double max_end_sigma = 0.008;
+  double max_end_sigma = 0.0065;
   /// A wall is at least so long (m), is made of so many returns, has no gap
   /// longer than this (m), and returns on this share of its length (in pieces
   /// of 0.1 m).
-  double min_length = 0.8;
+  double min_length = 0.5;
   int min_returns = 20;
   double max_gap = 0.4;
   double min_coverage = 0.75;

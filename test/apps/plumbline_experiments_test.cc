@@ -1,0 +1,168 @@
+// plumbline_experiments, and the graphs of plumbline_simulate, as processes.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/apps/synthetic_worlds.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/graph_g2o.h>
+#include <sys/wait.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <string>
+
+namespace plumbline {
+namespace {
+
+using ::testing::HasSubstr;
+
+class ExperimentsBinaryTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (const char* name : {"plumbline_experiments", "plumbline_simulate"}) {
+      const std::string binary = std::string(PLUMBLINE_BIN_DIR) + "/" + name;
+      if (!std::ifstream(binary)) GTEST_SKIP() << binary << " is not built";
+    }
+    folder_ = ::testing::TempDir() + "experiments_" +
+              ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override {
+    if (!folder_.empty()) std::filesystem::remove_all(folder_);
+  }
+
+  std::string Read(const std::string& name) const {
+    std::ifstream file(folder_ + "/" + name);
+    return {std::istreambuf_iterator<char>(file),
+            std::istreambuf_iterator<char>()};
+  }
+
+  // Runs a command line with the binary's folder put before it.
+  static int Run(const std::string& command, std::string* output) {
+    const std::string line = "env -u PLUMBLINE_DATASETS " +
+                             std::string(PLUMBLINE_BIN_DIR) + "/" + command +
+                             " 2>&1";
+    FILE* const pipe = popen(line.c_str(), "r");
+    char buffer[4096];
+    std::size_t count;
+    output->clear();
+    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0) {
+      output->append(buffer, count);
+    }
+    const int status = pclose(pipe);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+  std::string folder_;
+};
+
+TEST_F(ExperimentsBinaryTest, WritesTablesAndFigures) {
+  std::string output;
+  ASSERT_EQ(Run("plumbline_experiments --experiment=S6 --trials=2 "
+                "--output_dir=" +
+                    folder_ + "/new/results",
+                &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("S6: Four ways"));
+  EXPECT_THAT(Read("new/results/S6.csv"), HasSubstr("S6,\"4: common centre"));
+  EXPECT_THAT(Read("new/results/S6_summary.txt"), HasSubstr("Paper:"));
+  EXPECT_THAT(Read("new/results/S6.svg"), HasSubstr("</svg>"));
+}
+
+TEST_F(ExperimentsBinaryTest, SameFilesWithOneAndTwoThreads) {
+  std::string output;
+  for (const std::string threads : {"1", "2"}) {
+    ASSERT_EQ(Run("plumbline_experiments --experiment=S1 --trials=2 "
+                  "--num_threads=" +
+                      threads + " --output_dir=" + folder_ + "/" + threads,
+                  &output),
+              0)
+        << output;
+  }
+  int files = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(folder_ + "/1")) {
+    const std::string name = entry.path().filename();
+    EXPECT_EQ(Read("1/" + name), Read("2/" + name)) << name;
+    ++files;
+  }
+  // Trials, two summaries, the plot and three maps.
+  EXPECT_EQ(files, 7);
+}
+
+TEST_F(ExperimentsBinaryTest, SaysWhatItSkips) {
+  std::string output;
+  EXPECT_EQ(Run("plumbline_experiments --experiment=R2 --output_dir=" + folder_,
+                &output),
+            0);
+  EXPECT_THAT(output, HasSubstr("skipped: PLUMBLINE_DATASETS is not set"));
+}
+
+TEST_F(ExperimentsBinaryTest, RefusesWrongFlags) {
+  std::string output;
+  const std::string good = " --output_dir=" + folder_;
+  EXPECT_EQ(Run("plumbline_experiments" + good, &output), 2);
+  EXPECT_THAT(output, HasSubstr("--experiment: it is missing"));
+  EXPECT_EQ(Run("plumbline_experiments --experiment=S9" + good, &output), 2);
+  EXPECT_THAT(output, HasSubstr("S1, S2, S3, S4, S5, S6, R1, R2 or all"));
+  EXPECT_EQ(Run("plumbline_experiments --experiment=S6", &output), 2);
+  EXPECT_THAT(output, HasSubstr("--output_dir"));
+  EXPECT_EQ(
+      Run("plumbline_experiments --experiment=S6 --trials=0" + good, &output),
+      1);
+  EXPECT_EQ(Run("plumbline_experiments --experiment=S6 --delta_mode=x" + good,
+                &output),
+            1);
+  EXPECT_EQ(
+      Run("plumbline_experiments --experiment=S6 --output_dir=/dev/null/x",
+          &output),
+      2);
+}
+
+TEST_F(ExperimentsBinaryTest, SimulateWritesTheGraphOfAWorld) {
+  std::string output;
+  const std::string command =
+      "plumbline_simulate --world=S4 --seed=9 --position_noise=0.1 "
+      "--outliers=3 --truth=" +
+      folder_ + "/truth.json --output=" + folder_;
+  ASSERT_EQ(Run(command + "/a.g2o", &output), 0) << output;
+  ASSERT_EQ(Run(command + "/b.g2o", &output), 0) << output;
+  EXPECT_EQ(Read("a.g2o"), Read("b.g2o"));
+  EXPECT_THAT(Read("truth.json"), HasSubstr("plumbline-synthetic-truth"));
+
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  Graph graph;
+  std::istringstream file(Read("a.g2o"));
+  ReadG2o(file, "a.g2o", registry, &graph);
+  SyntheticOptions options = DefaultSyntheticOptions("S4");
+  options.position_noise = 0.1;
+  options.outliers = 3;
+  const SyntheticWorld world = MakeSyntheticWorld("S4", options, 9, registry);
+  ASSERT_EQ(graph.num_features(), 575u);
+  ASSERT_EQ(graph.num_constraints(), world.graph->num_constraints());
+  for (FeatureId id = 0; id < 575; ++id) {
+    EXPECT_EQ(graph.GetFeature(id).parameters,
+              world.graph->GetFeature(id).parameters);
+  }
+  EXPECT_EQ(graph.GetConstraint(77).expected,
+            world.graph->GetConstraint(77).expected);
+}
+
+TEST_F(ExperimentsBinaryTest, SimulateRefusesWhatAGraphHasNot) {
+  std::string output;
+  EXPECT_EQ(Run("plumbline_simulate --world=S1 --output=" + folder_ +
+                    "/a.g2o --relations=" + folder_ + "/a.relations",
+                &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("no --relations"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ + "/a.g2o"));
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -26,6 +26,11 @@ OdometryRefiner::OdometryRefiner(const OdometryRefinementOptions& options)
 void OdometryRefiner::RebuildReference() {
   std::vector<ScanPoint> reference;
   for (const KeyScan& key : keys_) {
+    // Where odometry has jumped: nothing is in sight of both.
+    if ((key.pose - keys_.back().pose).head<2>().norm() >
+        2.0 * options_.points.usable_range) {
+      continue;
+    }
     const double c = std::cos(key.pose[2]);
     const double s = std::sin(key.pose[2]);
     for (const ScanPoint& point : key.points) {
@@ -74,9 +79,11 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
       ++wide_searches_;
       // Twice the distance: some odometry gives the way travelled backwards
       // as if it were forwards.
-      const Pose2 found = matcher_.Search(
-          points_, result.pose, options_.search_translation + 2.0 * distance,
-          options_.search_rotation + turn, nullptr);
+      const Pose2 found =
+          matcher_.Search(points_, result.pose,
+                          std::min(options_.search_translation + 2.0 * distance,
+                                   options_.max_search_translation),
+                          options_.search_rotation + turn, nullptr);
       MatchPrior overruled = prior;
       overruled.information.row(2).setZero();
       overruled.information.col(2).setZero();

@@ -65,6 +65,9 @@ struct OdometryRefinementOptions {
   /// the turn are added.
   double search_translation = 0.3;
   double search_rotation = DegToRad(6.0);
+  /// The translation's window is never larger, m: odometry that jumps by more
+  /// than a robot goes between two scans must not make the search endless.
+  double max_search_translation = 5.0;
   /// A turn between scans from which on the wide search is always made, rad.
   double search_turn = DegToRad(4.0);
 };

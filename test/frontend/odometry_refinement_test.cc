@@ -240,6 +240,28 @@ TEST(OdometryRefinerTest, BackwardsGivenAsForwards) {
   }
 }
 
+// A search as wide as the jump would not end.
+TEST(OdometryRefinerTest, OdometryThatJumps) {
+  for (const double jump : {50.0, 1e6, 1e9}) {
+    SCOPED_TRACE(jump);
+    std::vector<Pose2> motions(12, Pose2(0.1, 0.0, 0.0));
+    std::vector<Pose2> reported = motions;
+    reported[5] = Pose2(jump, -jump, 0.5);
+    const std::vector<RefinedScan> refined =
+        Refine(Hall(), Along(Pose2(-2.0, -1.5, 0.2), motions, reported),
+               FullCircle(), Options());
+    EXPECT_FALSE(refined[5].odometry_only);
+    EXPECT_TRUE(refined[6].odometry_only);
+    EXPECT_TRUE(refined[6].is_key);
+    // From the jump on as before.
+    EXPECT_FALSE(refined[8].odometry_only);
+    for (const RefinedScan& scan : refined) {
+      EXPECT_TRUE(scan.pose.allFinite());
+      EXPECT_TRUE(scan.since_key.covariance.allFinite());
+    }
+  }
+}
+
 TEST(OdometryRefinerTest, NoOdometryAtAll) {
   std::vector<Pose2> motions;
   for (int i = 0; i < 40; ++i) {

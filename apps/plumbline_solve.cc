@@ -17,9 +17,12 @@
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <functional>
@@ -297,6 +300,13 @@ int Run() {
     throw Error(FLAGS_output_dir, 0,
                 "cannot make the output folder" +
                     (error ? " (" + error.message() + ")" : std::string()),
+                "a folder that can be written to");
+  }
+  // Said before the work, not after it.
+  if (access(FLAGS_output_dir.c_str(), W_OK | X_OK) != 0) {
+    throw Error(FLAGS_output_dir, 0,
+                std::string("cannot write to the output folder (") +
+                    std::strerror(errno) + ")",
                 "a folder that can be written to");
   }
   return is_graph ? SolveGraph(&input, registry, begin)

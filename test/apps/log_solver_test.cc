@@ -1,0 +1,169 @@
+#include <gtest/gtest.h>
+#include <plumbline/apps/log_solver.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/graph_json.h>
+#include <plumbline/detectors/builtins.h>
+#include <plumbline/frontend/carmen_reader.h>
+
+#include <cmath>
+#include <cstddef>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+class LogSolverTest : public ::testing::Test {
+ protected:
+  LogSolverTest() { RegisterBuiltins(&registry_); }
+
+  // The first scans of the bundled log.
+  static Log Office(std::size_t scans) {
+    Log log = ReadCarmenLog(
+        std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/office.clf.gz", {});
+    if (log.scans.size() > scans) log.scans.resize(scans);
+    return log;
+  }
+
+  static std::string Json(const Graph& graph) {
+    std::ostringstream text;
+    WriteGraphJson(graph, text);
+    return text.str();
+  }
+
+  static void ExpectFinite(const std::vector<Pose2>& trajectory) {
+    for (const Pose2& pose : trajectory) {
+      ASSERT_TRUE(pose.allFinite()) << pose.transpose();
+    }
+  }
+
+  Registry registry_;
+};
+
+TEST_F(LogSolverTest, SolvesTheStartOfALog) {
+  const Log log = Office(250);
+  LogSolver solver(registry_, {});
+  std::size_t calls = 0;
+  const LogSolverResult result =
+      solver.Run(log, [&](std::size_t done, std::size_t all) {
+        EXPECT_EQ(done, ++calls);
+        EXPECT_EQ(all, 250u);
+      });
+  EXPECT_EQ(calls, 250u);
+  EXPECT_FALSE(result.interrupted);
+  ASSERT_EQ(result.trajectory.size(), 250u);
+  EXPECT_EQ(result.scan_seconds.size(), 250u);
+  ExpectFinite(result.trajectory);
+  EXPECT_GT(result.key_scans, 20);
+  EXPECT_LE(result.key_scans, 250);
+  EXPECT_GT(result.segment_matches, result.segments_created);
+  EXPECT_TRUE(result.em.converged);
+  EXPECT_TRUE(std::isfinite(result.final_cost.total()));
+  EXPECT_FALSE(solver.trace().empty());
+  // Directions at right angles were found.
+  EXPECT_GE(solver.graph().VirtualFeatures(1).size(), 2u);
+  std::set<std::string> relations;
+  for (const Constraint* constraint : solver.graph().Constraints()) {
+    relations.insert(constraint->type->name);
+  }
+  EXPECT_EQ(relations.count("segment_orientation"), 1u);
+  EXPECT_EQ(relations.count("orientation_orientation"), 1u);
+}
+
+TEST_F(LogSolverTest, WithoutStructureThereAreMeasurementsOnly) {
+  LogSolverOptions options;
+  options.structure = false;
+  // Not looked at.
+  options.hierarchy = "no_such_detector";
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(Office(150));
+  ASSERT_EQ(result.trajectory.size(), 150u);
+  ExpectFinite(result.trajectory);
+  EXPECT_EQ(result.final_cost.structure, 0.0);
+  EXPECT_LE(result.final_cost.measurement, result.initial_cost.measurement);
+  EXPECT_TRUE(result.em.converged);
+  for (const Feature* feature : solver.graph().Features()) {
+    EXPECT_FALSE(feature->is_virtual);
+  }
+  for (const Constraint* constraint : solver.graph().Constraints()) {
+    EXPECT_EQ(constraint->kind, ConstraintClass::kMeasurement);
+  }
+}
+
+TEST_F(LogSolverTest, SameBytesEveryTime) {
+  const Log log = Office(150);
+  LogSolver first(registry_, {});
+  LogSolver second(registry_, {});
+  const LogSolverResult a = first.Run(log);
+  const LogSolverResult b = second.Run(log);
+  EXPECT_EQ(a.trajectory, b.trajectory);
+  EXPECT_EQ(Json(first.graph()), Json(second.graph()));
+}
+
+TEST_F(LogSolverTest, StoppedOnTheWay) {
+  const Log log = Office(150);
+  for (const std::size_t scans : {0, 1, 70}) {
+    SCOPED_TRACE(scans);
+    LogSolver solver(registry_, {});
+    std::size_t done = 0;
+    const LogSolverResult result = solver.Run(
+        log, [&](std::size_t count, std::size_t) { done = count; },
+        [&] { return done >= scans; });
+    EXPECT_TRUE(result.interrupted);
+    EXPECT_EQ(result.trajectory.size(), scans);
+    EXPECT_EQ(result.scan_seconds.size(), scans);
+    ExpectFinite(result.trajectory);
+    if (scans == 70) {
+      EXPECT_GT(solver.graph().num_features(), 5u);
+    }
+  }
+}
+
+TEST_F(LogSolverTest, StructureAtTheEndOnly) {
+  LogSolverOptions options;
+  options.em_every = 0;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(Office(150));
+  EXPECT_EQ(result.trajectory.size(), 150u);
+  EXPECT_GE(solver.graph().VirtualFeatures(1).size(), 1u);
+  EXPECT_TRUE(result.em.converged);
+}
+
+TEST_F(LogSolverTest, EmptyLog) {
+  LogSolver solver(registry_, {});
+  const LogSolverResult result = solver.Run(Log());
+  EXPECT_TRUE(result.trajectory.empty());
+  EXPECT_EQ(result.final_cost.total(), 0.0);
+}
+
+TEST_F(LogSolverTest, ScansWithoutAnyReturn) {
+  Log log = Office(40);
+  for (Scan& scan : log.scans) {
+    scan.ranges.assign(scan.ranges.size(), 0.0f);
+  }
+  // One without beams at all.
+  log.scans[3].ranges.clear();
+  LogSolver solver(registry_, {});
+  const LogSolverResult result = solver.Run(log);
+  ASSERT_EQ(result.trajectory.size(), 40u);
+  // Odometry is all that there is.
+  for (std::size_t i = 0; i < 40; ++i) {
+    EXPECT_LT((result.trajectory[i] - log.scans[i].odometry).norm(), 1e-6) << i;
+  }
+}
+
+TEST_F(LogSolverTest, WrongHierarchyIsRefused) {
+  LogSolverOptions options;
+  options.hierarchy = "no_such_detector";
+  EXPECT_THROW(LogSolver(registry_, options), Error);
+  options.hierarchy = "orientation_relation/orientation_mixture";
+  EXPECT_THROW(LogSolver(registry_, options), Error);
+  options.hierarchy = "orientation_mixture";
+  options.detector_parameters["orientation_mixture"]["sigma_deg"] = -1.0;
+  EXPECT_THROW(LogSolver(registry_, options), Error);
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -1,0 +1,843 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/apps/relations.h>
+#include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/graph_json.h>
+#include <plumbline/detectors/builtins.h>
+#include <plumbline/frontend/input_stream.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+const std::set<std::string>& FilesOfALog() {
+  static const auto* files = new std::set<std::string>{
+      "em_trace.csv", "graph.g2o",    "map.json",      "map.png",
+      "map.svg",      "summary.json", "trajectory.tum"};
+  return *files;
+}
+
+std::set<std::string> FilesOfAGraph() {
+  std::set<std::string> files = FilesOfALog();
+  files.erase("trajectory.tum");
+  return files;
+}
+
+std::string ReadFile(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  EXPECT_TRUE(file) << path;
+  return {std::istreambuf_iterator<char>(file),
+          std::istreambuf_iterator<char>()};
+}
+
+std::vector<std::string> Lines(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  std::string line;
+  while (std::getline(stream, line)) lines.push_back(line);
+  return lines;
+}
+
+std::vector<std::string> Cells(const std::string& line) {
+  std::vector<std::string> cells(1);
+  for (const char c : line) {
+    if (c == ',') {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
+  return cells;
+}
+
+// Elements close in the order in which they opened, and there is one root.
+bool IsWellFormed(const std::string& xml) {
+  std::vector<std::string> open;
+  int roots = 0;
+  for (std::size_t i = xml.find('<'); i != std::string::npos;
+       i = xml.find('<', i)) {
+    if (xml.compare(i, 4, "<!--") == 0) {
+      i = xml.find("-->", i);
+      continue;
+    }
+    const std::size_t end = xml.find('>', i);
+    if (end == std::string::npos) return false;
+    const std::string tag = xml.substr(i + 1, end - i - 1);
+    i = end;
+    if (tag.empty() || tag.find('<') != std::string::npos) return false;
+    if (tag[0] == '?' || tag[0] == '!') continue;
+    if (std::count(tag.begin(), tag.end(), '"') % 2 != 0) return false;
+    if (tag[0] == '/') {
+      if (open.empty() || open.back() != tag.substr(1)) return false;
+      open.pop_back();
+      continue;
+    }
+    if (open.empty()) ++roots;
+    if (tag.back() != '/') {
+      open.push_back(tag.substr(0, tag.find_first_of(" \n\t")));
+    }
+  }
+  return open.empty() && roots == 1;
+}
+
+// Runs the binary in a folder of its own.
+class SolveTest : public ::testing::Test {
+ protected:
+  SolveTest() { RegisterBuiltins(&registry_); }
+
+  void SetUp() override {
+    binary_ = std::string(PLUMBLINE_BIN_DIR) + "/plumbline_solve";
+    if (!std::ifstream(binary_)) GTEST_SKIP() << binary_ << " is not built";
+    office_ = std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/office.clf.gz";
+    folder_ = fs::path(::testing::TempDir()) /
+              (std::string("solve_") +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override {
+    if (!folder_.empty() && !HasFailure()) fs::remove_all(folder_);
+  }
+
+  std::string Write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return (folder_ / name).string();
+  }
+
+  // Everything that the run prints goes to `output`.
+  int Run(const std::string& arguments, std::string* output) {
+    FILE* const pipe =
+        popen((binary_ + " " + arguments + " 2>&1").c_str(), "r");
+    char buffer[4096];
+    std::size_t count;
+    output->clear();
+    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0)
+      output->append(buffer, count);
+    const int status = pclose(pipe);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+  int Solve(const std::string& input, const std::string& out,
+            const std::string& flags, std::string* output) {
+    return Run("--input='" + input + "' --output_dir='" +
+                   (folder_ / out).string() + "' " + flags,
+               output);
+  }
+
+  // Names in an output folder; none when it was not made.
+  std::set<std::string> Files(const std::string& out) const {
+    std::set<std::string> names;
+    if (!fs::exists(folder_ / out)) return names;
+    for (const auto& entry : fs::directory_iterator(folder_ / out)) {
+      names.insert(entry.path().filename().string());
+    }
+    return names;
+  }
+
+  std::string Out(const std::string& out, const std::string& name) const {
+    return ReadFile(folder_ / out / name);
+  }
+
+  // The comments, parameters and first `scans` scans of the bundled log.
+  std::vector<std::string> OfficeLines(int scans) const {
+    InputStream input(office_);
+    std::vector<std::string> lines;
+    std::string_view line;
+    while (scans > 0 && input.ReadLine(&line)) {
+      lines.emplace_back(line);
+      if (line.substr(0, 6) == "FLASER") --scans;
+    }
+    return lines;
+  }
+
+  static std::string Join(const std::vector<std::string>& lines) {
+    std::string text;
+    for (const std::string& line : lines) text += line + "\n";
+    return text;
+  }
+
+  // What two runs have to agree on: files without the times in them.
+  std::map<std::string, std::string> Comparable(const std::string& out) const {
+    std::map<std::string, std::string> files;
+    for (const std::string& name : Files(out)) {
+      std::string text = Out(out, name);
+      if (name == "summary.json") {
+        auto json = nlohmann::json::parse(text);
+        json.erase("time_s");
+        json.erase("peak_memory_bytes");
+        json.erase("flags");
+        for (const char* key :
+             {"scan_seconds_second_tenth", "scan_seconds_last_tenth",
+              "scan_seconds_growth"}) {
+          json["frontend"].erase(key);
+        }
+        text = json.dump();
+      } else if (name == "em_trace.csv") {
+        const std::vector<std::string> lines = Lines(text);
+        const std::vector<std::string> header = Cells(lines.at(0));
+        const auto seconds =
+            std::find(header.begin(), header.end(), "seconds") - header.begin();
+        text.clear();
+        for (const std::string& line : lines) {
+          std::vector<std::string> cells = Cells(line);
+          cells.at(seconds).clear();
+          for (const std::string& cell : cells) text += cell + ",";
+          text += "\n";
+        }
+      }
+      files[name] = text;
+    }
+    return files;
+  }
+
+  void ExpectSame(const std::string& a, const std::string& b) const {
+    SCOPED_TRACE(a + " and " + b);
+    const auto first = Comparable(a);
+    const auto second = Comparable(b);
+    ASSERT_EQ(first.size(), second.size());
+    for (const auto& file : first) {
+      const auto other = second.find(file.first);
+      ASSERT_TRUE(other != second.end()) << file.first;
+      EXPECT_TRUE(file.second == other->second) << file.first << " differs";
+    }
+  }
+
+  // Every file is there, nothing else is, and all read back.
+  void CheckFiles(const std::string& out,
+                  const std::set<std::string>& expected) {
+    ASSERT_EQ(Files(out), expected);
+
+    const std::string json = Out(out, "map.json");
+    Graph map;
+    {
+      std::istringstream text(json);
+      ASSERT_NO_THROW(ReadGraphJson(text, "map.json", registry_, &map));
+    }
+    const std::string g2o = Out(out, "graph.g2o");
+    Graph graph;
+    std::istringstream text(g2o);
+    G2oFile file;
+    ASSERT_NO_THROW(file = ReadG2o(text, "graph.g2o", registry_, &graph));
+    std::ostringstream again;
+    WriteG2o(graph, &file, again);
+    EXPECT_TRUE(again.str() == g2o) << "graph.g2o changes when written again";
+    EXPECT_EQ(graph.num_features(), map.num_features());
+    EXPECT_EQ(graph.num_constraints(), map.num_constraints());
+
+    EXPECT_THAT(Out(out, "map.png"), StartsWith("\x89PNG\r\n\x1a\n"));
+    EXPECT_THAT(Out(out, "map.png"), HasSubstr("IEND"));
+    const std::string svg = Out(out, "map.svg");
+    EXPECT_THAT(svg, HasSubstr("<svg"));
+    EXPECT_TRUE(IsWellFormed(svg));
+
+    const auto summary = nlohmann::json::parse(Out(out, "summary.json"));
+    for (const char* key :
+         {"input", "seed", "flags", "counts", "cost", "em", "time_s",
+          "peak_memory_bytes", "orthogonality_deg", "version"}) {
+      EXPECT_TRUE(summary.contains(key)) << key;
+    }
+    for (const char* key : {"scans", "features", "constraints"}) {
+      EXPECT_TRUE(summary["counts"].contains(key)) << key;
+    }
+    for (const char* key : {"initial", "measurement", "structure", "total"}) {
+      EXPECT_TRUE(summary["cost"][key].is_number()) << key;
+    }
+    EXPECT_TRUE(summary["em"]["iterations"].is_number_integer());
+    EXPECT_TRUE(summary["em"]["converged"].is_boolean());
+    for (const char* key :
+         {"total", "parse", "frontend", "detect", "solve", "write"}) {
+      ASSERT_TRUE(summary["time_s"][key].is_number()) << key;
+      EXPECT_GE(summary["time_s"][key].get<double>(), 0.0) << key;
+    }
+    EXPECT_GT(summary["peak_memory_bytes"].get<double>(), 1e6);
+    std::size_t features = 0;
+    for (const auto& type : summary["counts"]["features"]) {
+      for (const auto& level : type) features += level.get<std::size_t>();
+    }
+    EXPECT_EQ(features, map.num_features());
+    std::size_t constraints = 0;
+    for (const auto& type : summary["counts"]["constraints"]) {
+      for (const char* key : {"measurement", "structure", "broken"}) {
+        constraints += type[key].get<std::size_t>();
+      }
+    }
+    EXPECT_EQ(constraints, map.num_constraints());
+
+    const std::vector<std::string> rows = Lines(Out(out, "em_trace.csv"));
+    ASSERT_GE(rows.size(), 1u);
+    EXPECT_THAT(rows[0],
+                StartsWith("iteration,phase,cost_measurement,cost_structure,"));
+    EXPECT_THAT(rows[0],
+                HasSubstr(",structure_constraints,broken_constraints,seconds,"
+                          "mean_position_error"));
+    for (const std::string& row : rows) {
+      EXPECT_EQ(Cells(row).size(), Cells(rows[0]).size()) << row;
+    }
+  }
+
+  nlohmann::json SummaryOf(const std::string& out) const {
+    return nlohmann::json::parse(Out(out, "summary.json"));
+  }
+
+  Registry registry_;
+  std::string binary_;
+  std::string office_;
+  fs::path folder_;
+};
+
+TEST_F(SolveTest, Office) {
+  std::string output;
+  ASSERT_EQ(Solve(office_, "out", "", &output), 0) << output;
+  EXPECT_EQ(output, "");
+  CheckFiles("out", FilesOfALog());
+  const auto summary = SummaryOf("out");
+  EXPECT_EQ(summary["input"], office_);
+  EXPECT_EQ(summary["seed"], 1);
+  EXPECT_EQ(summary["counts"]["scans"], 1408);
+  EXPECT_TRUE(summary["em"]["converged"].get<bool>());
+  EXPECT_TRUE(summary["flags"].contains("input"));
+  EXPECT_FALSE(summary["flags"].contains("delta_threshold"));
+  EXPECT_LT(summary["orthogonality_deg"].get<double>(), 1.0);
+  EXPECT_GT(Lines(Out("out", "em_trace.csv")).size(), 4u);
+
+  // A line a scan, with the log's own time stamps.
+  const std::vector<TimedPose> trajectory =
+      ReadTum((folder_ / "out/trajectory.tum").string());
+  ASSERT_EQ(trajectory.size(), 1408u);
+  EXPECT_EQ(Lines(Out("out", "trajectory.tum")).size(), 1408u);
+  std::size_t scan = 0;
+  for (const std::string& line : OfficeLines(1408)) {
+    if (line.compare(0, 6, "FLASER") != 0) continue;
+    std::istringstream fields(line);
+    std::vector<std::string> words{std::istream_iterator<std::string>(fields),
+                                   std::istream_iterator<std::string>()};
+    EXPECT_EQ(trajectory[scan].timestamp, std::stod(words[words.size() - 3]));
+    ++scan;
+  }
+  const RelationEvaluation evaluation = EvaluateRelations(
+      trajectory, ReadRelations(std::string(PLUMBLINE_SOURCE_DIR) +
+                                "/datasets/office.relations"));
+  EXPECT_TRUE(evaluation.unmatched.empty());
+  EXPECT_GT(evaluation.translation.count, 100u);
+  EXPECT_LT(evaluation.translation.mean, 0.08);
+  EXPECT_LT(evaluation.rotation_deg.mean, 0.8);
+
+  // The building's directions, and no others.
+  Graph map;
+  std::istringstream text(Out("out", "map.json"));
+  ReadGraphJson(text, "map.json", registry_, &map);
+  std::set<int> found;
+  for (const Feature* feature : map.Features()) {
+    if (feature->type->name != "orientation") continue;
+    bool is_true = false;
+    for (const int direction : {-60, 0, 30, 90}) {
+      if (std::abs(std::remainder(RadToDeg(feature->parameters[0]) - direction,
+                                  180.0)) < 1.5) {
+        is_true = true;
+        found.insert(direction);
+      }
+    }
+    EXPECT_TRUE(is_true) << RadToDeg(feature->parameters[0]);
+  }
+  EXPECT_EQ(found, (std::set<int>{-60, 0, 30, 90}));
+}
+
+// Whatever the number of threads.
+TEST_F(SolveTest, SameBytesEveryTime) {
+  const std::string log = Write("office.log", Join(OfficeLines(300)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "a", "", &output), 0) << output;
+  ASSERT_EQ(Solve(log, "b", "", &output), 0) << output;
+  ASSERT_EQ(Solve(log, "one", "--num_threads=1", &output), 0) << output;
+  ASSERT_EQ(Solve(log, "two", "--num_threads=2", &output), 0) << output;
+  EXPECT_EQ(Files("a"), FilesOfALog());
+  ExpectSame("a", "b");
+  ExpectSame("a", "one");
+  ExpectSame("a", "two");
+}
+
+TEST_F(SolveTest, WithoutStructure) {
+  const std::string log = Write("office.log", Join(OfficeLines(150)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "out", "--structure=false", &output), 0) << output;
+  CheckFiles("out", FilesOfALog());
+  const auto summary = SummaryOf("out");
+  EXPECT_EQ(summary["flags"]["structure"], false);
+  EXPECT_EQ(summary["cost"]["structure"], 0.0);
+  EXPECT_FALSE(summary["counts"]["features"].contains("orientation"));
+  for (const auto& type : summary["counts"]["constraints"]) {
+    EXPECT_EQ(type["structure"], 0);
+    EXPECT_EQ(type["broken"], 0);
+  }
+}
+
+TEST_F(SolveTest, WithoutOdometryRefinement) {
+  const std::string log = Write("office.log", Join(OfficeLines(150)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "out", "--odometry_refinement=false", &output), 0)
+      << output;
+  CheckFiles("out", FilesOfALog());
+  EXPECT_EQ(SummaryOf("out")["counts"]["scans"], 150);
+  EXPECT_EQ(SummaryOf("out")["flags"]["odometry_refinement"], false);
+}
+
+TEST_F(SolveTest, StandardInput) {
+  const std::string log = Write("office.log", Join(OfficeLines(60)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "file", "", &output), 0) << output;
+  ASSERT_EQ(Solve("-", "input", "<" + log, &output), 0) << output;
+  EXPECT_EQ(SummaryOf("input")["input"], "-");
+  EXPECT_TRUE(Out("file", "trajectory.tum") == Out("input", "trajectory.tum"));
+  EXPECT_TRUE(Out("file", "map.json") == Out("input", "map.json"));
+  EXPECT_TRUE(Out("file", "graph.g2o") == Out("input", "graph.g2o"));
+  // Packed.
+  ASSERT_EQ(std::system(("gzip -c " + log + " >" + log + ".gz").c_str()), 0);
+  ASSERT_EQ(Solve("-", "packed", "<" + log + ".gz", &output), 0) << output;
+  EXPECT_TRUE(Out("file", "map.json") == Out("packed", "map.json"));
+}
+
+// Once everything is read the signal is there already: nothing is solved, and
+// what was done, nothing, is written whole.
+TEST_F(SolveTest, InterruptedRunsWriteWhatTheyHave) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const std::string text = Join(OfficeLines(400));
+  // Longer than a pipe holds, so the binary is reading once it is written.
+  ASSERT_GT(text.size(), 200000u);
+  const std::string out = (folder_ / "out").string();
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    dup2(ends[0], STDIN_FILENO);
+    close(ends[0]);
+    close(ends[1]);
+    if (std::freopen("/dev/null", "w", stderr) == nullptr) _exit(99);
+    const std::string flag = "--output_dir=" + out;
+    execl(binary_.c_str(), binary_.c_str(), "--input=-", flag.c_str(),
+          static_cast<char*>(nullptr));
+    _exit(99);
+  }
+  close(ends[0]);
+  std::size_t written = 0;
+  while (written < text.size()) {
+    const ssize_t count =
+        write(ends[1], text.data() + written, text.size() - written);
+    ASSERT_GT(count, 0);
+    written += count;
+  }
+  kill(child, SIGINT);
+  close(ends[1]);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  const std::set<std::string> files = Files("out");
+  for (const std::string& name : FilesOfAGraph()) {
+    EXPECT_EQ(files.count(name), 1u) << name;
+  }
+  EXPECT_EQ(SummaryOf("out")["counts"]["scans"], 0);
+}
+
+const char kGraph[] =
+    "# two corners of a room, seen along a drive\n"
+    "VERTEX_SE2 10 0 0 0\n"
+    "VERTEX_SE2 11 1.1 0.1 0.05\n"
+    "VERTEX_SE2 12 2.1 0.1 1.6\n"
+    "VERTEX_UNKNOWN 99 1 2 3\n"
+    "FIX 10\n"
+    "EDGE_SE2 10 11 1 0 0 100 0 0 100 0 1000\n"
+    "EDGE_SE2 11 12 1 0 1.5707963 100 0 0 100 0 1000\n"
+    "EDGE_SE2 10 12 2 0 1.5707963 100 0 0 100 0 1000\n";
+
+TEST_F(SolveTest, Graph) {
+  const std::string input = Write("small.g2o", kGraph);
+  std::string output;
+  ASSERT_EQ(Solve(input, "out", "", &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("VERTEX_UNKNOWN"));
+  CheckFiles("out", FilesOfAGraph());
+  const auto summary = SummaryOf("out");
+  EXPECT_EQ(summary["counts"]["scans"], 0);
+  EXPECT_EQ(summary["counts"]["features"]["pose"]["0"], 3);
+  EXPECT_EQ(summary["counts"]["constraints"]["pose_pose"]["measurement"], 3);
+  EXPECT_GT(summary["cost"]["initial"].get<double>(), 1.0);
+  EXPECT_LT(summary["cost"]["total"].get<double>(), 1e-6);
+  EXPECT_TRUE(summary["orthogonality_deg"].is_null());
+  Graph map;
+  std::istringstream text(Out("out", "map.json"));
+  ReadGraphJson(text, "map.json", registry_, &map);
+  EXPECT_NEAR(map.GetFeature(1).parameters[0], 1.0, 1e-6);
+  EXPECT_NEAR(map.GetFeature(1).parameters[1], 0.0, 1e-6);
+  EXPECT_NEAR(map.GetFeature(2).parameters[0], 2.0, 1e-6);
+  EXPECT_NEAR(map.GetFeature(2).parameters[2], 0.5 * kPi, 1e-6);
+  // Ids and what is not known are kept.
+  EXPECT_THAT(Out("out", "graph.g2o"),
+              HasSubstr("\nVERTEX_UNKNOWN 99 1 2 3\n"));
+  EXPECT_THAT(Out("out", "graph.g2o"), HasSubstr("\nFIX 10\n"));
+
+  // The result is an input again, and stays as it is.
+  ASSERT_EQ(Solve((folder_ / "out/graph.g2o").string(), "again", "", &output),
+            0)
+      << output;
+  Graph stays;
+  std::istringstream again(Out("again", "map.json"));
+  ReadGraphJson(again, "map.json", registry_, &stays);
+  EXPECT_NEAR(stays.GetFeature(2).parameters[0], 2.0, 1e-6);
+}
+
+TEST_F(SolveTest, MapOfALogIsAGraphToSolve) {
+  const std::string log = Write("office.log", Join(OfficeLines(150)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "out", "", &output), 0) << output;
+  ASSERT_EQ(Solve((folder_ / "out/graph.g2o").string(), "again", "", &output),
+            0)
+      << output;
+  CheckFiles("again", FilesOfAGraph());
+  EXPECT_TRUE(SummaryOf("again")["em"]["converged"].get<bool>());
+  EXPECT_EQ(SummaryOf("again")["counts"]["features"]["segment"],
+            SummaryOf("out")["counts"]["features"]["segment"]);
+}
+
+TEST_F(SolveTest, ListPlugins) {
+  std::string output;
+  EXPECT_EQ(Run("--list_plugins", &output), 0);
+  for (const char* name :
+       {"segment", "orientation", "pose_pose", "segment_orientation", "frozen",
+        "geman_mcclure", "orientation_mixture", "orientation_relation"}) {
+    EXPECT_THAT(output, HasSubstr(std::string("  ") + name + " ")) << name;
+  }
+  EXPECT_EQ(Run("--list_plugins --plugins=no_such_plugin.so", &output), 2);
+  EXPECT_THAT(output, HasSubstr("no_such_plugin.so"));
+}
+
+TEST_F(SolveTest, Usage) {
+  std::string output;
+  EXPECT_EQ(Run("", &output), 1);
+  EXPECT_THAT(output, HasSubstr("--input"));
+  EXPECT_EQ(Run("--input=" + office_, &output), 1);
+  EXPECT_THAT(output, HasSubstr("--output_dir"));
+  EXPECT_EQ(Run("--help", &output), 0);
+  EXPECT_THAT(output, HasSubstr("Example:"));
+  EXPECT_THAT(output, HasSubstr("--delta_threshold"));
+}
+
+TEST_F(SolveTest, AbsurdFlags) {
+  const std::string log = Write("office.log", Join(OfficeLines(20)));
+  std::string output;
+  for (const char* flag :
+       {"--delta_threshold=2", "--delta_threshold=nan", "--delta_threshold=x",
+        "--delta_mode=sometimes", "--link_radius=0", "--link_radius=-1",
+        "--link_radius=inf", "--association_depth=0", "--em_every=-1",
+        "--em_max_iterations=0", "--num_threads=-1", "--num_threads=1e9",
+        "--seed=-1", "--angle_resolution=-5", "--usable_range=0",
+        "--structure_sigma_segment_orientation=0", "--refine=perhaps",
+        "--no_such_flag=1", "argument"}) {
+    EXPECT_EQ(Solve(log, "out", flag, &output), 1) << flag;
+    std::string name = flag;
+    name = name.substr(0, name.find('='));
+    while (name[0] == '-') name.erase(0, 1);
+    EXPECT_THAT(output, HasSubstr(name));
+  }
+  // Those that only a closer look shows to be wrong.
+  for (const char* flag :
+       {"--hierarchy=no_such_detector",
+        "--hierarchy=orientation_relation/orientation_mixture",
+        "--allowed_angles=x", "--allowed_angles=0,,90", "--allowed_angles=1e9",
+        "--allowed_angles=", "--angle_resolution=1e-6", "--laser_start_angle=x",
+        "--laser_step=nan", "--laser_step=0", "--laser_max_range=-1"}) {
+    EXPECT_EQ(Solve(log, "out", flag, &output), 2) << flag << "\n" << output;
+    EXPECT_THAT(output, HasSubstr(": expected ")) << flag;
+  }
+  EXPECT_TRUE(Files("out").empty());
+  // At the ends of their ranges.
+  for (const char* flag :
+       {"--delta_threshold=0", "--delta_threshold=1", "--link_radius=0.5",
+        "--em_every=1", "--em_max_iterations=1", "--num_threads=1024",
+        "--usable_range=0.5", "--seed=18446744073709551615",
+        "--association_depth=100", "--angle_resolution=90",
+        "--hierarchy=orientation_mixture", "--refine=none"}) {
+    EXPECT_EQ(Solve(log, "out", flag, &output), 0) << flag << "\n" << output;
+    CheckFiles("out", FilesOfALog());
+  }
+}
+
+TEST_F(SolveTest, InputThatIsNone) {
+  std::string output;
+  EXPECT_EQ(Solve((folder_ / "missing").string(), "out", "", &output), 2);
+  EXPECT_THAT(output, HasSubstr("missing: cannot be opened"));
+  EXPECT_EQ(Solve(folder_.string(), "out", "", &output), 2);
+  EXPECT_THAT(output, HasSubstr("directory"));
+  EXPECT_EQ(Solve(Write("empty", ""), "out", "", &output), 2);
+  EXPECT_THAT(output, HasSubstr("empty: "));
+  EXPECT_EQ(Solve("-", "out", "</dev/null", &output), 2);
+  EXPECT_THAT(output, HasSubstr("standard input: "));
+  EXPECT_EQ(Solve(Write("blank", "\n\n\n"), "out", "", &output), 2);
+  EXPECT_EQ(Solve(Write("text", "This is no log.\nNor is it a graph.\n"), "out",
+                  "", &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("text: "));
+
+  std::mt19937_64 random(5);
+  std::string bytes;
+  for (int i = 0; i < 300000; ++i) {
+    bytes += static_cast<char>(random() >> 56);
+  }
+  EXPECT_EQ(Solve(Write("random", bytes), "out", "", &output), 2);
+  EXPECT_THAT(output, HasSubstr("random: "));
+  EXPECT_LT(output.size(), 4000u);
+  // Starts like each of the packed formats.
+  for (const std::string& magic :
+       {std::string("\x1f\x8b\x08\x00", 4), std::string("BZh9")}) {
+    EXPECT_EQ(Solve(Write("packed", magic + bytes), "out", "", &output), 2);
+    EXPECT_THAT(output, HasSubstr("packed: "));
+  }
+  EXPECT_TRUE(Files("out").empty());
+}
+
+// What is there is solved, with a report.
+TEST_F(SolveTest, HalfAPackedLog) {
+  const std::string whole = ReadFile(office_);
+  const std::string input = Write("half.gz", whole.substr(0, 60000));
+  std::string output;
+  ASSERT_EQ(Solve(input, "out", "", &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("half.gz: "));
+  CheckFiles("out", FilesOfALog());
+  const auto summary = SummaryOf("out");
+  const int scans = summary["counts"]["scans"].get<int>();
+  EXPECT_GT(scans, 50);
+  EXPECT_LT(scans, 700);
+  EXPECT_EQ(Lines(Out("out", "trajectory.tum")).size(),
+            static_cast<std::size_t>(scans));
+  EXPECT_FALSE(summary["frontend"]["skipped"].empty());
+
+  // Half a graph is not one.
+  const std::string graph = Write("small.g2o", kGraph);
+  ASSERT_EQ(std::system(("gzip -f " + graph).c_str()), 0);
+  const std::string packed = ReadFile(graph + ".gz");
+  EXPECT_EQ(Solve(Write("half.g2o.gz", packed.substr(0, packed.size() - 12)),
+                  "graph", "", &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("half.g2o.gz: "));
+  EXPECT_TRUE(Files("graph").empty());
+}
+
+TEST_F(SolveTest, GarbledLines) {
+  std::vector<std::string> lines = OfficeLines(60);
+  std::size_t garbled = 0;
+  std::size_t index = 0;
+  for (std::string& line : lines) {
+    if (line.compare(0, 6, "FLASER") != 0) continue;
+    // The last one breaks off, as in a log whose disk was full.
+    if (index == 10 || index == 59) {
+      line.resize(line.size() / 2);
+    } else if (index == 20) {
+      line.replace(line.size() / 3, 4, "\x01\xff\x02x");
+    } else if (index == 30) {
+      line = "FLASER 999999999 1 2 3";
+    } else if (index == 40) {
+      line = "FLASER -5 1 2 3";
+    } else {
+      --garbled;
+    }
+    ++garbled;
+    ++index;
+  }
+  ASSERT_EQ(garbled, 5u);
+  lines.insert(lines.begin() + 50, std::string(100000, 'x'));
+  const std::string input = Write("garbled.log", Join(lines));
+  std::string output;
+  ASSERT_EQ(Solve(input, "out", "", &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("garbled.log: "));
+  EXPECT_THAT(output, HasSubstr("skipped"));
+  EXPECT_LT(output.size(), 4000u);
+  CheckFiles("out", FilesOfALog());
+  EXPECT_EQ(SummaryOf("out")["counts"]["scans"], 55);
+  EXPECT_EQ(Lines(Out("out", "trajectory.tum")).size(), 55u);
+}
+
+TEST_F(SolveTest, GarbledGraphs) {
+  std::string output;
+  const std::pair<const char*, const char*> cases[] = {
+      {"VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 7 1 0 0 1 0 0 1 0 1\n", ":2: "},
+      {"VERTEX_SE2 0 0 0\n", ":1: "},
+      {"VERTEX_SE2 0 0 0 nan\n", ":1: "},
+      {"VERTEX_SE2 0 0 0 0\nVERTEX_SE2 0 0 0 0\n", ":2: "},
+      {"VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 0 0 0\n"
+       "EDGE_SE2 0 1 1 0 0 -1 0 0 1 0 1\n",
+       ":3: "}};
+  for (const auto& entry : cases) {
+    EXPECT_EQ(Solve(Write("bad.g2o", entry.first), "out", "", &output), 2)
+        << entry.first;
+    EXPECT_THAT(output, HasSubstr(std::string("bad.g2o") + entry.second));
+    EXPECT_THAT(output, HasSubstr("expected"));
+  }
+  EXPECT_TRUE(Files("out").empty());
+}
+
+// The six fields of poses come after the beams.
+std::string Flaser(const std::vector<std::string>& ranges, double x,
+                   double stamp) {
+  std::ostringstream line;
+  line << "FLASER " << ranges.size();
+  for (const std::string& range : ranges) line << " " << range;
+  for (int i = 0; i < 2; ++i) line << " " << x << " 0 0";
+  line << " " << stamp << " host " << stamp;
+  return line.str();
+}
+
+// Ranges in a room of 8 m x 6 m from (x, 0) along +x.
+std::vector<std::string> RoomRanges(double x, int beams) {
+  std::vector<std::string> ranges;
+  for (int i = 0; i < beams; ++i) {
+    const double angle = DegToRad(-90.0 + i * (beams > 181 ? 0.5 : 1.0)) + 1e-6;
+    const double ahead =
+        std::cos(angle) > 1e-9 ? (4.0 - x) / std::cos(angle) : 1e9;
+    const double side = 3.0 / std::max(1e-9, std::abs(std::sin(angle)));
+    std::ostringstream range;
+    range.precision(3);
+    range << std::fixed << std::min(ahead, side);
+    ranges.push_back(range.str());
+  }
+  return ranges;
+}
+
+TEST_F(SolveTest, NoOdometryAtAll) {
+  std::string text;
+  for (int i = 0; i < 60; ++i) {
+    text += Flaser(RoomRanges(0.05 * i, 181), 0.0, 100.0 + i) + "\n";
+  }
+  std::string output;
+  ASSERT_EQ(Solve(Write("still.log", text), "out", "", &output), 0) << output;
+  CheckFiles("out", FilesOfALog());
+  // The scans tell the way.
+  const std::vector<TimedPose> trajectory =
+      ReadTum((folder_ / "out/trajectory.tum").string());
+  ASSERT_EQ(trajectory.size(), 60u);
+  EXPECT_NEAR(trajectory[59].pose[0] - trajectory[0].pose[0], 2.95, 0.05);
+  EXPECT_NEAR(trajectory[59].pose[1], 0.0, 0.05);
+
+  // Nor any pose.
+  std::string raw;
+  for (int i = 0; i < 30; ++i) {
+    const double x = 0.05 * i;
+    raw += "RAWLASER1 0 -1.5707963 3.1415927 0.0174533 20 0.01 0 181";
+    for (const std::string& range : RoomRanges(x, 181)) raw += " " + range;
+    raw += " 0 " + std::to_string(100.0 + i) + " host 0\n";
+  }
+  ASSERT_EQ(Solve(Write("raw.log", raw), "raw", "", &output), 0) << output;
+  CheckFiles("raw", FilesOfALog());
+  EXPECT_EQ(SummaryOf("raw")["counts"]["scans"], 30);
+}
+
+TEST_F(SolveTest, NumberOfBeamsChanges) {
+  std::string text;
+  for (int i = 0; i < 60; ++i) {
+    const double x = 0.05 * i;
+    text += Flaser(RoomRanges(x, i < 20   ? 181
+                                 : i < 40 ? 361
+                                          : 180),
+                   x, 100.0 + i) +
+            "\n";
+  }
+  std::string output;
+  ASSERT_EQ(Solve(Write("beams.log", text), "out", "", &output), 0) << output;
+  CheckFiles("out", FilesOfALog());
+  const std::vector<TimedPose> trajectory =
+      ReadTum((folder_ / "out/trajectory.tum").string());
+  ASSERT_EQ(trajectory.size(), 60u);
+  for (int i = 0; i < 60; ++i) {
+    EXPECT_NEAR(trajectory[i].pose[0], 0.05 * i, 0.05) << i;
+    EXPECT_NEAR(trajectory[i].pose[1], 0.0, 0.05) << i;
+  }
+}
+
+TEST_F(SolveTest, ScansWithoutBeams) {
+  std::string output;
+  std::string none, some;
+  for (int i = 0; i < 20; ++i) {
+    const double x = 0.1 * i;
+    none += Flaser({}, x, 100.0 + i) + "\n";
+    some += Flaser(i == 10 ? std::vector<std::string>() : RoomRanges(x, 181), x,
+                   100.0 + i) +
+            "\n";
+  }
+  // A log without any beam has no map.
+  EXPECT_EQ(Solve(Write("none.log", none), "none", "", &output), 2) << output;
+  EXPECT_THAT(output, HasSubstr("none.log: "));
+  EXPECT_TRUE(Files("none").empty());
+  ASSERT_EQ(Solve(Write("some.log", some), "some", "", &output), 0) << output;
+  CheckFiles("some", FilesOfALog());
+  // Nothing but readings out of range.
+  std::string far;
+  for (int i = 0; i < 20; ++i) {
+    far += Flaser(std::vector<std::string>(181, "81.83"), 0.1 * i, 100.0 + i) +
+           "\n";
+  }
+  ASSERT_EQ(Solve(Write("far.log", far), "far", "", &output), 0) << output;
+  CheckFiles("far", FilesOfALog());
+  EXPECT_NEAR(ReadTum((folder_ / "far/trajectory.tum").string())[19].pose[0],
+              1.9, 1e-6);
+}
+
+TEST_F(SolveTest, OutputThatCannotBeWritten) {
+  const std::string log = Write("office.log", Join(OfficeLines(20)));
+  std::string output;
+  // A file where the folder should be, and on the way to it.
+  Write("file", "mine");
+  EXPECT_EQ(Solve(log, "file", "", &output), 2);
+  EXPECT_THAT(output, HasSubstr("output folder"));
+  EXPECT_EQ(Solve(log, "file/out", "", &output), 2);
+  EXPECT_THAT(output, HasSubstr("output folder"));
+  EXPECT_EQ(ReadFile(folder_ / "file"), "mine");
+
+  // A folder in the place of a file.
+  fs::create_directories(folder_ / "out" / "map.json" / "sub");
+  EXPECT_EQ(Solve(log, "out", "", &output), 2);
+  EXPECT_THAT(output, HasSubstr("map.json"));
+  for (const std::string& name : Files("out")) {
+    EXPECT_EQ(FilesOfALog().count(name), 1u) << name;
+  }
+  EXPECT_EQ(Files("out").count("summary.json"), 0u);
+
+  // No right to write there: said before anything is solved.
+  if (geteuid() != 0) {
+    fs::create_directories(folder_ / "locked");
+    chmod((folder_ / "locked").c_str(), 0555);
+    EXPECT_EQ(Solve(log, "locked", "", &output), 2);
+    EXPECT_THAT(output, HasSubstr("locked"));
+    EXPECT_TRUE(Files("locked").empty());
+    chmod((folder_ / "locked").c_str(), 0755);
+  }
+
+  // Folders are made, and a second run replaces the files of the first.
+  ASSERT_EQ(Solve(log, "new/sub/folder", "", &output), 0) << output;
+  CheckFiles("new/sub/folder", FilesOfALog());
+  Write("new/sub/folder/map.svg", "old");
+  ASSERT_EQ(Solve(log, "new/sub/folder", "", &output), 0) << output;
+  CheckFiles("new/sub/folder", FilesOfALog());
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -1,0 +1,149 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/frontend/wall_completion.h>
+
+#include <cmath>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::MakeScan;
+using testing::Noise;
+using testing::Wall;
+
+class WallCompletionTest : public ::testing::Test {
+ protected:
+  WallCompletionTest() {
+    RegisterBuiltinRelations(&registry_);
+    // A corridor wall at y = 1 with a door 1 m wide at the origin, and a wall
+    // of the room behind it at y = 4.
+    world_ = {{{-10.0, 1.0}, {-0.5, 1.0}},
+              {{0.5, 1.0}, {10.0, 1.0}},
+              {{-3.0, 4.0}, {3.0, 4.0}}};
+    // The robot passes along the corridor. Five beams a scan go sideways: too
+    // few for a segment in any scan.
+    laser_.start_angle = DegToRad(80.0);
+    laser_.angle_step = DegToRad(5.0);
+    laser_.beams = 5;
+    laser_.sigma = 0.005;
+    Noise noise(3);
+    for (int i = 0; i <= 160; ++i) {
+      poses_.emplace_back(-4.0 + 0.05 * i, 0.0, 0.0);
+      scans_.push_back(MakeScan(world_, poses_.back(), laser_, &noise));
+    }
+    AddSegment({-5.0, 1.0, kPi}, 4.5);
+    AddSegment({5.0, 1.0, kPi}, 4.5);
+  }
+
+  void AddSegment(const Pose2& pose, double half_length) {
+    Transaction transaction;
+    Feature feature;
+    feature.type = &registry_.GetFeature("segment");
+    feature.parameters = {pose[0], pose[1], pose[2]};
+    feature.extent_begin = -half_length;
+    feature.extent_end = half_length;
+    transaction.AddFeature(feature);
+    graph_.Apply(std::move(transaction));
+  }
+
+  Registry registry_;
+  Graph graph_;
+  std::vector<Wall> world_;
+  testing::Laser laser_;
+  std::vector<Scan> scans_;
+  std::vector<Pose2> poses_;
+  WallCompletionOptions options_;
+};
+
+TEST_F(WallCompletionTest, FindsTheWallSeenThroughTheDoor) {
+  const Transaction walls =
+      FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_);
+  ASSERT_EQ(walls.added_features().size(), 1u);
+  const Feature& wall = walls.added_features().front();
+  EXPECT_EQ(wall.type->name, "segment");
+  EXPECT_EQ(wall.level, 0);
+  EXPECT_EQ(wall.source, "wall_completion");
+  EXPECT_NEAR(wall.parameters[1], 4.0, 0.01);
+  // Seen from below: the laser is on the left of its direction.
+  EXPECT_NEAR(RadToDeg(NormalizeAngle(wall.parameters[2] - kPi)), 0.0, 0.5);
+  EXPECT_GT(wall.extent_end - wall.extent_begin, 0.9);
+  EXPECT_LT(wall.extent_end - wall.extent_begin, 2.5);
+  // Bound to both walls of the map, by relations that hold as they stand.
+  ASSERT_EQ(walls.added_constraints().size(), 2u);
+  for (const Constraint& constraint : walls.added_constraints()) {
+    EXPECT_EQ(constraint.kind, ConstraintClass::kMeasurement);
+    const Feature& other = graph_.GetFeature(constraint.features[0]);
+    const Pose2 expected = Between(
+        Pose2(other.parameters[0], other.parameters[1], other.parameters[2]),
+        Pose2(wall.parameters[0], wall.parameters[1], wall.parameters[2]));
+    EXPECT_NEAR((constraint.expected - expected).norm(), 0.0, 1e-12);
+  }
+}
+
+TEST_F(WallCompletionTest, FindsNothingTwice) {
+  graph_.Apply(FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_));
+  EXPECT_TRUE(
+      FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_).empty());
+}
+
+TEST_F(WallCompletionTest, AWallFromTwoVisitsThatDisagreeIsFoundOnce) {
+  // The second visit's poses are 10 cm off: its returns make another line, but
+  // so near that the first explains it.
+  const std::size_t n = scans_.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    scans_.push_back(scans_[i]);
+    poses_.push_back(poses_[i] + Pose2(0.0, 0.1, 0.0));
+  }
+  const Transaction walls =
+      FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_);
+  EXPECT_EQ(walls.added_features().size(), 1u);
+}
+
+TEST_F(WallCompletionTest, ScatteredReturnsAreNoWall) {
+  Noise noise(5);
+  std::vector<Scan> scans;
+  for (const Pose2& pose : poses_) {
+    Scan scan = MakeScan(world_, pose, laser_);
+    for (float& range : scan.ranges) {
+      range = static_cast<float>(std::abs(4.0 + noise.Normal(1.0)));
+    }
+    scans.push_back(scan);
+  }
+  EXPECT_TRUE(
+      FindGlimpsedWalls(graph_, registry_, scans, poses_, options_).empty());
+}
+
+TEST_F(WallCompletionTest, NothingComesOfNothing) {
+  EXPECT_TRUE(FindGlimpsedWalls(graph_, registry_, {}, {}, options_).empty());
+  Graph empty;
+  // Without a wall in the map there is nothing to bind one to.
+  EXPECT_TRUE(FindGlimpsedWalls(empty, registry_, scans_, poses_, options_)
+                  .added_constraints()
+                  .empty());
+}
+
+TEST_F(WallCompletionTest, SameFarFromTheOrigin) {
+  const Pose2 far(10000.0, -10000.0, 0.0);
+  Graph graph;
+  for (const Feature* feature : graph_.Features()) {
+    Transaction transaction;
+    Feature moved = *feature;
+    moved.parameters[0] += far[0];
+    moved.parameters[1] += far[1];
+    transaction.AddFeature(moved);
+    graph.Apply(std::move(transaction));
+  }
+  std::vector<Pose2> poses;
+  for (const Pose2& pose : poses_) poses.push_back(pose + far);
+  const Transaction walls =
+      FindGlimpsedWalls(graph, registry_, scans_, poses, options_);
+  ASSERT_EQ(walls.added_features().size(), 1u);
+  EXPECT_NEAR(walls.added_features().front().parameters[1], -9996.0, 0.01);
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -244,7 +244,8 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   }
   summary.parse_seconds = Now() - parse_begin;
   for (const auto& tag : outcome.g2o.unknown_tags) {
-    std::fprintf(stderr, "%s: %d lines with the unknown tag %s kept as they are\n",
+    std::fprintf(stderr,
+                 "%s: %d lines with the unknown tag %s kept as they are\n",
                  input->name().c_str(), tag.second, tag.first.c_str());
   }
 
@@ -258,17 +259,16 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
     // the graph holds.
     const bool has_directions = raw.count("segment") + raw.count("line") > 0;
     if (!FLAGS_hierarchy.empty() || has_directions) {
-      hierarchy = MakeHierarchy(options.hierarchy, registry,
-                                {raw.begin(), raw.end()},
-                                options.detector_parameters);
+      hierarchy =
+          MakeHierarchy(options.hierarchy, registry, {raw.begin(), raw.end()},
+                        options.detector_parameters);
     }
   }
   SolverSession session(&graph, registry, options.session);
   outcome.initial_cost = session.Cost();
   EmOrchestrator em(&graph, &session, registry, std::move(hierarchy),
                     options.em);
-  em.SetTrace(
-      [&](const EmPhase& phase) { outcome.trace.push_back(phase); });
+  em.SetTrace([&](const EmPhase& phase) { outcome.trace.push_back(phase); });
   outcome.em = em.Run(InterruptRequested);
   outcome.final_cost = session.Cost();
   outcome.title = std::filesystem::path(input->name()).filename().string();

@@ -1,6 +1,5 @@
-#include <plumbline/apps/solve_flags.h>
-
 #include <gflags/gflags.h>
+#include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/error.h>
 
 #include <charconv>
@@ -9,9 +8,10 @@
 #include <string>
 #include <thread>
 
-DEFINE_string(input, "",
-              "Robot log (CARMEN) or graph (g2o), plain, gzip or bzip2; - reads "
-              "standard input");
+DEFINE_string(
+    input, "",
+    "Robot log (CARMEN) or graph (g2o), plain, gzip or bzip2; - reads "
+    "standard input");
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 
 DEFINE_bool(structure, true, "Find structure; false: measurements only");
@@ -64,8 +64,7 @@ PLUMBLINE_FLAG_RANGE(usable_range, 0.5, 10000.0);
 DEFINE_string(laser_start_angle, "",
               "Direction of the first beam, degrees; empty: as the log says or "
               "by the number of beams");
-DEFINE_string(laser_step, "",
-              "Angle between beams, degrees; empty: as above");
+DEFINE_string(laser_step, "", "Angle between beams, degrees; empty: as above");
 DEFINE_string(laser_max_range, "",
               "Readings from here on are no return, m; empty: as the log says");
 

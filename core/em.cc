@@ -342,6 +342,17 @@ struct EmOrchestrator::Impl final : public GraphListener {
 
   bool MayBeProposed(const Constraint& constraint,
                      const std::vector<const Feature*>& features) {
+    const HypothesisKey key = KeyOf(constraint, features);
+    if (key.first != kNoId) {
+      const auto entries = memory.find(key);
+      int breaks = 0;
+      if (entries != memory.end()) {
+        for (const BrokenHypothesis& broken : entries->second) {
+          breaks += broken.breaks;
+        }
+      }
+      if (breaks >= options.max_breaks_per_feature) return false;
+    }
     const BrokenHypothesis* hypothesis = FindBroken(constraint, features);
     if (hypothesis == nullptr) return true;
     if (hypothesis->breaks >= options.max_breaks) return false;

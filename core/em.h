@@ -44,6 +44,10 @@ struct EmOptions {
   double reproposal_sigmas = 1.0;
   /// ... but not after it was broken so often: this bounds the loop.
   int max_breaks = 3;
+  /// Nor when a raw feature has had so many hypotheses of one relation broken,
+  /// whatever their values: a virtual feature that comes back a little to the
+  /// side each time would otherwise never be the same hypothesis.
+  int max_breaks_per_feature = 10;
   std::uint64_t seed = 1;
 };
 
@@ -92,7 +96,8 @@ struct EmReport {
 /// under other ids), with its error once the map had relaxed without it. A
 /// hypothesis is let in again only as reproposal_sigmas and max_breaks say, and
 /// a virtual feature only with the minimum support left. Every hypothesis is
-/// thus added at most max_breaks times, so the loop ends.
+/// thus added at most max_breaks times, and a raw feature has at most
+/// max_breaks_per_feature of them broken per relation, so the loop ends.
 class EmOrchestrator {
  public:
   /// Pointers are not owned and must outlive the orchestrator.

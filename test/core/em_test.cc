@@ -437,6 +437,36 @@ TEST_F(EmTest, AStubbornDetectorIsNotBelievedForEver) {
   EXPECT_EQ(most, 0);
 }
 
+TEST_F(EmTest, AWanderingDetectorIsNotBelievedForEver) {
+  // The same wrong parallelism, each time by an orientation proposed somewhere
+  // else: never the same hypothesis, and broken every time.
+  const FeatureId a = AddSegment(0.0);
+  const FeatureId b = AddSegment(8.0);
+  int calls = 0;
+  Add(0, "wandering", 2,
+      [&](const Graph& graph, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        if (HasLive(graph, a, "segment_orientation")) return transaction;
+        const FeatureId orientation = transaction.AddFeature(
+            Orientation(registry, DegToRad(20.0 + 2.0 * calls++)));
+        for (const FeatureId id : {a, b}) {
+          transaction.AddConstraint(Structure(registry, "segment_orientation",
+                                              id, orientation, 0.0, 0.5));
+        }
+        return transaction;
+      });
+  EmOptions options;
+  options.max_breaks_per_feature = 4;
+  options.max_iterations = 50;
+  const EmReport report = Make(options).Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_GE(calls, 4);
+  EXPECT_LT(report.iterations, 12);
+  EXPECT_EQ(Live(), 0);
+  EXPECT_NEAR(Direction(a), 0.0, 1e-5);
+  EXPECT_NEAR(Direction(b), 8.0, 1e-5);
+}
+
 TEST_F(EmTest, AHypothesisThatBecomesTrueIsBelievedAgain) {
   for (int i = 0; i < 5; ++i) AddSegment(0.0);
   const FeatureId wall = AddSegment(5.0);

@@ -1,4 +1,5 @@
 #include <plumbline/apps/line_plot.h>
+#include <plumbline/apps/xml_text.h>
 #include <plumbline/core/error.h>
 
 #include <algorithm>
@@ -33,29 +34,6 @@ std::string Number(double value, const char* format = "%.2f") {
 std::string Label(double value) {
   if (std::abs(value) < 1e-12) return "0";
   return Number(value, "%.6g");
-}
-
-std::string Escaped(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
 }
 
 struct Range {
@@ -159,7 +137,7 @@ class PlotWriter {
       output_ << " transform=\"rotate(" << Number(turn, "%g") << ' '
               << Number(x) << ' ' << Number(y) << ")\"";
     }
-    output_ << '>' << Escaped(text) << "</text>\n";
+    output_ << '>' << EscapeXml(text) << "</text>\n";
   }
 
   void WriteAxes() {

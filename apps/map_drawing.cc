@@ -1,6 +1,7 @@
 #include <cairo-svg.h>
 #include <cairo.h>
 #include <plumbline/apps/map_drawing.h>
+#include <plumbline/apps/xml_text.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/registry.h>
@@ -510,26 +511,6 @@ void Draw(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   DrawCircles(cr, drawing, layout);
   DrawFrame(cr, drawing, layout);
   CheckStatus(cairo_status(cr));
-}
-
-std::string EscapeXml(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
 }
 
 /// Cairo's page in px put into an outer viewBox in metres: cairo itself rounds

@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace plumbline {
@@ -62,74 +61,7 @@ double DistanceTo(const Feature& feature, const Eigen::Vector2d& point) {
 
 MapBuilder::MapBuilder(Graph* graph, const Registry& registry,
                        const MapBuilderOptions& options)
-    : graph_(graph), registry_(registry), options_(options) {}
-
-void MapBuilder::Predict(const UncertainPose2& motion) {
-  const Eigen::Matrix3d j1 = ComposeJacobianFirst(robot_, motion.mean);
-  const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
-  const Eigen::Matrix3d added = j2 * motion.covariance * j2.transpose();
-  robot_ = Compose(robot_, motion.mean);
-  for (auto& link : links_) {
-    Eigen::Matrix3d& covariance = link.second.covariance;
-    covariance = Symmetric(j1 * covariance * j1.transpose() + added);
-  }
-  CutLinks();
-}
-
-void MapBuilder::CutLinks() {
-  const Eigen::Vector2d position = robot_.head<2>();
-  // Where no wall was recognized for the whole radius the best link stays, far
-  // as it is: without any the map would fall apart.
-  FeatureId best = kNoId;
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const auto& link : links_) {
-    const double trace = link.second.covariance.trace();
-    if (graph_->FindFeature(link.first) != nullptr && trace < smallest) {
-      smallest = trace;
-      best = link.first;
-    }
-  }
-  std::vector<FeatureId> far;
-  for (const auto& link : links_) {
-    const Feature* feature = graph_->FindFeature(link.first);
-    if (feature == nullptr ||
-        DistanceTo(*feature, position) > options_.link_radius) {
-      far.push_back(link.first);
-    }
-  }
-  const bool keep_best = far.size() == links_.size();
-  for (const FeatureId id : far) {
-    if (keep_best && id == best) continue;
-    links_.erase(id);
-  }
-}
-
-std::vector<FeatureId> MapBuilder::Neighborhood(int depth) const {
-  std::map<FeatureId, int> distance;
-  std::vector<FeatureId> frontier;
-  for (const auto& link : links_) {
-    distance.emplace(link.first, 1);
-    frontier.push_back(link.first);
-  }
-  for (int d = 2; d <= depth; ++d) {
-    std::vector<FeatureId> next;
-    for (FeatureId id : frontier) {
-      for (ConstraintId cid : graph_->ConstraintsOf(id)) {
-        const Constraint& constraint = graph_->GetConstraint(cid);
-        if (constraint.kind != ConstraintClass::kMeasurement) continue;
-        for (FeatureId other : constraint.features) {
-          if (other == robot_id_) continue;
-          if (distance.emplace(other, d).second) next.push_back(other);
-        }
-      }
-    }
-    frontier = std::move(next);
-  }
-  if (robot_id_ != kNoId) distance.emplace(robot_id_, 0);
-  std::vector<FeatureId> ids;
-  for (const auto& entry : distance) ids.push_back(entry.first);
-  return ids;
-}
+    : graph_(graph), registry_(registry), options_(options), robot_(graph) {}
 
 void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
                             const std::vector<SegmentObservation>& observations,
@@ -137,26 +69,20 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
   KeyScanRecord record;
   record.scan = scan;
   if (records_.empty()) {
-    robot_ = start;
+    robot_.set_pose(start);
   } else {
     record.motion = motion;
-    Predict(motion);
+    robot_.Predict(motion);
+    robot_.Cut(options_.link_radius, [this](const Feature& feature) {
+      return DistanceTo(feature, robot_.pose().head<2>());
+    });
   }
 
   // What may be seen: features near in the graph and within sight.
   std::vector<AssociationCandidate> candidates;
-  Eigen::Matrix3d widest = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d tightest = Eigen::Matrix3d::Identity() * 1e6;
-  for (const auto& link : links_) {
-    if (link.second.covariance.trace() > widest.trace()) {
-      widest = link.second.covariance;
-    }
-    if (link.second.covariance.trace() < tightest.trace()) {
-      tightest = link.second.covariance;
-    }
-  }
+  const Eigen::Matrix3d widest = robot_.Widest();
   for (FeatureId id : Neighborhood(options_.association_depth)) {
-    if (id == robot_id_) continue;
+    if (id == robot_.id()) continue;
     const Feature& feature = graph_->GetFeature(id);
     if (feature.is_virtual) continue;
     AssociationCandidate candidate;
@@ -164,22 +90,22 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
     candidate.pose = PoseOf(feature);
     candidate.extent_begin = feature.extent_begin;
     candidate.extent_end = feature.extent_end;
-    const auto link = links_.find(id);
+    const auto link = robot_.links().find(id);
     candidate.robot_covariance =
-        link != links_.end() ? link->second.covariance : widest;
+        link != robot_.links().end() ? link->second : widest;
     candidates.push_back(candidate);
   }
 
   std::vector<Association> associations =
-      Associate(robot_, observations, candidates, options_.association);
+      Associate(robot_.pose(), observations, candidates, options_.association);
   if (!associations.empty()) {
-    const Eigen::Matrix3d prior = tightest.inverse();
+    const Eigen::Matrix3d prior = robot_.Tightest().inverse();
     // Again from the corrected pose: what was at the edge of the gates may be
     // in now, or out.
     for (int round = 0; round < 2; ++round) {
       const Localization localized =
-          LocalizeRobot(robot_, prior, observations, candidates, associations,
-                        options_.association);
+          LocalizeRobot(robot_.pose(), prior, observations, candidates,
+                        associations, options_.association);
       if (round == 0) {
         std::vector<Association> again = Associate(
             localized.pose, observations, candidates, options_.association);
@@ -188,21 +114,11 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
           continue;
         }
       }
-      robot_ = localized.pose;
-      for (auto& link : links_) {
-        Eigen::Matrix3d& covariance = link.second.covariance;
-        covariance =
-            Symmetric((covariance.inverse() + localized.observation_information)
-                          .inverse());
-      }
+      std::vector<FeatureId> seen;
       for (const Association& association : associations) {
-        const FeatureId id = candidates[association.candidate].feature;
-        const auto inserted = links_.emplace(id, Link());
-        if (inserted.second) {
-          inserted.first->second.covariance = Symmetric(
-              (widest.inverse() + localized.observation_information).inverse());
-        }
+        seen.push_back(candidates[association.candidate].feature);
       }
+      robot_.Correct(localized.pose, localized.observation_information, seen);
       break;
     }
   }
@@ -217,7 +133,7 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
     match.observation = observation;
     Feature& feature = graph_->GetFeature(match.feature);
     const Pose2 relative =
-        Between(PoseOf(feature), Compose(robot_, observation.pose));
+        Between(PoseOf(feature), Compose(robot_.pose(), observation.pose));
     feature.extent_begin =
         std::min(feature.extent_begin, relative[0] - 0.5 * observation.length);
     feature.extent_end =
@@ -228,7 +144,7 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
   }
   SecondLook(record.matches);
   Grow(observations, used, &record);
-  record.pose = robot_;
+  record.pose = robot_.pose();
   records_.push_back(std::move(record));
 }
 
@@ -238,7 +154,7 @@ void MapBuilder::SecondLook(const std::vector<FeatureMatch>& matches) {
   std::map<FeatureId, UncertainPose2> seen;
   for (const FeatureMatch& match : matches) {
     const Pose2 feature = PoseOf(graph_->GetFeature(match.feature));
-    const Pose2 observed = Compose(robot_, match.observation.pose);
+    const Pose2 observed = Compose(robot_.pose(), match.observation.pose);
     const double along = Between(observed, feature)[0];
     UncertainPose2 observation;
     observation.mean = match.observation.pose;
@@ -337,8 +253,8 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
 
   // The links that tell most about where the robot is.
   std::vector<std::pair<double, FeatureId>> anchors;
-  for (const auto& link : links_) {
-    const Eigen::Matrix3d& c = link.second.covariance;
+  for (const auto& link : robot_.links()) {
+    const Eigen::Matrix3d& c = link.second;
     anchors.emplace_back(c(0, 0) + c(1, 1) + 9.0 * c(2, 2), link.first);
   }
   std::sort(anchors.begin(), anchors.end());
@@ -352,7 +268,7 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
   std::vector<std::size_t> owner;
   // The first scan's best segment fixes the gauge.
   int gauge = -1;
-  if (links_.empty() && num_created_ == 0) {
+  if (robot_.links().empty() && num_created_ == 0) {
     for (int index : fresh) {
       if (gauge < 0 ||
           observations[index].length > observations[gauge].length) {
@@ -362,7 +278,7 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
   }
   for (std::size_t k = 0; k < fresh.size(); ++k) {
     const SegmentObservation& observation = observations[fresh[k]];
-    const Pose2 pose = Compose(robot_, observation.pose);
+    const Pose2 pose = Compose(robot_.pose(), observation.pose);
     // Another piece of a wall that this scan has just made a feature of (there
     // is something in front of its middle).
     const std::size_t piece_of =
@@ -398,12 +314,13 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
     // gets its share of the information, so together they do not claim more
     // than one (covariance intersection).
     for (const auto& anchor : anchors) {
-      const Link& link = links_.at(anchor.second);
+      const Eigen::Matrix3d& link = robot_.links().at(anchor.second);
       const Pose2 other = PoseOf(graph_->GetFeature(anchor.second));
-      const Eigen::Matrix3d j1 = ComposeJacobianFirst(robot_, observation.pose);
-      const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
+      const Eigen::Matrix3d j1 =
+          ComposeJacobianFirst(robot_.pose(), observation.pose);
+      const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_.pose());
       const Eigen::Matrix3d covariance =
-          j1 * link.covariance * j1.transpose() +
+          j1 * link * j1.transpose() +
           j2 * observation_covariance * j2.transpose();
       Constraint constraint;
       constraint.type = &relation;
@@ -455,56 +372,37 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
     record->matches.push_back(std::move(match));
     if (owner[k] != k) continue;
     // The robot relative to the new feature: only the observation's error.
-    Link link;
-    const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_);
-    const Eigen::Matrix3d j1 = ComposeJacobianFirst(robot_, observation.pose);
+    const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_.pose());
+    const Eigen::Matrix3d j1 =
+        ComposeJacobianFirst(robot_.pose(), observation.pose);
     // r = f (-) o to first order: J1 dr = -J2 do.
     const Eigen::Matrix3d j = j1.inverse() * j2;
-    link.covariance =
+    robot_.Add(
+        record->matches.back().feature,
         Symmetric(j * ObservationCovariance(observation, options_.along_sigma) *
-                  j.transpose());
-    links_.emplace(record->matches.back().feature, link);
+                  j.transpose()));
     ++num_created_;
   }
 }
 
 void MapBuilder::WriteRobot() {
-  Transaction transaction;
-  FeatureId robot = robot_id_;
-  if (robot == kNoId) {
-    Feature feature;
-    feature.type = &registry_.GetFeature("pose");
-    feature.source = kSource;
-    feature.parameters = {robot_[0], robot_[1], robot_[2]};
-    robot = transaction.AddFeature(feature);
-  } else {
-    for (ConstraintId id : graph_->ConstraintsOf(robot_id_)) {
-      transaction.RemoveConstraint(id);
-    }
-    Feature& feature = graph_->GetFeature(robot_id_);
-    feature.parameters = {robot_[0], robot_[1], robot_[2]};
-  }
   const RelationType& relation = registry_.GetRelation("pose_pose");
-  for (const auto& link : links_) {
-    const Pose2 other = PoseOf(graph_->GetFeature(link.first));
-    Constraint constraint;
-    constraint.type = &relation;
-    constraint.features = std::vector<FeatureId>{link.first, robot};
-    constraint.expected = Between(other, robot_);
-    constraint.information =
-        Symmetric(ToFrame(link.second.covariance, other[2]).inverse()) /
-        static_cast<double>(links_.size());
-    constraint.source = kSource;
-    transaction.AddConstraint(std::move(constraint));
-  }
-  const TransactionResult result = graph_->Apply(std::move(transaction));
-  if (robot_id_ == kNoId) robot_id_ = result.features.front();
-}
-
-void MapBuilder::ReadRobot() {
-  if (robot_id_ == kNoId) return;
-  robot_ = PoseOf(graph_->GetFeature(robot_id_));
-  robot_[2] = NormalizeAngle(robot_[2]);
+  robot_.Write(registry_, kSource, [&](FeatureId robot) {
+    std::vector<Constraint> constraints;
+    for (const auto& link : robot_.links()) {
+      const Pose2 other = PoseOf(graph_->GetFeature(link.first));
+      Constraint constraint;
+      constraint.type = &relation;
+      constraint.features = std::vector<FeatureId>{link.first, robot};
+      constraint.expected = Between(other, robot_.pose());
+      constraint.information =
+          Symmetric(ToFrame(link.second, other[2]).inverse()) /
+          static_cast<double>(robot_.links().size());
+      constraint.source = kSource;
+      constraints.push_back(std::move(constraint));
+    }
+    return constraints;
+  });
 }
 
 }  // namespace plumbline

@@ -5,10 +5,10 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/association.h>
+#include <plumbline/frontend/robot_links.h>
 #include <plumbline/frontend/segment_extraction.h>
 
 #include <Eigen/Core>
-#include <map>
 #include <vector>
 
 namespace plumbline {
@@ -78,29 +78,22 @@ class MapBuilder {
   /// a solve carries the robot along with what it is linked to.
   void WriteRobot();
   /// Takes the robot's pose back from the graph after a solve.
-  void ReadRobot();
+  void ReadRobot() { robot_.Read(); }
 
   /// Features that the robot is linked to and those they are bound to, up to
   /// `depth` constraints from the robot, and the robot, ascending.
-  std::vector<FeatureId> Neighborhood(int depth) const;
+  std::vector<FeatureId> Neighborhood(int depth) const {
+    return robot_.Neighborhood(depth);
+  }
 
-  const Pose2& robot() const { return robot_; }
-  FeatureId robot_id() const { return robot_id_; }
+  const Pose2& robot() const { return robot_.pose(); }
+  FeatureId robot_id() const { return robot_.id(); }
   const std::vector<KeyScanRecord>& records() const { return records_; }
   /// Observations that matched a feature, and that made one, so far.
   std::int64_t num_matches() const { return num_matches_; }
   std::int64_t num_created() const { return num_created_; }
 
  private:
-  // Link from the robot to a feature.
-  struct Link {
-    // Covariance of the robot's pose relative to the feature, in the axes of
-    // the map frame.
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  };
-
-  void Predict(const UncertainPose2& motion);
-  void CutLinks();
   void SecondLook(const std::vector<FeatureMatch>& matches);
   // Index in `fresh` of the first observation whose feature this one is a piece
   // of; the number of entries in `owner` when there is none.
@@ -114,9 +107,7 @@ class MapBuilder {
   Graph* graph_;
   const Registry& registry_;
   MapBuilderOptions options_;
-  Pose2 robot_ = Pose2::Zero();
-  FeatureId robot_id_ = kNoId;
-  std::map<FeatureId, Link> links_;
+  RobotLinks robot_;
   std::vector<KeyScanRecord> records_;
   std::int64_t num_matches_ = 0;
   std::int64_t num_created_ = 0;

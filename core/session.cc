@@ -1,5 +1,6 @@
 #include <ceres/ceres.h>
 #include <dlfcn.h>
+#include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/session.h>
 #include <plumbline/factors/angle.h>
@@ -11,7 +12,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <utility>
 
 namespace plumbline {
@@ -118,29 +118,6 @@ struct Residual {
   ceres::ResidualBlockId id = nullptr;
   // Rank of the information.
   int degrees_of_freedom = 0;
-};
-
-// Disjoint sets with path halving; the root of a set is its smallest index.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t size) : parents_(size) {
-    std::iota(parents_.begin(), parents_.end(), std::size_t{0});
-  }
-  std::size_t Find(std::size_t i) {
-    while (parents_[i] != i) {
-      parents_[i] = parents_[parents_[i]];
-      i = parents_[i];
-    }
-    return i;
-  }
-  void Join(std::size_t i, std::size_t j) {
-    i = Find(i);
-    j = Find(j);
-    parents_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<std::size_t> parents_;
 };
 
 }  // namespace
@@ -419,6 +396,51 @@ struct SolverSession::Impl {
     return std::abs(constraint->delta - before);
   }
 
+  LinearizedConstraint Linearize(const Constraint& constraint) const {
+    if (constraint.state != ConstraintState::kLive) {
+      throw PLUMBLINE_ERROR("constraint " + std::to_string(constraint.id) +
+                                " is broken and cannot be linearized",
+                            "a live constraint");
+    }
+    using RowMajor =
+        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Residual& residual = *residuals[constraint.id];
+    LinearizedConstraint linearized;
+    linearized.residual.resize(constraint.type->residual_size);
+    std::vector<RowMajor> rows;
+    std::vector<const double*> parameters;
+    std::vector<double*> jacobians;
+    for (const FeatureId id : constraint.features) {
+      const Feature& feature = std::as_const(*graph).GetFeature(id);
+      rows.emplace_back(constraint.type->residual_size, feature.type->size);
+      parameters.push_back(feature.data());
+    }
+    for (RowMajor& matrix : rows) jacobians.push_back(matrix.data());
+    bool is_finite = residual.cost->Evaluate(
+        parameters.data(), linearized.residual.data(), jacobians.data());
+    is_finite = is_finite && linearized.residual.allFinite();
+    for (const RowMajor& matrix : rows) {
+      is_finite = is_finite && matrix.allFinite();
+    }
+    if (!is_finite) {
+      throw PLUMBLINE_ERROR(
+          constraint.type->name + " " + std::to_string(constraint.id) +
+              " cannot be linearized",
+          "a state at which the residual and its derivatives are finite");
+    }
+    double weight = 1.0;
+    if (residual.loss != nullptr) {
+      double rho[3];
+      residual.loss->Evaluate(linearized.residual.squaredNorm(), rho);
+      weight = std::sqrt(rho[1]);
+    }
+    linearized.residual *= weight;
+    for (const RowMajor& matrix : rows) {
+      linearized.jacobians.push_back(weight * matrix);
+    }
+    return linearized;
+  }
+
   void AddCost(const Constraint& constraint, CostReport* report) const {
     if (constraint.state != ConstraintState::kLive) return;
     const double squared = SquaredResidual(constraint);
@@ -559,6 +581,11 @@ Eigen::VectorXd SolverSession::Error(const Constraint& constraint) const {
 
 double SolverSession::Delta(const Constraint& constraint) const {
   return impl_->Delta(constraint);
+}
+
+LinearizedConstraint SolverSession::Linearize(
+    const Constraint& constraint) const {
+  return impl_->Linearize(constraint);
 }
 
 double SolverSession::UpdateDeltas(const std::vector<FeatureId>* features) {

@@ -61,6 +61,13 @@ struct CostReport {
   double total() const { return measurement + structure; }
 };
 
+/// First-order model of a constraint: r(x + d) = residual + sum J_i d_i.
+struct LinearizedConstraint {
+  Eigen::VectorXd residual;
+  /// For each feature in order, rows x parameters (not tangent space).
+  std::vector<Eigen::MatrixXd> jacobians;
+};
+
 /// Keeps one ceres::Problem in step with a graph: residual blocks are added and
 /// removed as constraints are, parameter blocks live in the features. It
 /// listens to the graph for as long as it lives.
@@ -102,6 +109,11 @@ class SolverSession : public GraphListener {
   /// weight freezes for good: Delta() is that of the unweighted residual.
   /// Returns the largest change of a weight.
   double UpdateDeltas(const std::vector<FeatureId>* features = nullptr);
+
+  /// Linearization of a live constraint at the present state as a solve has it:
+  /// whitened, and structure weighted with the root of rho'(s). Throws Error
+  /// when the constraint is broken or cannot be evaluated.
+  LinearizedConstraint Linearize(const Constraint& constraint) const;
 
   /// Cost at the present state of the whole graph, or of the live constraints
   /// on `features`.

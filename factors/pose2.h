@@ -86,6 +86,30 @@ inline Eigen::Matrix3d InverseJacobian(const Pose2& p) {
   return jacobian;
 }
 
+/// Jacobian (3x3) of Between(p1, p2) with respect to p1.
+inline Eigen::Matrix3d BetweenJacobianFirst(const Pose2& p1, const Pose2& p2) {
+  const double c = std::cos(p1[2]);
+  const double s = std::sin(p1[2]);
+  const double dx = p2[0] - p1[0];
+  const double dy = p2[1] - p1[1];
+  Eigen::Matrix3d jacobian;
+  jacobian << -c, -s, c * dy - s * dx,  //
+      s, -c, -c * dx - s * dy,          //
+      0, 0, -1;
+  return jacobian;
+}
+
+/// Jacobian (3x3) of Between(p1, p2) with respect to p2.
+inline Eigen::Matrix3d BetweenJacobianSecond(const Pose2& p1) {
+  const double c = std::cos(p1[2]);
+  const double s = std::sin(p1[2]);
+  Eigen::Matrix3d jacobian;
+  jacobian << c, s, 0,  //
+      -s, c, 0,         //
+      0, 0, 1;
+  return jacobian;
+}
+
 /// A pose with its covariance (3x3, units m^2, m rad, rad^2), expressed in the
 /// reference frame of the pose.
 struct UncertainPose2 {

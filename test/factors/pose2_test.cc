@@ -79,18 +79,25 @@ TEST(Pose2Test, JacobiansMatchDifferences) {
     const Eigen::Matrix3d first = ComposeJacobianFirst(a, b);
     const Eigen::Matrix3d second = ComposeJacobianSecond(a);
     const Eigen::Matrix3d inverse = InverseJacobian(a);
+    const Eigen::Matrix3d between_first = BetweenJacobianFirst(a, b);
+    const Eigen::Matrix3d between_second = BetweenJacobianSecond(a);
     for (int p = 0; p < 3; ++p) {
       const Pose2 d = step * Pose2::Unit(p);
       Pose2 by_first = Compose(Pose2(a + d), b) - Compose(Pose2(a - d), b);
       Pose2 by_second = Compose(a, Pose2(b + d)) - Compose(a, Pose2(b - d));
       Pose2 by_inverse = Inverse(Pose2(a + d)) - Inverse(Pose2(a - d));
-      for (Pose2* difference : {&by_first, &by_second, &by_inverse}) {
+      Pose2 by_seer = Between(Pose2(a + d), b) - Between(Pose2(a - d), b);
+      Pose2 by_seen = Between(a, Pose2(b + d)) - Between(a, Pose2(b - d));
+      for (Pose2* difference :
+           {&by_first, &by_second, &by_inverse, &by_seer, &by_seen}) {
         (*difference)[2] = NormalizeAngle((*difference)[2]);
         *difference /= 2.0 * step;
       }
       EXPECT_LT((by_first - first.col(p)).norm(), 1e-7);
       EXPECT_LT((by_second - second.col(p)).norm(), 1e-7);
       EXPECT_LT((by_inverse - inverse.col(p)).norm(), 1e-7);
+      EXPECT_LT((by_seer - between_first.col(p)).norm(), 1e-7);
+      EXPECT_LT((by_seen - between_second.col(p)).norm(), 1e-7);
     }
   }
 }

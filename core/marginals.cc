@@ -1,0 +1,472 @@
+#include <plumbline/core/disjoint_sets.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/marginals.h>
+#include <plumbline/factors/pose2.h>
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using SparseMatrix = Eigen::SparseMatrix<double>;
+
+// Information of the prior on directions that have none.
+constexpr double kPriorInformation = 1.0 / Marginals::kUndeterminedVariance;
+// Pivots below these fractions of the diagonal are rounding, and a prior of
+// that size stands out from rounding.
+constexpr double kPivotRounding = 1e-13;
+constexpr double kPriorOverRounding = 10.0;
+// Every pass over the pivots can only add priors, and few are needed.
+constexpr int kMaxPasses = 20;
+
+std::string Describe(const Feature& feature) {
+  return feature.type->name + " " + std::to_string(feature.id);
+}
+
+bool IsPose(const FeatureType& type) {
+  return type.parameter_names ==
+         std::vector<std::string>{"x m", "y m", "theta rad"};
+}
+
+}  // namespace
+
+struct Marginals::Impl {
+  // What is known of a feature.
+  struct Entry {
+    std::string name;
+    bool is_pose = false;
+    int size = 0;
+    // Held constant: fixed, or the gauge.
+    bool is_constant = false;
+    bool has_constraint = false;
+    // First row in the normal matrix, and how many.
+    int column = -1;
+    int tangent_size = 0;
+    // Parameters by tangent space: the derivative of Plus at zero.
+    Eigen::MatrixXd lift;
+    Pose2 pose = Pose2::Zero();
+    std::size_t part = 0;
+  };
+
+  // Adds the features of the graph or scope, ascending; returns their ids.
+  std::vector<FeatureId> AddEntries(const Graph& graph,
+                                    const std::vector<FeatureId>* scope) {
+    std::vector<FeatureId> ids;
+    if (scope == nullptr) {
+      for (const Feature* feature : graph.Features()) {
+        ids.push_back(feature->id);
+      }
+    } else {
+      ids = *scope;
+      std::sort(ids.begin(), ids.end());
+      ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    }
+    entries.resize(static_cast<std::size_t>(graph.feature_id_end()));
+    for (const FeatureId id : ids) {
+      const Feature& feature = graph.GetFeature(id);
+      auto entry = std::make_unique<Entry>();
+      entry->name = Describe(feature);
+      entry->size = feature.type->size;
+      entry->is_constant = feature.fixed;
+      entry->is_pose = IsPose(*feature.type);
+      if (entry->is_pose) entry->pose = Eigen::Vector3d(feature.data());
+      entry->tangent_size = entry->size;
+      if (feature.type->make_manifold) {
+        const auto manifold = feature.type->make_manifold();
+        entry->tangent_size = manifold->TangentSize();
+        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>
+            lift(entry->size, entry->tangent_size);
+        if (!manifold->PlusJacobian(feature.data(), lift.data())) {
+          throw PLUMBLINE_ERROR(entry->name + " has no tangent space",
+                                "a state in which its manifold has one");
+        }
+        entry->lift = lift;
+      } else {
+        entry->lift = Eigen::MatrixXd::Identity(entry->size, entry->size);
+      }
+      entries[static_cast<std::size_t>(id)] = std::move(entry);
+    }
+    return ids;
+  }
+
+  // The live constraints among the entries, ascending.
+  std::vector<const Constraint*> ConstraintsAmong(
+      const Graph& graph, const std::vector<FeatureId>& ids) {
+    std::vector<ConstraintId> constraint_ids;
+    for (const FeatureId id : ids) {
+      const std::vector<ConstraintId>& on = graph.ConstraintsOf(id);
+      constraint_ids.insert(constraint_ids.end(), on.begin(), on.end());
+    }
+    std::sort(constraint_ids.begin(), constraint_ids.end());
+    constraint_ids.erase(
+        std::unique(constraint_ids.begin(), constraint_ids.end()),
+        constraint_ids.end());
+    std::vector<const Constraint*> constraints;
+    for (const ConstraintId id : constraint_ids) {
+      const Constraint& constraint = graph.GetConstraint(id);
+      if (constraint.state == ConstraintState::kLive &&
+          std::all_of(
+              constraint.features.begin(), constraint.features.end(),
+              [this](FeatureId feature) { return Find(feature) != nullptr; })) {
+        constraints.push_back(&constraint);
+      }
+    }
+    return constraints;
+  }
+
+  // Connected parts and what ties them to the plane.
+  void FindParts(const Graph& graph, const std::vector<FeatureId>& ids,
+                 const std::vector<const Constraint*>& constraints,
+                 bool hold_gauge) {
+    DisjointSets parts(entries.size());
+    has_gauge.assign(entries.size(), false);
+    for (const Constraint* constraint : constraints) {
+      const std::vector<FeatureId>& features = constraint->features;
+      for (const FeatureId id : features) {
+        parts.Join(static_cast<std::size_t>(features[0]),
+                   static_cast<std::size_t>(id));
+        entries[static_cast<std::size_t>(id)]->has_constraint = true;
+      }
+    }
+    for (const FeatureId id : ids) {
+      Entry& entry = *entries[static_cast<std::size_t>(id)];
+      entry.part = parts.Find(static_cast<std::size_t>(id));
+      if (entry.is_constant) has_gauge[entry.part] = true;
+    }
+    for (const Constraint* constraint : constraints) {
+      if (constraint->features.size() == 1) {
+        has_gauge[parts.Find(
+            static_cast<std::size_t>(constraint->features[0]))] = true;
+      }
+    }
+    // A part without gauge is held all the same, so that what is relative can
+    // be asked for.
+    std::map<std::size_t, FeatureId> held;
+    for (const FeatureId id : ids) {
+      const Entry& entry = *entries[static_cast<std::size_t>(id)];
+      if (!entry.has_constraint || has_gauge[entry.part]) continue;
+      const auto [lowest, is_new] = held.emplace(entry.part, id);
+      if (!is_new &&
+          graph.GetFeature(id).level < graph.GetFeature(lowest->second).level) {
+        lowest->second = id;
+      }
+    }
+    for (const auto& [part, id] : held) {
+      entries[static_cast<std::size_t>(id)]->is_constant = true;
+      if (hold_gauge) has_gauge[part] = true;
+    }
+  }
+
+  void Factorize(const SolverSession& session,
+                 const std::vector<FeatureId>& ids,
+                 const std::vector<const Constraint*>& constraints) {
+    for (const FeatureId id : ids) {
+      Entry& entry = *entries[static_cast<std::size_t>(id)];
+      if (entry.is_constant || !entry.has_constraint) continue;
+      entry.column = columns;
+      columns += entry.tangent_size;
+    }
+    if (columns == 0) return;
+    std::vector<Eigen::Triplet<double>> triplets;
+    for (const Constraint* constraint : constraints) {
+      const LinearizedConstraint linearized = session.Linearize(*constraint);
+      std::vector<Eigen::MatrixXd> jacobians;
+      for (std::size_t i = 0; i < constraint->features.size(); ++i) {
+        jacobians.push_back(
+            linearized.jacobians[i] *
+            entries[static_cast<std::size_t>(constraint->features[i])]->lift);
+      }
+      for (std::size_t i = 0; i < jacobians.size(); ++i) {
+        const Entry& a = *Find(constraint->features[i]);
+        if (a.column < 0) continue;
+        for (std::size_t j = 0; j < jacobians.size(); ++j) {
+          const Entry& b = *Find(constraint->features[j]);
+          if (b.column < 0 || b.column > a.column) continue;
+          const Eigen::MatrixXd block = jacobians[i].transpose() * jacobians[j];
+          for (Eigen::Index r = 0; r < block.rows(); ++r) {
+            for (Eigen::Index c = 0; c < block.cols(); ++c) {
+              const int row = a.column + static_cast<int>(r);
+              const int column = b.column + static_cast<int>(c);
+              if (row >= column) {
+                triplets.emplace_back(row, column, block(r, c));
+              }
+            }
+          }
+        }
+      }
+    }
+    SparseMatrix normal(columns, columns);
+    normal.setFromTriplets(triplets.begin(), triplets.end());
+    AddPriors(&normal);
+  }
+
+  // Factorizes, with priors where the pivots show that nothing is known.
+  void AddPriors(SparseMatrix* normal) {
+    const Eigen::VectorXd diagonal = normal->diagonal();
+    Eigen::VectorXd priors(columns);
+    for (int i = 0; i < columns; ++i) {
+      // Exact zeros would end a factorization early: this much is rounding.
+      priors[i] = diagonal[i] > 0.0 ? 1e-2 * kPivotRounding * diagonal[i]
+                                    : kPriorInformation;
+      normal->coeffRef(i, i) += priors[i];
+    }
+    ldlt.analyzePattern(*normal);
+    for (int pass = 0; pass < kMaxPasses; ++pass) {
+      ldlt.factorize(*normal);
+      bool is_determined = ldlt.info() == Eigen::Success;
+      const Eigen::VectorXd& pivots = ldlt.vectorD();
+      for (int k = 0; k < columns; ++k) {
+        const int i = ldlt.permutationPinv().indices()[k];
+        const double rounding = kPivotRounding * diagonal[i];
+        const double prior =
+            std::max(kPriorInformation, kPriorOverRounding * rounding);
+        if (pivots[k] > std::max(rounding, 1e-2 * kPriorInformation) ||
+            priors[i] >= prior) {
+          continue;
+        }
+        is_determined = false;
+        normal->coeffRef(i, i) += prior;
+        priors[i] += prior;
+        // Exactly zero: that is where the factorization ended.
+        if (pivots[k] == 0.0) break;
+      }
+      if (is_determined) return;
+    }
+    if (ldlt.info() != Eigen::Success) {
+      throw PLUMBLINE_ERROR("the normal matrix cannot be factorized",
+                            "information that is finite and not negative");
+    }
+  }
+
+  const Entry* Find(FeatureId id) const {
+    if (id < 0 || static_cast<std::size_t>(id) >= entries.size()) {
+      return nullptr;
+    }
+    return entries[static_cast<std::size_t>(id)].get();
+  }
+
+  // Of a feature with something to say about it.
+  const Entry& Get(FeatureId id) const {
+    const Entry* entry = Find(id);
+    if (entry == nullptr) {
+      throw PLUMBLINE_ERROR("no feature " + std::to_string(id),
+                            "a feature of the graph, or of the scope");
+    }
+    if (!entry->is_constant && !entry->has_constraint) {
+      throw PLUMBLINE_ERROR(entry->name + " has no covariance",
+                            "a live constraint on it");
+    }
+    return *entry;
+  }
+
+  const Entry& GetWithGauge(FeatureId id) const {
+    const Entry& entry = Get(id);
+    if (!has_gauge[entry.part]) {
+      throw PLUMBLINE_ERROR("the gauge of " + entry.name +
+                                " is not fixed: nothing ties it, or "
+                                "what it is connected with, to the plane",
+                            "a fixed feature (FIX) or a prior there");
+    }
+    return entry;
+  }
+
+  // sum of B_i Cov(i, j) B_j' over features and their Jacobians (rows x
+  // parameters).
+  Eigen::MatrixXd Propagate(
+      const std::vector<std::pair<const Entry*, Eigen::MatrixXd>>& terms)
+      const {
+    const Eigen::Index rows = terms.front().second.rows();
+    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(columns, rows);
+    for (const auto& [entry, jacobian] : terms) {
+      if (entry->column < 0) continue;
+      right.middleRows(entry->column, entry->tangent_size) +=
+          (jacobian * entry->lift).transpose();
+    }
+    if (columns == 0) return Eigen::MatrixXd::Zero(rows, rows);
+    const Eigen::MatrixXd solved = ldlt.solve(right);
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(rows, rows);
+    for (const auto& [entry, jacobian] : terms) {
+      if (entry->column < 0) continue;
+      covariance += jacobian * entry->lift *
+                    solved.middleRows(entry->column, entry->tangent_size);
+    }
+    return 0.5 * (covariance + covariance.transpose());
+  }
+
+  const Eigen::MatrixXd& Covariance(FeatureId id) {
+    const Entry& entry = GetWithGauge(id);
+    const auto found = blocks.find(id);
+    if (found != blocks.end()) return found->second;
+    const Eigen::MatrixXd identity =
+        Eigen::MatrixXd::Identity(entry.size, entry.size);
+    return blocks.emplace(id, Propagate({{&entry, identity}})).first->second;
+  }
+
+  // Entries of the inverse at the places where the factor has entries
+  // (Takahashi, Fagan and Chen 1973), from the last column to the first: below
+  // the diagonal in the pattern of L, and the diagonal.
+  void InvertOnPattern(std::vector<double>* below,
+                       Eigen::VectorXd* diagonal) const {
+    const auto& factor = ldlt.matrixL().nestedExpression();
+    const Eigen::VectorXd& pivots = ldlt.vectorD();
+    const int* starts = factor.outerIndexPtr();
+    const int* rows = factor.innerIndexPtr();
+    const double* values = factor.valuePtr();
+    below->assign(static_cast<std::size_t>(starts[columns]), 0.0);
+    diagonal->resize(columns);
+    // Of the column at hand: L by row, and what the entries of the inverse add
+    // up to.
+    std::vector<double> l(static_cast<std::size_t>(columns), 0.0);
+    std::vector<bool> is_in(static_cast<std::size_t>(columns), false);
+    std::vector<double> sum(static_cast<std::size_t>(columns), 0.0);
+    for (int j = columns - 1; j >= 0; --j) {
+      for (int p = starts[j]; p < starts[j + 1]; ++p) {
+        l[rows[p]] = values[p];
+        is_in[rows[p]] = true;
+        sum[rows[p]] = 0.0;
+      }
+      for (int p = starts[j]; p < starts[j + 1]; ++p) {
+        const int k = rows[p];
+        sum[k] += (*diagonal)[k] * l[k];
+        for (int q = starts[k]; q < starts[k + 1]; ++q) {
+          const int i = rows[q];
+          if (!is_in[i]) continue;
+          const double z = (*below)[static_cast<std::size_t>(q)];
+          sum[i] += z * l[k];
+          sum[k] += z * l[i];
+        }
+      }
+      double z_jj = 1.0 / pivots[j];
+      for (int p = starts[j]; p < starts[j + 1]; ++p) {
+        const double z = -sum[rows[p]];
+        (*below)[static_cast<std::size_t>(p)] = z;
+        z_jj -= values[p] * z;
+        is_in[rows[p]] = false;
+      }
+      (*diagonal)[j] = z_jj;
+    }
+  }
+
+  void Compute(const std::vector<FeatureId>& ids) {
+    std::vector<FeatureId> missing;
+    for (const FeatureId id : ids) {
+      if (GetWithGauge(id).column >= 0 && blocks.count(id) == 0) {
+        missing.push_back(id);
+      }
+    }
+    // The pass over the factor costs about as much as a few solves for each
+    // column of a typical elimination front.
+    constexpr std::size_t kFewFeatures = 10;
+    if (missing.size() < kFewFeatures) return;
+    std::vector<double> below;
+    Eigen::VectorXd diagonal;
+    InvertOnPattern(&below, &diagonal);
+    const auto& factor = ldlt.matrixL().nestedExpression();
+    const auto& position = ldlt.permutationP().indices();
+    for (const FeatureId id : missing) {
+      const Entry& entry = *Find(id);
+      Eigen::MatrixXd tangent(entry.tangent_size, entry.tangent_size);
+      for (int r = 0; r < entry.tangent_size; ++r) {
+        for (int c = 0; c <= r; ++c) {
+          const int a = position[entry.column + r];
+          const int b = position[entry.column + c];
+          if (a == b) {
+            tangent(r, c) = diagonal[a];
+            continue;
+          }
+          const int* begin =
+              factor.innerIndexPtr() + factor.outerIndexPtr()[std::min(a, b)];
+          const int* end = factor.innerIndexPtr() +
+                           factor.outerIndexPtr()[std::min(a, b) + 1];
+          const int* found = std::lower_bound(begin, end, std::max(a, b));
+          // Parameters of one feature are coupled in the pattern.
+          tangent(r, c) =
+              below[static_cast<std::size_t>(found - factor.innerIndexPtr())];
+          tangent(c, r) = tangent(r, c);
+        }
+      }
+      blocks.emplace(id, entry.lift * tangent * entry.lift.transpose());
+    }
+  }
+
+  // By feature id; null for those outside the scope.
+  std::vector<std::unique_ptr<Entry>> entries;
+  // By root of a part.
+  std::vector<bool> has_gauge;
+  int columns = 0;
+  Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<int>>
+      ldlt;
+  // Covariances that were asked for.
+  std::map<FeatureId, Eigen::MatrixXd> blocks;
+};
+
+Marginals::Marginals(const Graph& graph, const SolverSession& session,
+                     const MarginalsOptions& options)
+    : impl_(std::make_unique<Impl>()) {
+  const std::vector<FeatureId> ids = impl_->AddEntries(graph, options.features);
+  const std::vector<const Constraint*> constraints =
+      impl_->ConstraintsAmong(graph, ids);
+  impl_->FindParts(graph, ids, constraints, options.hold_gauge);
+  impl_->Factorize(session, ids, constraints);
+}
+
+Marginals::~Marginals() = default;
+Marginals::Marginals(Marginals&&) noexcept = default;
+Marginals& Marginals::operator=(Marginals&&) noexcept = default;
+
+Eigen::MatrixXd Marginals::Covariance(FeatureId id) {
+  return impl_->Covariance(id);
+}
+
+Eigen::MatrixXd Marginals::JointCovariance(const std::vector<FeatureId>& ids) {
+  Eigen::Index size = 0;
+  for (const FeatureId id : ids) size += impl_->GetWithGauge(id).size;
+  std::vector<std::pair<const Impl::Entry*, Eigen::MatrixXd>> terms;
+  Eigen::Index row = 0;
+  for (const FeatureId id : ids) {
+    const Impl::Entry& entry = impl_->GetWithGauge(id);
+    Eigen::MatrixXd selection = Eigen::MatrixXd::Zero(size, entry.size);
+    selection.middleRows(row, entry.size).setIdentity();
+    row += entry.size;
+    terms.emplace_back(&entry, std::move(selection));
+  }
+  if (terms.empty()) return Eigen::MatrixXd(0, 0);
+  return impl_->Propagate(terms);
+}
+
+Eigen::Matrix3d Marginals::RelativeCovariance(FeatureId from, FeatureId to) {
+  const Impl::Entry& a = impl_->Get(from);
+  const Impl::Entry& b = impl_->Get(to);
+  for (const Impl::Entry* entry : {&a, &b}) {
+    if (!entry->is_pose) {
+      throw PLUMBLINE_ERROR(entry->name + " has no relative pose",
+                            "a feature with the parameters x, y, theta");
+    }
+  }
+  if (from == to) return Eigen::Matrix3d::Zero();
+  // Parts that are both tied to the plane are connected by it.
+  if (a.part != b.part &&
+      !(impl_->has_gauge[a.part] && impl_->has_gauge[b.part])) {
+    throw PLUMBLINE_ERROR("nothing connects " + a.name + " and " + b.name,
+                          "features of one connected part");
+  }
+  return impl_->Propagate({{&a, BetweenJacobianFirst(a.pose, b.pose)},
+                           {&b, BetweenJacobianSecond(a.pose)}});
+}
+
+void Marginals::Compute(const std::vector<FeatureId>& ids) {
+  impl_->Compute(ids);
+}
+
+bool Marginals::IsDetermined(FeatureId id) {
+  return impl_->Covariance(id).diagonal().maxCoeff() <
+         1e-2 * kUndeterminedVariance;
+}
+
+}  // namespace plumbline

@@ -41,6 +41,12 @@ class StructureDetector {
   /// detector alive.
   virtual int minimum_support() const { return 1; }
 
+  /// Whether a virtual feature of this detector stays when it has a single live
+  /// constraint. It only follows what it is on, but a detector of the next
+  /// level may see something in several of them: the centres of circles that
+  /// stand in a row.
+  virtual bool keeps_followers() const { return false; }
+
   virtual Transaction Detect(const Graph& graph, const Registry& registry,
                              const DetectionScope& scope) const = 0;
 };

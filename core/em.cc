@@ -138,6 +138,8 @@ struct EmOrchestrator::Impl final : public GraphListener {
     for (const auto& level : hierarchy) {
       for (const auto& detector : level) {
         minimum_support[detector->name()] = detector->minimum_support();
+        if (detector->keeps_followers())
+          keeps_followers.insert(detector->name());
       }
     }
     for (const Feature* feature : std::as_const(*graph).Features()) {
@@ -530,7 +532,10 @@ struct EmOrchestrator::Impl final : public GraphListener {
       }
       if (is_measured) continue;
       const bool is_supported = support >= MinimumSupport(*feature);
-      if (is_supported && live > 1) continue;
+      if (is_supported &&
+          (live > 1 || keeps_followers.count(feature->source) > 0)) {
+        continue;
+      }
       if (is_supported && last != nullptr) {
         // Nothing is wrong with it, but it would be found and dropped again.
         silent_alone.insert(AloneKey(*last, id));
@@ -757,6 +762,8 @@ struct EmOrchestrator::Impl final : public GraphListener {
   Hierarchy hierarchy;
   EmOptions options;
   std::map<std::string, int> minimum_support;
+  // Detectors whose features stay with a single constraint.
+  std::set<std::string> keeps_followers;
 
   std::map<HypothesisKey, std::vector<BrokenHypothesis>> memory;
   // Keys of hypotheses that were broken and not measured since.

@@ -88,8 +88,9 @@ struct EmReport {
 /// Support: a virtual feature is dropped, with its constraints, when it has
 /// fewer live structure constraints from features of lower levels than its
 /// detector's minimum_support, or a single live constraint altogether: it would
-/// follow that one and say nothing. Dropping goes on up the levels. Fixed
-/// virtual features and those with measurements stay.
+/// follow that one and say nothing (unless its detector keeps_followers).
+/// Dropping goes on up the levels. Fixed virtual features and those with
+/// measurements stay.
 ///
 /// Memory: what was broken is remembered by what it said (relation, expected
 /// value, features; virtual ones by their type and value, since they come again

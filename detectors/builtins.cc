@@ -12,8 +12,9 @@ namespace plumbline {
 
 void RegisterBuiltinDetectors(Registry* registry) {
   for (DetectorType type :
-       {CenterClusterType(), CircleRansacType(), LineRansacType(),
-        OrientationMixtureType(), OrientationRelationType()}) {
+       {CenterClusterType(), CircleCenterType(), CircleRansacType(),
+        LineRansacType(), OrientationMixtureType(),
+        OrientationRelationType()}) {
     if (registry->FindDetector(type.name) == nullptr) {
       registry->Register(std::move(type));
     }

@@ -13,7 +13,8 @@
 namespace plumbline {
 namespace {
 
-constexpr char kName[] = "center_cluster";
+constexpr char kClusterName[] = "center_cluster";
+constexpr char kCenterName[] = "circle_center";
 // Rounds of assigning circles and moving centres; centres settle in few.
 constexpr int kRounds = 5;
 
@@ -112,15 +113,18 @@ std::vector<Eigen::Vector2d> Cluster(const std::vector<Circle>& circles,
   return means;
 }
 
+CenterClusterOptions ReadCenterOptions(const ParameterReader& reader) {
+  CenterClusterOptions options;
+  options.gate = reader.Get("gate", 1e-6);
+  options.sigma = reader.Get("sigma", 1e-6);
+  return options;
+}
+
 }  // namespace
 
-CenterCluster::CenterCluster(const CenterClusterOptions& options)
-    : options_(options) {}
-
-const std::string& CenterCluster::name() const {
-  static const std::string name = kName;
-  return name;
-}
+CenterCluster::CenterCluster(std::string name,
+                             const CenterClusterOptions& options)
+    : name_(std::move(name)), options_(options) {}
 
 Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
                                   const DetectionScope& scope) const {
@@ -208,7 +212,7 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
     feature.is_virtual = true;
     feature.parameters[0] = centers.position(i).x();
     feature.parameters[1] = centers.position(i).y();
-    feature.source = kName;
+    feature.source = name_;
     ids[k] = transaction.AddFeature(std::move(feature));
   }
   for (const Circle& circle : circles) {
@@ -222,7 +226,7 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
     constraint.information =
         Eigen::MatrixXd::Identity(2, 2) / (options_.sigma * options_.sigma);
     constraint.kind = ConstraintClass::kStructure;
-    constraint.source = kName;
+    constraint.source = name_;
     transaction.AddConstraint(std::move(constraint));
   }
   return transaction;
@@ -231,7 +235,7 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
 DetectorType CenterClusterType() {
   const CenterClusterOptions defaults;
   DetectorType type;
-  type.name = kName;
+  type.name = kClusterName;
   type.description =
       "Common centres of circles: clusters within the gate, each tied to its "
       "centre of gravity";
@@ -243,12 +247,29 @@ DetectorType CenterClusterType() {
       {"minimum_support", static_cast<double>(defaults.minimum_support)},
   };
   type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kName, known, given);
-    CenterClusterOptions options;
-    options.gate = reader.Get("gate", 1e-6);
-    options.sigma = reader.Get("sigma", 1e-6);
+    const ParameterReader reader(kClusterName, known, given);
+    CenterClusterOptions options = ReadCenterOptions(reader);
     options.minimum_support = reader.GetInt("minimum_support", 2);
-    return std::make_unique<CenterCluster>(options);
+    return std::make_unique<CenterCluster>(kClusterName, options);
+  };
+  return type;
+}
+
+DetectorType CircleCenterType() {
+  const CenterClusterOptions defaults;
+  DetectorType type;
+  type.name = kCenterName;
+  type.description =
+      "Centre of every circle, one for those that share it: lines may be seen "
+      "through them";
+  type.reads = {"circle"};
+  type.makes = {"point"};
+  type.defaults = {{"gate", defaults.gate}, {"sigma", defaults.sigma}};
+  type.make = [known = type.defaults](const DetectorParameters& given) {
+    const ParameterReader reader(kCenterName, known, given);
+    CenterClusterOptions options = ReadCenterOptions(reader);
+    options.minimum_support = 1;
+    return std::make_unique<CenterCluster>(kCenterName, options);
   };
   return type;
 }

@@ -13,7 +13,8 @@ struct CenterClusterOptions {
   double gate = 0.4;
   /// Tolerance of a centre against the common one, m.
   double sigma = 0.05;
-  /// Fewest circles that make a common centre.
+  /// Fewest circles that make a common centre. With 1 every circle has a centre
+  /// of its own unless it shares one.
   int minimum_support = 2;
 };
 
@@ -26,21 +27,34 @@ struct CenterClusterOptions {
 /// nearest one within the gate, one that is there already or a new one. Of
 /// concentric circles of the same radius one is probably the other seen twice;
 /// that is left to whoever makes circles.
+///
+/// Centres of single circles say nothing on their own and are there to be seen
+/// in a row by line_ransac on the next level (method.md, Table 1).
 class CenterCluster : public StructureDetector {
  public:
-  explicit CenterCluster(const CenterClusterOptions& options);
+  /// `name` is the one under which the detector is registered.
+  CenterCluster(std::string name, const CenterClusterOptions& options);
 
-  const std::string& name() const override;
+  const std::string& name() const override { return name_; }
   int minimum_support() const override { return options_.minimum_support; }
+  bool keeps_followers() const override {
+    return options_.minimum_support == 1;
+  }
   Transaction Detect(const Graph& graph, const Registry& registry,
                      const DetectionScope& scope) const override;
 
  private:
+  std::string name_;
   CenterClusterOptions options_;
 };
 
-/// "center_cluster" with its parameters (m).
+/// "center_cluster": centres that at least two circles share. Parameters: gate
+/// and sigma (m), minimum_support.
 DetectorType CenterClusterType();
+
+/// "circle_center": the centre of every circle, one for those that share it.
+/// Parameters: gate and sigma (m).
+DetectorType CircleCenterType();
 
 }  // namespace plumbline
 

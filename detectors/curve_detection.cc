@@ -105,11 +105,6 @@ class CurveDetection {
           continue;
         }
         const Feature& feature = graph.GetFeature(constraint.features[1]);
-        if (constraint.state != ConstraintState::kLive) {
-          // An outlier of that curve is no sign of another.
-          outliers_.push_back(i);
-          continue;
-        }
         PlanarCurve curve;
         if (constraint.type->name == "point_line_distance") {
           const double d = feature.parameters[0];
@@ -123,6 +118,11 @@ class CurveDetection {
           curve.position = {feature.parameters[0], feature.parameters[1]};
           curve.radius = feature.parameters[2];
         } else {
+          continue;
+        }
+        if (constraint.state != ConstraintState::kLive) {
+          // An outlier of that curve is no sign of another.
+          outliers_.push_back(i);
           continue;
         }
         Entry& entry = entries[feature.id];

@@ -63,7 +63,7 @@ Transaction OrientationMixture::Detect(const Graph& graph,
                                        const DetectionScope& scope) const {
   std::vector<Candidate> candidates;
   const auto consider = [&](const Feature& feature) {
-    if (feature.level != scope.level) return;
+    if (feature.level > scope.level) return;
     const int parameter = DirectionParameter(feature);
     if (parameter < 0 || LengthOf(feature) < options_.min_length) return;
     if (IsTied(graph, feature)) return;

@@ -26,9 +26,11 @@ struct OrientationMixtureOptions {
 };
 
 /// Orientations of segments and lines (method.md, section 6): reads features of
-/// the types "segment" and "line" of a level and makes virtual "orientation"
-/// features one level up, tied by the relations segment_orientation and
-/// line_orientation (expected 0).
+/// the types "segment" and "line" of a level, and of those below that have no
+/// orientation yet, and makes virtual "orientation" features one level up, tied
+/// by the relations segment_orientation and line_orientation (expected 0). So
+/// walls (level 0 or 1) and rows of columns (level 2 or 3) have directions in
+/// common when the detector stands above both.
 ///
 /// A feature that no live constraint ties to an orientation yet joins the
 /// nearest one within the gate, one that is there already or a new one. New

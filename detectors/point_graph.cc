@@ -1,18 +1,36 @@
 #include <plumbline/detectors/point_graph.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdint>
-#include <limits>
+#include <cstddef>
 #include <map>
+#include <nanoflann.hpp>
 #include <set>
 #include <utility>
 
 namespace plumbline {
 namespace {
 
-constexpr int kFewPoints = 64;
-constexpr int kNearest = 8;
+constexpr std::size_t kNearest = 8;
+
+// The positions as nanoflann asks for them.
+struct Positions {
+  const std::vector<Eigen::Vector2d>& points;
+
+  std::size_t kdtree_get_point_count() const { return points.size(); }
+  double kdtree_get_pt(int i, std::size_t dimension) const {
+    return points[static_cast<std::size_t>(i)][static_cast<int>(dimension)];
+  }
+  template <typename Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<
+    nanoflann::L2_Simple_Adaptor<double, Positions, double, int>, Positions, 2,
+    int>;
 
 bool IsPoint(const Feature& feature, int level) {
   return feature.level == level && feature.type->name == "point" &&
@@ -105,57 +123,21 @@ void PointGraph::Connect(const Graph& graph) {
 }
 
 void PointGraph::ConnectNearest() {
-  const int n = size();
-  if (n <= kFewPoints) {
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) {
-        if (j != i) neighbors_[static_cast<std::size_t>(i)].push_back(j);
-      }
-    }
-    return;
-  }
-  // Cells with about two points each; those of a crowded cell are cut off
-  // below, so that points on one spot do not make all pairs.
-  Eigen::Vector2d low = positions_[0];
-  Eigen::Vector2d high = positions_[0];
-  for (const Eigen::Vector2d& position : positions_) {
-    low = low.cwiseMin(position);
-    high = high.cwiseMax(position);
-  }
-  const double extent = (high - low).maxCoeff();
-  const double cell =
-      std::max(extent * std::sqrt(2.0 / n), 1e-9 * (1.0 + extent));
-  using Cell = std::pair<std::int64_t, std::int64_t>;
-  const auto cell_of = [&](const Eigen::Vector2d& position) {
-    return Cell(static_cast<std::int64_t>((position.x() - low.x()) / cell),
-                static_cast<std::int64_t>((position.y() - low.y()) / cell));
-  };
-  std::map<Cell, std::vector<int>> cells;
-  for (int i = 0; i < n; ++i) cells[cell_of(position(i))].push_back(i);
-  std::vector<std::set<int>> connected(static_cast<std::size_t>(n));
-  for (int i = 0; i < n; ++i) {
-    const Cell center = cell_of(position(i));
-    std::vector<std::pair<double, int>> nearest;
-    for (std::int64_t x = center.first - 2; x <= center.first + 2; ++x) {
-      for (std::int64_t y = center.second - 2; y <= center.second + 2; ++y) {
-        const auto found = cells.find({x, y});
-        if (found == cells.end()) continue;
-        std::size_t taken = 0;
-        for (const int j : found->second) {
-          if (j == i) continue;
-          if (++taken > 4 * kNearest) break;
-          nearest.emplace_back((position(j) - position(i)).squaredNorm(), j);
-        }
-      }
-    }
+  const Positions positions{positions_};
+  const Tree tree(2, positions, nanoflann::KDTreeSingleIndexAdaptorParams());
+  std::vector<std::set<int>> connected(positions_.size());
+  // A point is the nearest to itself, or one that lies on it is.
+  std::array<int, kNearest + 1> nearest{};
+  std::array<double, kNearest + 1> squared_distances{};
+  for (int i = 0; i < size(); ++i) {
     const std::size_t count =
-        std::min(nearest.size(), static_cast<std::size_t>(kNearest));
-    std::partial_sort(nearest.begin(),
-                      nearest.begin() + static_cast<std::ptrdiff_t>(count),
-                      nearest.end());
+        tree.knnSearch(position(i).data(), nearest.size(), nearest.data(),
+                       squared_distances.data());
     for (std::size_t k = 0; k < count; ++k) {
-      connected[static_cast<std::size_t>(i)].insert(nearest[k].second);
-      connected[static_cast<std::size_t>(nearest[k].second)].insert(i);
+      const int j = nearest[k];
+      if (j == i) continue;
+      connected[static_cast<std::size_t>(i)].insert(j);
+      connected[static_cast<std::size_t>(j)].insert(i);
     }
   }
   for (std::size_t i = 0; i < connected.size(); ++i) {

@@ -18,8 +18,8 @@ class PointGraph {
   /// constraints, at a cost that depends on these only.
   ///
   /// Points are connected by live measurements between them. Virtual points
-  /// (level 1 and up) have none: then all of up to 64 of them are connected
-  /// with each other, of more each with its 8 nearest.
+  /// (level 1 and up) have none: then each is connected with its 8 nearest,
+  /// however far they are: the spacing of columns is not known beforehand.
   PointGraph(const Graph& graph, const DetectionScope& scope, int reach);
 
   int size() const { return static_cast<int>(ids_.size()); }

@@ -25,10 +25,15 @@ class TestDetector : public StructureDetector {
  public:
   using Function = std::function<Transaction(const Graph&, const Registry&,
                                              const DetectionScope&)>;
-  TestDetector(std::string name, int support, Function detect)
-      : name_(std::move(name)), support_(support), detect_(std::move(detect)) {}
+  TestDetector(std::string name, int support, Function detect,
+               bool keeps_followers = false)
+      : name_(std::move(name)),
+        support_(support),
+        keeps_followers_(keeps_followers),
+        detect_(std::move(detect)) {}
   const std::string& name() const override { return name_; }
   int minimum_support() const override { return support_; }
+  bool keeps_followers() const override { return keeps_followers_; }
   Transaction Detect(const Graph& graph, const Registry& registry,
                      const DetectionScope& scope) const override {
     return detect_(graph, registry, scope);
@@ -37,6 +42,7 @@ class TestDetector : public StructureDetector {
  private:
   std::string name_;
   int support_;
+  bool keeps_followers_;
   Function detect_;
 };
 
@@ -526,6 +532,25 @@ TEST_F(EmTest, AFeatureThatSaysNothingIsDroppedOnce) {
   AddSegment(0.2);
   em_->Run();
   EXPECT_EQ(Live(), 2);
+}
+
+TEST_F(EmTest, AFollowerStaysWhereItsDetectorSaysSo) {
+  const FeatureId wall = AddSegment(0.0);
+  hierarchy_.resize(1);
+  hierarchy_[0].push_back(std::make_unique<TestDetector>(
+      "directions", 1, DirectionDetector({0.0}), true));
+  EXPECT_TRUE(Make().Run().converged);
+  EXPECT_EQ(graph_.VirtualFeatures(1).size(), 1u);
+  EXPECT_EQ(Live(), 1);
+  // Not without what it follows.
+  Transaction transaction;
+  for (const ConstraintId id : graph_.ConstraintsOf(wall)) {
+    transaction.RemoveConstraint(id);
+  }
+  transaction.RemoveFeature(wall);
+  graph_.Apply(std::move(transaction));
+  em_->Run();
+  EXPECT_TRUE(graph_.VirtualFeatures(1).empty());
 }
 
 TEST_F(EmTest, ASingleChildWithARelationStays) {

@@ -29,11 +29,12 @@ class CenterClusterTest : public ::testing::Test {
 
   Transaction Detect(int level = 1,
                      const std::vector<FeatureId>* features = nullptr,
-                     const DetectorParameters& parameters = {}) const {
+                     const DetectorParameters& parameters = {},
+                     const char* detector = "center_cluster") const {
     DetectionScope scope;
     scope.level = level;
     scope.features = features;
-    return registry_.GetDetector("center_cluster")
+    return registry_.GetDetector(detector)
         .make(parameters)
         ->Detect(graph_, registry_, scope);
   }
@@ -146,6 +147,44 @@ TEST_F(CenterClusterTest, NothingIsProposedTwice) {
   EXPECT_GT(transaction.added_features().size(), 10u);
   graph_.Apply(transaction);
   EXPECT_TRUE(Detect().empty());
+}
+
+TEST_F(CenterClusterTest, EveryCircleHasACentre) {
+  const FeatureId a = AddCircle(1.0, 2.0, 1.0);
+  const FeatureId b = AddCircle(7.0, 2.0, 1.0);
+  const FeatureId c = AddCircle(1.1, 2.2, 2.0);
+  const Transaction transaction = Detect(1, nullptr, {}, "circle_center");
+  ASSERT_EQ(transaction.added_features().size(), 2u);
+  EXPECT_EQ(transaction.added_features()[0].type->name, "point");
+  EXPECT_EQ(transaction.added_features()[0].level, 2);
+  EXPECT_EQ(transaction.added_features()[0].source, "circle_center");
+  EXPECT_NEAR(transaction.added_features()[0].parameters[1], 2.1, 1e-12);
+  EXPECT_EQ(transaction.added_features()[1].parameters[0], 7.0);
+  ASSERT_EQ(transaction.added_constraints().size(), 3u);
+  const FeatureId p = Transaction::ProvisionalId(0);
+  const FeatureId q = Transaction::ProvisionalId(1);
+  EXPECT_EQ(transaction.added_constraints()[0].features,
+            (std::vector<FeatureId>{a, p}));
+  EXPECT_EQ(transaction.added_constraints()[1].features,
+            (std::vector<FeatureId>{b, q}));
+  EXPECT_EQ(transaction.added_constraints()[2].features,
+            (std::vector<FeatureId>{c, p}));
+  EXPECT_EQ(transaction.added_constraints()[2].source, "circle_center");
+  graph_.Apply(transaction);
+  EXPECT_TRUE(Detect(1, nullptr, {}, "circle_center").empty());
+  // Neither makes again what the other made.
+  EXPECT_TRUE(Detect().empty());
+}
+
+TEST_F(CenterClusterTest, CentresOfSingleCirclesStay) {
+  EXPECT_TRUE(
+      registry_.GetDetector("circle_center").make({})->keeps_followers());
+  EXPECT_EQ(registry_.GetDetector("circle_center").make({})->minimum_support(),
+            1);
+  EXPECT_FALSE(
+      registry_.GetDetector("center_cluster").make({})->keeps_followers());
+  EXPECT_THROW(Detect(1, nullptr, {{"minimum_support", 2.0}}, "circle_center"),
+               Error);
 }
 
 TEST_F(CenterClusterTest, Parameters) {

@@ -475,6 +475,48 @@ TEST_F(CurveRansacTest, ManyVirtualPoints) {
   EXPECT_EQ(lines.added_constraints().size(), 120u);
 }
 
+// Two crowded quarters of a wide land: the nearest are found all the same, and
+// no line leads from one to the other.
+TEST_F(CurveRansacTest, VirtualPointsInFarQuarters) {
+  Transaction transaction;
+  for (const double x : {0.0, 5000.0}) {
+    for (int i = 0; i < 40; ++i) {
+      transaction.AddFeature(Point(x + 3.0 * i, 1.0, 1));
+    }
+    for (int i = 0; i < 40; ++i) {
+      transaction.AddFeature(Point(x + 3.0 * i, 8.0, 1));
+    }
+  }
+  graph_.Apply(std::move(transaction));
+  const Transaction lines = Detect("line_ransac", nullptr, 1);
+  EXPECT_EQ(lines.added_features().size(), 4u);
+  EXPECT_EQ(lines.added_constraints().size(), 160u);
+}
+
+// A common centre that a circle has left is still in line with the others.
+TEST_F(CurveRansacTest, BrokenTiesToOtherThingsDoNotMatter) {
+  Transaction transaction;
+  for (int i = 0; i < 6; ++i) transaction.AddFeature(Point(3.0 * i, 1.0, 2));
+  for (int i = 0; i < 6; ++i) {
+    Feature circle;
+    circle.type = &registry_.GetFeature("circle");
+    circle.level = 1;
+    circle.is_virtual = true;
+    circle.parameters = {3.0 * i, 2.0, 1.0};
+    Constraint tie;
+    tie.type = &registry_.GetRelation("point_point_coincidence");
+    tie.features = {transaction.AddFeature(circle),
+                    Transaction::ProvisionalId(static_cast<std::size_t>(i))};
+    tie.expected = Eigen::VectorXd::Zero(2);
+    tie.information = Eigen::MatrixXd::Identity(2, 2);
+    tie.kind = ConstraintClass::kStructure;
+    tie.state = ConstraintState::kBroken;
+    transaction.AddConstraint(tie);
+  }
+  graph_.Apply(std::move(transaction));
+  EXPECT_EQ(Detect("line_ransac", nullptr, 2).added_constraints().size(), 6u);
+}
+
 TEST_F(CurveRansacTest, ShortArcsAreRefused) {
   PointWorld world(7);
   world.AddCircle(0.0, 0.0, 5.0, 0.2, 0.0, 60.0);

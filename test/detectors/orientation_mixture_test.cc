@@ -145,7 +145,7 @@ TEST_F(OrientationMixtureTest, ClutterMakesNothing) {
 TEST_F(OrientationMixtureTest, ReadsLinesAndSegmentsOfTheLevel) {
   for (int i = 0; i < 4; ++i) {
     AddLine(30.0 + 0.1 * i, 10.0, 1);
-    AddLine(70.0, 10.0, 0);
+    AddLine(70.0, 10.0, 2);
     AddSegment(30.0 + 180.0 * (i % 2), 4.0, 1);
   }
   const Transaction transaction = Detect(nullptr, 1);
@@ -159,6 +159,28 @@ TEST_F(OrientationMixtureTest, ReadsLinesAndSegmentsOfTheLevel) {
   }
   EXPECT_EQ(lines, 4);
   EXPECT_EQ(transaction.added_constraints().size(), 8u);
+}
+
+// Walls at level 0 and a row of columns at level 2 share a direction.
+TEST_F(OrientationMixtureTest, ReadsWhatHasNoOrientationFurtherDown) {
+  std::vector<FeatureId> walls;
+  for (int i = 0; i < 4; ++i) walls.push_back(AddSegment(30.0 + 0.1 * i, 4.0));
+  const FeatureId row = AddLine(30.2, 10.0, 2);
+  const TransactionResult result = graph_.Apply(Detect(nullptr, 2));
+  ASSERT_EQ(result.features.size(), 1u);
+  const FeatureId orientation = result.features[0];
+  EXPECT_EQ(graph_.GetFeature(orientation).level, 3);
+  ASSERT_EQ(result.constraints.size(), 5u);
+  EXPECT_EQ(graph_.GetConstraint(result.constraints[4]).features,
+            (std::vector<FeatureId>{row, orientation}));
+  EXPECT_TRUE(Detect(nullptr, 2).empty());
+  // They have one now.
+  EXPECT_TRUE(Detect(nullptr, 0).empty());
+  // A wall that comes later makes none of its own.
+  const std::vector<FeatureId> late = {AddSegment(30.1, 4.0)};
+  EXPECT_TRUE(Detect(nullptr, 0).empty());
+  EXPECT_EQ(Detect(nullptr, 2).added_constraints().size(), 1u);
+  EXPECT_EQ(Detect(&late, 2).added_constraints().size(), 1u);
 }
 
 TEST_F(OrientationMixtureTest, ShortFeaturesAreLeftOut) {

@@ -7,6 +7,7 @@
 #include <plumbline/factors/geman_mcclure_loss.h>
 #include <plumbline/factors/line_manifold.h>
 #include <plumbline/factors/line_orientation.h>
+#include <plumbline/factors/line_rectangle.h>
 #include <plumbline/factors/orientation_orientation.h>
 #include <plumbline/factors/point_circle_distance.h>
 #include <plumbline/factors/point_line_distance.h>
@@ -14,7 +15,9 @@
 #include <plumbline/factors/point_point_distance.h>
 #include <plumbline/factors/pose_pose.h>
 #include <plumbline/factors/pose_segment_collinearity.h>
+#include <plumbline/factors/rectangle_orientation.h>
 #include <plumbline/factors/segment_orientation.h>
+#include <plumbline/factors/segment_rectangle.h>
 
 #include <cmath>
 #include <utility>
@@ -131,8 +134,12 @@ void RegisterFeatures(Registry* registry) {
              [] { return std::make_unique<LineManifold>(); });
   AddFeature(registry, "circle", "PLUMBLINE_CIRCLE", {"x m", "y m", "R m"},
              "Circle: centre and radius", nullptr);
+  AddFeature(registry, "rectangle", "PLUMBLINE_RECTANGLE",
+             {"x m", "y m", "theta rad", "half_length m", "half_width m"},
+             "Rectangle: centre, direction, half its size along it and across",
+             nullptr);
   AddFeature(registry, "orientation", "PLUMBLINE_ORIENTATION", {"theta rad"},
-             "Direction shared by lines or segments, modulo pi",
+             "Direction shared by walls, modulo pi",
              [] { return std::make_unique<AngleManifold>(); });
 }
 
@@ -223,6 +230,34 @@ void RegisterRelations(Registry* registry) {
               "o - theta - u modulo pi; rad (Eq. 22)",
               [](const RelationArguments& a) {
                 return CostPointer(SegmentOrientation::Create(
+                    a.expected[0], a.sqrt_information(0, 0)));
+              });
+  AddRelation(
+      registry, "segment_rectangle", "PLUMBLINE_SEGMENT_RECTANGLE",
+      {{"segment"}, {"rectangle"}}, 2,
+      "distance past the side in the direction u1 of the rectangle minus u0, "
+      "and angle between them minus u1 modulo pi; m, rad (Table 1, #4)",
+      [](const RelationArguments& a) {
+        return CostPointer(
+            SegmentRectangle::Create(a.expected, a.sqrt_information));
+      });
+  AddRelation(
+      registry, "line_rectangle", "PLUMBLINE_LINE_RECTANGLE",
+      {{"line"}, {"rectangle"}}, 2,
+      "segment_rectangle with a line, its distance taken at the middle of the "
+      "side; m, rad (Table 1, #4)",
+      [](const RelationArguments& a) {
+        const std::array<double, 2>& anchor = a.features[0]->anchor;
+        return CostPointer(LineRectangle::Create(
+            a.expected, Eigen::Vector2d(anchor[0], anchor[1]),
+            a.sqrt_information));
+      });
+  AddRelation(registry, "rectangle_orientation",
+              "PLUMBLINE_RECTANGLE_ORIENTATION",
+              {{"rectangle"}, {"orientation"}}, 1,
+              "o - theta - u modulo pi; rad (Table 1, #4)",
+              [](const RelationArguments& a) {
+                return CostPointer(RectangleOrientation::Create(
                     a.expected[0], a.sqrt_information(0, 0)));
               });
   AddRelation(

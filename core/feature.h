@@ -27,6 +27,9 @@ struct FeatureType;  // core/registry.h
 ///   segment      x, y, theta       m, m, rad
 ///   line         d, alpha          m, rad; relative to `anchor`
 ///   circle       x, y, R           m
+///   rectangle    x, y, theta, half_length, half_width
+///                                  m, m, rad, m, m; half its size along theta
+///                                  and across
 ///   orientation  theta             rad
 struct Feature {
   FeatureId id = kNoId;

@@ -131,8 +131,9 @@ TEST(RegistryTest, EverythingComesInTheOrderOfNames) {
   for (const FeatureType* type : registry.features()) {
     names.push_back(type->name);
   }
-  EXPECT_THAT(names, ::testing::ElementsAre("circle", "line", "orientation",
-                                            "point", "pose", "segment"));
+  EXPECT_THAT(names,
+              ::testing::ElementsAre("circle", "line", "orientation", "point",
+                                     "pose", "rectangle", "segment"));
 }
 
 TEST(RegistryTest, GlobalIsOneInstance) {
@@ -188,7 +189,7 @@ TEST_F(BuiltinsTest, RegisteringTwiceDoesNothing) {
   const FeatureType* point = registry_.FindFeature("point");
   RegisterBuiltinRelations(&registry_);
   EXPECT_EQ(registry_.FindFeature("point"), point);
-  EXPECT_EQ(registry_.relations().size(), 10u);
+  EXPECT_EQ(registry_.relations().size(), 13u);
   EXPECT_EQ(registry_.losses().size(), 7u);
 }
 
@@ -261,6 +262,26 @@ TEST_F(BuiltinsTest, ValuesByHand) {
                        {Make("orientation", {0.1}),
                         Make("orientation", {0.15 - kPi / 2})})[0],
               0.05, 1e-12);
+}
+
+TEST_F(BuiltinsTest, SidesOfARectangle) {
+  // Half sizes 3 and 2 about (4, 5): the side on the right is at x = 7.
+  const Feature rectangle = Make("rectangle", {4.0, 5.0, 0.0, 3.0, 2.0});
+  const Eigen::VectorXd segment =
+      Residual("segment_rectangle", Numbers({0.0, kPi / 2}),
+               {Make("segment", {7.5, 4.0, kPi / 2 + 0.1}), rectangle});
+  EXPECT_NEAR(segment[0], 0.5, 1e-12);
+  EXPECT_NEAR(segment[1], 0.1, 1e-12);
+  // The line x = 7.5, downwards: d = (x - 100) for the anchor (100, 10).
+  Feature line = Make("line", {-92.5, -kPi / 2});
+  line.anchor = {100.0, 10.0};
+  const Eigen::VectorXd of_line =
+      Residual("line_rectangle", Numbers({0.0, kPi / 2}), {line, rectangle});
+  EXPECT_NEAR(of_line[0], 0.5, 1e-12);
+  EXPECT_NEAR(of_line[1], 0.0, 1e-12);
+  EXPECT_NEAR(Residual("rectangle_orientation", Numbers({kPi / 2}),
+                       {rectangle, Make("orientation", {0.2 - kPi / 2})})[0],
+              0.2, 1e-12);
 }
 
 TEST_F(BuiltinsTest, LinesAreRelativeToTheirAnchor) {

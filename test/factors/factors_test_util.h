@@ -123,6 +123,14 @@ inline Block MovePose(const Pose2& motion, const Block& pose) {
   return {moved[0], moved[1], moved[2]};
 }
 
+/// Moves a rectangle (x, y, theta, half_length, half_width).
+inline Block MoveRectangle(const Pose2& motion, const Block& rectangle) {
+  Block moved = MovePose(motion, rectangle);
+  moved.push_back(rectangle[3]);
+  moved.push_back(rectangle[4]);
+  return moved;
+}
+
 /// Moves a line whose anchor is moved with the world.
 inline Block MoveLine(const Pose2& motion, const Block& line) {
   return {line[0], NormalizeAngle(line[1] + motion[2])};

@@ -23,6 +23,9 @@ DECLARE_bool(helpfull);
 DECLARE_bool(version);
 
 namespace plumbline {
+
+const char* const kVersion = PLUMBLINE_VERSION;
+
 namespace {
 
 constexpr std::size_t kColumns = 80;

@@ -8,9 +8,8 @@
 
 namespace plumbline {
 
-/// Version of the project; the same as in the top-level CMakeLists.txt (a test
-/// compares them).
-constexpr char kVersion[] = "0.1.0";
+/// Version of the project, from the top-level CMakeLists.txt.
+extern const char* const kVersion;
 
 /// Exit statuses of every binary.
 enum ExitStatus {

@@ -1,4 +1,5 @@
 #include <plumbline/apps/log_solver.h>
+#include <plumbline/detectors/default_hierarchy.h>
 
 #include <chrono>
 #include <utility>
@@ -18,8 +19,10 @@ LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
     : registry_(registry), options_(options) {
   Hierarchy hierarchy;
   if (options_.structure) {
-    hierarchy = MakeHierarchy(options_.hierarchy, registry_, {"segment"},
-                              options_.detector_parameters);
+    hierarchy =
+        MakeHierarchy(options_.hierarchy.empty() ? DefaultHierarchy({"segment"})
+                                                 : options_.hierarchy,
+                      registry_, {"segment"}, options_.detector_parameters);
   }
   session_ =
       std::make_unique<SolverSession>(&graph_, registry_, options_.session);

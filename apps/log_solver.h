@@ -23,8 +23,8 @@ namespace plumbline {
 struct LogSolverOptions {
   /// Find structure. False: measurements only.
   bool structure = true;
-  /// Detectors by level (MakeHierarchy).
-  std::string hierarchy = "orientation_mixture/orientation_relation";
+  /// Detectors by level (MakeHierarchy); empty: DefaultHierarchy.
+  std::string hierarchy;
   std::map<std::string, DetectorParameters> detector_parameters;
   OdometryRefinementOptions odometry;
   SegmentExtractionOptions segments;

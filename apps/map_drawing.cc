@@ -119,8 +119,10 @@ Bounds BoundsOf(const MapDrawing& drawing) {
   for (const Pose2& pose : drawing.path) {
     if (IsDrawable(pose[0], pose[1])) bounds.Add(pose[0], pose[1]);
   }
-  for (const Eigen::Vector2d& point : drawing.points) {
-    if (IsDrawable(point[0], point[1])) bounds.Add(point[0], point[1]);
+  for (const auto* points : {&drawing.points, &drawing.centers}) {
+    for (const Eigen::Vector2d& point : *points) {
+      if (IsDrawable(point[0], point[1])) bounds.Add(point[0], point[1]);
+    }
   }
   if (!(bounds.min_x <= bounds.max_x)) {
     bounds.Add(-5.0, -5.0);
@@ -141,7 +143,7 @@ Bounds BoundsOf(const MapDrawing& drawing) {
   return bounds;
 }
 
-enum class Swatch { kWall, kCircle, kPath };
+enum class Swatch { kWall, kCircle, kCenter, kPath, kPoint };
 
 struct LegendEntry {
   Swatch swatch;
@@ -194,6 +196,12 @@ std::vector<LegendEntry> Legend(const MapDrawing& drawing) {
   if (!drawing.circles.empty()) {
     legend.push_back({Swatch::kCircle, kCircleColor, "circles"});
   }
+  if (!drawing.centers.empty()) {
+    legend.push_back({Swatch::kCenter, kCircleColor, "common centres"});
+  }
+  if (!drawing.points.empty()) {
+    legend.push_back({Swatch::kPoint, kPointColor, "points"});
+  }
   if (drawing.path.size() > 1) {
     legend.push_back({Swatch::kPath, kPathColor, "path"});
   }
@@ -238,6 +246,8 @@ constexpr double kRowHeight = 22.0;     // units
 constexpr double kSwatchWidth = 26.0;   // units
 constexpr double kWallWidth = 2.0;      // units
 constexpr double kPathWidth = 1.1;      // units
+constexpr double kPointRadius = 1.6;    // units
+constexpr double kCrossReach = 4.0;     // units, of a common centre
 constexpr double kLeastWidth = 420.0;   // units, so that a legend fits
 constexpr double kLeastHeight = 120.0;  // units, of the map itself
 
@@ -341,8 +351,8 @@ void DrawPoints(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
     for (const Eigen::Vector2d& point : drawing.points) {
       if (!IsDrawable(point[0], point[1])) continue;
       cairo_new_sub_path(cr);
-      cairo_arc(cr, layout.X(point[0]), layout.Y(point[1]), 1.6 * layout.unit,
-                0.0, 2.0 * kPi);
+      cairo_arc(cr, layout.X(point[0]), layout.Y(point[1]),
+                kPointRadius * layout.unit, 0.0, 2.0 * kPi);
       cairo_close_path(cr);
     }
     cairo_fill(cr);
@@ -442,6 +452,24 @@ void DrawCircles(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   cairo_stroke(cr);
 }
 
+void AddCross(cairo_t* cr, double x, double y, double reach) {
+  cairo_move_to(cr, x - reach, y);
+  cairo_line_to(cr, x + reach, y);
+  cairo_move_to(cr, x, y - reach);
+  cairo_line_to(cr, x, y + reach);
+}
+
+void DrawCenters(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
+  SetColor(cr, kCircleColor);
+  cairo_set_line_width(cr, 0.75 * kWallWidth * layout.unit);
+  for (const Eigen::Vector2d& center : drawing.centers) {
+    if (!IsDrawable(center[0], center[1])) continue;
+    AddCross(cr, layout.X(center[0]), layout.Y(center[1]),
+             kCrossReach * layout.unit);
+  }
+  cairo_stroke(cr);
+}
+
 void DrawText(cairo_t* cr, double x, double y, double size,
               const std::string& text) {
   SetColor(cr, kInkColor);
@@ -485,6 +513,14 @@ void DrawFrame(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
       cairo_new_sub_path(cr);
       cairo_arc(cr, end - 7.0 * unit, baseline - middle, 5.0 * unit, 0.0,
                 2.0 * kPi);
+    } else if (entry.swatch == Swatch::kCenter) {
+      cairo_set_line_width(cr, 0.75 * kWallWidth * unit);
+      AddCross(cr, end - 7.0 * unit, baseline - middle, kCrossReach * unit);
+    } else if (entry.swatch == Swatch::kPoint) {
+      cairo_new_sub_path(cr);
+      cairo_arc(cr, end - 7.0 * unit, baseline - middle, kPointRadius * unit,
+                0.0, 2.0 * kPi);
+      cairo_fill(cr);
     } else {
       // Thicker than in the map: colour is hard to tell on a thin line.
       cairo_set_line_width(cr,
@@ -509,6 +545,7 @@ void Draw(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   DrawPath(cr, drawing, layout);
   DrawWalls(cr, drawing, layout);
   DrawCircles(cr, drawing, layout);
+  DrawCenters(cr, drawing, layout);
   DrawFrame(cr, drawing, layout);
   CheckStatus(cairo_status(cr));
 }
@@ -633,8 +670,8 @@ MapDrawing DrawingFromGraph(const Graph& graph,
       drawing.circles.push_back({feature->parameters[0], feature->parameters[1],
                                  feature->parameters[2], feature->id});
     } else if (type == "point") {
-      drawing.points.emplace_back(feature->parameters[0],
-                                  feature->parameters[1]);
+      (feature->is_virtual ? drawing.centers : drawing.points)
+          .emplace_back(feature->parameters[0], feature->parameters[1]);
     } else if (type == "pose" && path.empty()) {
       drawing.path.emplace_back(feature->parameters[0], feature->parameters[1],
                                 feature->parameters[2]);

@@ -38,6 +38,8 @@ struct MapDrawing {
   std::vector<Pose2> path;
   /// Scan points or landmarks, m, map frame: faint, under everything.
   std::vector<Eigen::Vector2d> points;
+  /// Common centres of circles, m, map frame: crosses.
+  std::vector<Eigen::Vector2d> centers;
   /// Direction of each orientation cluster, rad, modulo pi: for the legend.
   std::vector<double> cluster_directions;
   /// One line above the map; may be empty.
@@ -51,10 +53,10 @@ struct MapDrawingOptions {
 };
 
 /// Draws the walls (segments and lines with an extent), circles and points of a
-/// graph. A wall's cluster is the orientation feature to which a live structure
-/// constraint ties it; clusters are numbered by the length of wall that they
-/// hold, longest first. An empty `path` is replaced by the graph's poses in the
-/// order of ids.
+/// graph; virtual points are common centres. A wall's cluster is the
+/// orientation feature to which a live structure constraint ties it; clusters
+/// are numbered by the length of wall that they hold, longest first. An empty
+/// `path` is replaced by the graph's poses in the order of ids.
 MapDrawing DrawingFromGraph(const Graph& graph, const std::vector<Pose2>& path);
 
 /// Ends of a wall feature (segment or line) in the map frame, m: x1, y1, x2,

@@ -15,6 +15,7 @@
 #include <plumbline/core/graph_json.h>
 #include <plumbline/core/plugin.h>
 #include <plumbline/detectors/builtins.h>
+#include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
 #include <unistd.h>
@@ -255,14 +256,9 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
     for (const Feature* feature : graph.Features()) {
       if (feature->level == 0) raw.insert(feature->type->name);
     }
-    // Structure is looked for where a detector of the hierarchy can read what
-    // the graph holds.
-    const bool has_directions = raw.count("segment") + raw.count("line") > 0;
-    if (!FLAGS_hierarchy.empty() || has_directions) {
-      hierarchy =
-          MakeHierarchy(options.hierarchy, registry, {raw.begin(), raw.end()},
-                        options.detector_parameters);
-    }
+    hierarchy = MakeHierarchy(
+        options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
+        registry, {raw.begin(), raw.end()}, options.detector_parameters);
   }
   SolverSession session(&graph, registry, options.session);
   outcome.initial_cost = session.Cost();

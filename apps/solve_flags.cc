@@ -17,8 +17,10 @@ DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 DEFINE_bool(structure, true, "Find structure; false: measurements only");
 DEFINE_string(hierarchy, "",
               "Detectors by level, levels separated by /, detectors of a level "
-              "by commas; empty: by input (a log: "
-              "orientation_mixture/orientation_relation)");
+              "by commas; empty: by input (segments: "
+              "orientation_mixture/orientation_relation; points: "
+              "line_ransac,circle_ransac/center_cluster,orientation_mixture/"
+              "orientation_relation)");
 DEFINE_string(allowed_angles, "0,45,90,135",
               "Angles between orientations that are looked for, degrees");
 DEFINE_double(angle_resolution, 0.0,
@@ -26,11 +28,20 @@ DEFINE_double(angle_resolution, 0.0,
               "--allowed_angles, degrees; 0: not set");
 PLUMBLINE_FLAG_RANGE(angle_resolution, 0.0, 90.0);
 DEFINE_double(structure_sigma_segment_orientation, 0.1,
-              "Tolerance of a wall against its orientation, degrees");
+              "Tolerance of a wall or line against its orientation, degrees");
 PLUMBLINE_FLAG_RANGE(structure_sigma_segment_orientation, 1e-3, 45.0);
 DEFINE_double(structure_sigma_orientation_orientation, 0.02,
               "Tolerance of the angle between two orientations, degrees");
 PLUMBLINE_FLAG_RANGE(structure_sigma_orientation_orientation, 1e-3, 45.0);
+DEFINE_double(structure_sigma_point_line_distance, 0.05,
+              "Tolerance of a point against its line, m");
+PLUMBLINE_FLAG_RANGE(structure_sigma_point_line_distance, 1e-5, 10.0);
+DEFINE_double(structure_sigma_point_circle_distance, 0.05,
+              "Tolerance of a point against its circle, m");
+PLUMBLINE_FLAG_RANGE(structure_sigma_point_circle_distance, 1e-5, 10.0);
+DEFINE_double(structure_sigma_point_point_coincidence, 0.05,
+              "Tolerance of the centre of a circle against a common centre, m");
+PLUMBLINE_FLAG_RANGE(structure_sigma_point_point_coincidence, 1e-5, 10.0);
 
 DEFINE_double(delta_threshold, 0.3,
               "Break structure whose delta (p-value) is below it");
@@ -118,7 +129,10 @@ std::vector<FlagGroup> SolveFlagGroups() {
       {"Structure",
        {"structure", "hierarchy", "allowed_angles", "angle_resolution",
         "structure_sigma_segment_orientation",
-        "structure_sigma_orientation_orientation"}},
+        "structure_sigma_orientation_orientation",
+        "structure_sigma_point_line_distance",
+        "structure_sigma_point_circle_distance",
+        "structure_sigma_point_point_coincidence"}},
       {"Expectation maximization",
        {"delta_threshold", "delta_mode", "em_every", "em_max_iterations"}},
       {"Front-end",
@@ -132,7 +146,7 @@ std::vector<FlagGroup> SolveFlagGroups() {
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   LogSolverOptions options;
   options.structure = FLAGS_structure;
-  if (!FLAGS_hierarchy.empty()) options.hierarchy = FLAGS_hierarchy;
+  options.hierarchy = FLAGS_hierarchy;
 
   auto set = [&](const std::string& detector, const std::string& name,
                  double value) {
@@ -144,6 +158,9 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
       FLAGS_structure_sigma_segment_orientation);
   set("orientation_relation", "sigma_deg",
       FLAGS_structure_sigma_orientation_orientation);
+  set("line_ransac", "sigma", FLAGS_structure_sigma_point_line_distance);
+  set("circle_ransac", "sigma", FLAGS_structure_sigma_point_circle_distance);
+  set("center_cluster", "sigma", FLAGS_structure_sigma_point_point_coincidence);
   if (FLAGS_angle_resolution > 0.0) {
     set("orientation_relation", "resolution_deg", FLAGS_angle_resolution);
   } else {

@@ -19,7 +19,9 @@
 #include <plumbline/factors/segment_orientation.h>
 #include <plumbline/factors/segment_rectangle.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace plumbline {
@@ -34,11 +36,12 @@ constexpr double kInlierProbability = 0.95;
 // that is 4.42 standard deviations, near its usual constant of 4.685.
 constexpr double kRejectionProbability = 1.0 - 1e-5;
 
-void AddFeature(Registry* registry, const std::string& name,
-                const std::string& g2o_tag,
-                std::vector<std::string> parameter_names,
-                const std::string& description,
-                std::function<std::unique_ptr<ceres::Manifold>()> manifold) {
+void AddFeature(
+    Registry* registry, const std::string& name, const std::string& g2o_tag,
+    std::vector<std::string> parameter_names, const std::string& description,
+    std::function<std::unique_ptr<ceres::Manifold>()> manifold,
+    std::function<void(const std::vector<const Feature*>&, Feature*)>
+        update_extent = nullptr) {
   if (registry->FindFeature(name) != nullptr) return;
   FeatureType type;
   type.name = name;
@@ -47,6 +50,7 @@ void AddFeature(Registry* registry, const std::string& name,
   type.parameter_names = std::move(parameter_names);
   type.description = description;
   type.make_manifold = std::move(manifold);
+  type.update_extent = std::move(update_extent);
   registry->Register(std::move(type));
 }
 
@@ -118,6 +122,29 @@ CostPointer WithPointSize(const Feature& feature, const Function& make) {
   }
 }
 
+// Points, poses and circles (by their centres) carry a line; a line carried by
+// none keeps its extent.
+void UpdateLineExtent(const std::vector<const Feature*>& support,
+                      Feature* line) {
+  const double c = std::cos(line->parameters[1]);
+  const double s = std::sin(line->parameters[1]);
+  double begin = std::numeric_limits<double>::infinity();
+  double end = -begin;
+  for (const Feature* feature : support) {
+    const std::string& type = feature->type->name;
+    if (type != "point" && type != "pose" && type != "circle") continue;
+    // The foot point is seen from the anchor at right angles to the line.
+    const double along = c * (feature->parameters[0] - line->anchor[0]) +
+                         s * (feature->parameters[1] - line->anchor[1]);
+    if (!std::isfinite(along)) continue;
+    begin = std::min(begin, along);
+    end = std::max(end, along);
+  }
+  if (begin > end) return;
+  line->extent_begin = begin;
+  line->extent_end = end;
+}
+
 void RegisterFeatures(Registry* registry) {
   // Poses and segments have no manifold: their residuals wrap angles, the
   // session wraps headings after a solve, and Jacobians are cheaper so.
@@ -129,9 +156,10 @@ void RegisterFeatures(Registry* registry) {
   AddFeature(registry, "segment", "PLUMBLINE_SEGMENT",
              {"x m", "y m", "theta rad"},
              "Wall segment: a pose on it, x along the wall", nullptr);
-  AddFeature(registry, "line", "PLUMBLINE_LINE", {"d m", "alpha rad"},
-             "Line: signed distance from its anchor and direction",
-             [] { return std::make_unique<LineManifold>(); });
+  AddFeature(
+      registry, "line", "PLUMBLINE_LINE", {"d m", "alpha rad"},
+      "Line: signed distance from its anchor and direction",
+      [] { return std::make_unique<LineManifold>(); }, UpdateLineExtent);
   AddFeature(registry, "circle", "PLUMBLINE_CIRCLE", {"x m", "y m", "R m"},
              "Circle: centre and radius", nullptr);
   AddFeature(registry, "rectangle", "PLUMBLINE_RECTANGLE",

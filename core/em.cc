@@ -429,15 +429,39 @@ struct EmOrchestrator::Impl final : public GraphListener {
     return scope;
   }
 
+  void UpdateExtent(FeatureId id) {
+    Feature* feature = graph->FindFeature(id);
+    if (feature == nullptr || !feature->is_virtual ||
+        !feature->type->update_extent) {
+      return;
+    }
+    std::vector<const Feature*> support;
+    for (const ConstraintId constraint_id : graph->ConstraintsOf(id)) {
+      const Constraint& constraint = *graph->FindConstraint(constraint_id);
+      if (!IsLiveStructure(constraint)) continue;
+      for (const FeatureId other_id : constraint.features) {
+        const Feature& other = *graph->FindFeature(other_id);
+        if (other.level < feature->level) support.push_back(&other);
+      }
+    }
+    feature->type->update_extent(support, feature);
+  }
+
   void Optimize(const Scope& scope) {
     const auto start = std::chrono::steady_clock::now();
     if (scope.features == nullptr) {
       if (is_dirty) {
         is_usable = session->SolveGlobal().usable;
         is_dirty = false;
+        for (int level = 0; level <= highest_level; ++level) {
+          for (const FeatureId id : graph->VirtualFeatures(level)) {
+            UpdateExtent(id);
+          }
+        }
       }
     } else {
       is_usable = session->SolveLocal(scope.variables).usable;
+      for (const FeatureId id : scope.variables) UpdateExtent(id);
     }
     totals.solve_seconds += SecondsSince(start);
   }

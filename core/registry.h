@@ -36,6 +36,13 @@ struct FeatureType {
   /// Makes the manifold on which the parameters live; null when they are
   /// Euclidean. One instance may serve every block of the type.
   std::function<std::unique_ptr<ceres::Manifold>()> make_manifold;
+  /// Recomputes where the visible part of a virtual feature begins and ends
+  /// (Feature::extent_*) from the features of lower levels that live structure
+  /// constraints tie to it. Called after solves, which move both. Null when the
+  /// type has no such part.
+  std::function<void(const std::vector<const Feature*>& support,
+                     Feature* feature)>
+      update_extent;
 };
 
 /// What a relation's factory gets.

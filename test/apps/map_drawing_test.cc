@@ -285,6 +285,30 @@ TEST_F(MapDrawingTest, WallEndsOfSegmentsAndLines) {
   EXPECT_FALSE(WallEnds(MakeFeature("circle", {0.0, 0.0, 1.0}, 0, 1), &wall));
 }
 
+TEST_F(MapDrawingTest, PointsAndCommonCenters) {
+  Graph graph;
+  Transaction transaction;
+  transaction.AddFeature(MakeFeature("point", {1.0, 2.0}));
+  transaction.AddFeature(MakeFeature("point", {9.0, 2.0}));
+  Feature center = MakeFeature("point", {5.0, 8.0});
+  center.is_virtual = true;
+  center.level = 2;
+  transaction.AddFeature(center);
+  graph.Apply(std::move(transaction));
+  const MapDrawing drawing = DrawingFromGraph(graph, {});
+  ASSERT_EQ(drawing.points.size(), 2u);
+  EXPECT_EQ(drawing.points[1], Eigen::Vector2d(9.0, 2.0));
+  ASSERT_EQ(drawing.centers.size(), 1u);
+  EXPECT_EQ(drawing.centers[0], Eigen::Vector2d(5.0, 8.0));
+  WriteMapPng(drawing, File("map.png"));
+  const Picture picture(File("map.png"));
+  constexpr int kCircleColor = 0xE69F00;
+  // The cross is in the middle at the top, its entry in the legend below.
+  EXPECT_GT(picture.Count(kCircleColor, 0.3, 0.0, 0.7, 0.4), 10);
+  EXPECT_EQ(picture.Count(kCircleColor, 0.0, 0.4, 1.0, 0.85), 0);
+  EXPECT_GT(picture.Count(kCircleColor, 0.0, 0.85, 1.0, 1.0), 10);
+}
+
 TEST_F(MapDrawingTest, ClustersOfAGraphByLengthOfWall) {
   Graph graph;
   Transaction transaction;

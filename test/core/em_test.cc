@@ -601,6 +601,64 @@ TEST_F(EmTest, DroppingGoesUpTheLevels) {
   EXPECT_EQ(Live(), 2);
 }
 
+// A line is as long as what carries it, when more joins and when some breaks.
+TEST_F(EmTest, ExtentsFollowTheSupport) {
+  std::vector<FeatureId> points;
+  const auto add_point = [&](double x, double y) {
+    Feature point;
+    point.type = &registry_.GetFeature("point");
+    point.parameters = {x, y};
+    point.fixed = true;
+    Transaction transaction;
+    transaction.AddFeature(point);
+    points.push_back(graph_.Apply(transaction).features[0]);
+  };
+  for (double x : {10.0, 11.0, 12.0, 13.0}) add_point(x, 5.0);
+  FeatureId line = kNoId;
+  const auto tie = [&](FeatureId point, FeatureId to) {
+    return Structure(registry_, "point_line_distance", point, to, 0.0, 1.0);
+  };
+  Add(0, "lines", 2,
+      [&](const Graph& graph, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        FeatureId to = line;
+        if (line == kNoId) {
+          Feature feature;
+          feature.type = &registry.GetFeature("line");
+          feature.level = 1;
+          feature.anchor = {10.0, 5.0};
+          feature.extent_begin = -7.0;
+          feature.extent_end = 99.0;
+          to = transaction.AddFeature(feature);
+        }
+        for (const FeatureId point : points) {
+          if (graph.ConstraintsOf(point).empty()) {
+            transaction.AddConstraint(tie(point, to));
+          }
+        }
+        return transaction;
+      });
+  Make().Iterate();
+  ASSERT_EQ(graph_.VirtualFeatures(1).size(), 1u);
+  line = graph_.VirtualFeatures(1)[0];
+  EXPECT_NEAR(graph_.GetFeature(line).extent_begin, 0.0, 1e-9);
+  EXPECT_NEAR(graph_.GetFeature(line).extent_end, 3.0, 1e-9);
+  add_point(20.0, 5.0);
+  em_->Run();
+  EXPECT_NEAR(graph_.GetFeature(line).extent_end, 10.0, 1e-9);
+  // The same with a scope.
+  add_point(6.0, 5.0);
+  em_->Iterate(&points);
+  EXPECT_NEAR(graph_.GetFeature(line).extent_begin, -4.0, 1e-9);
+  // The point at the far end is lost.
+  Transaction transaction;
+  transaction.BreakConstraint(graph_.ConstraintsOf(points[4])[0]);
+  graph_.Apply(transaction);
+  EXPECT_TRUE(em_->Run().converged);
+  EXPECT_NEAR(graph_.GetFeature(line).extent_begin, -4.0, 1e-9);
+  EXPECT_NEAR(graph_.GetFeature(line).extent_end, 3.0, 1e-9);
+}
+
 TEST_F(EmTest, TooLittleSupportIsNotAdded) {
   AddSegment(0.0);
   AddSegment(0.0);

@@ -1,0 +1,23 @@
+#ifndef PLUMBLINE_DETECTORS_DEFAULT_HIERARCHY_H_
+#define PLUMBLINE_DETECTORS_DEFAULT_HIERARCHY_H_
+
+#include <set>
+#include <string>
+
+namespace plumbline {
+
+/// The hierarchy (MakeHierarchy) that is looked for in a graph with these types
+/// of raw features when nothing is asked for (method.md, section 5):
+///
+///   point          line_ransac,circle_ransac /
+///                  center_cluster,orientation_mixture / orientation_relation
+///   segment, line  orientation_mixture / orientation_relation
+///   circle         center_cluster
+///
+/// Those of several types are laid over each other, level by level. Empty when
+/// no type has structure of its own (poses).
+std::string DefaultHierarchy(const std::set<std::string>& raw_feature_types);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_DEFAULT_HIERARCHY_H_

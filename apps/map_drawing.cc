@@ -685,6 +685,7 @@ MapDrawing DrawingFromGraph(const Graph& graph,
   std::map<FeatureId, int> clusters;
   for (std::size_t i = 0; i < order.size(); ++i) {
     clusters[order[i].first] = static_cast<int>(i);
+    drawing.cluster_features.push_back(order[i].first);
     drawing.cluster_directions.push_back(
         graph.GetFeature(order[i].first).parameters[0]);
   }

@@ -42,6 +42,8 @@ struct MapDrawing {
   std::vector<Eigen::Vector2d> centers;
   /// Direction of each orientation cluster, rad, modulo pi: for the legend.
   std::vector<double> cluster_directions;
+  /// The orientation feature of each cluster; empty when not made from a graph.
+  std::vector<FeatureId> cluster_features;
   /// One line above the map; may be empty.
   std::string title;
 };

@@ -2,17 +2,13 @@
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/app.h>
-#include <plumbline/apps/em_trace.h>
 #include <plumbline/apps/log_solver.h>
-#include <plumbline/apps/map_drawing.h>
 #include <plumbline/apps/progress.h>
-#include <plumbline/apps/relations.h>
 #include <plumbline/apps/solve_flags.h>
+#include <plumbline/apps/solve_outputs.h>
 #include <plumbline/apps/summary.h>
-#include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
-#include <plumbline/core/graph_json.h>
 #include <plumbline/core/plugin.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/default_hierarchy.h>
@@ -24,15 +20,10 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <exception>
 #include <filesystem>
-#include <functional>
-#include <iostream>
-#include <mutex>
 #include <set>
 #include <sstream>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -75,99 +66,37 @@ void ListPlugins(const Registry& registry) {
   }
 }
 
-// Runs the tasks on so many threads; the first exception, in the order of
-// tasks, is thrown again when all have ended.
-void RunTasks(const std::vector<std::function<void()>>& tasks, int threads) {
-  std::vector<std::exception_ptr> failures(tasks.size());
-  std::mutex mutex;
-  std::size_t next = 0;
-  auto work = [&] {
-    for (;;) {
-      std::size_t index;
-      {
-        std::lock_guard<std::mutex> lock(mutex);
-        if (next == tasks.size()) return;
-        index = next++;
-      }
-      try {
-        tasks[index]();
-      } catch (...) {
-        failures[index] = std::current_exception();
-      }
-    }
-  };
-  std::vector<std::thread> pool;
-  for (int i = 1; i < threads && i < static_cast<int>(tasks.size()); ++i) {
-    pool.emplace_back(work);
+// Writes all files, the summary last: it knows what the others took.
+void WriteOutputs(SolveOutcome* outcome, double total_begin) {
+  const std::filesystem::path folder(FLAGS_output_dir);
+  const double begin = Now();
+  CountGraph(*outcome->graph, &outcome->summary);
+  for (const std::string& line :
+       WriteSolveOutputs(*outcome, SelectOutputs(FLAGS_outputs), folder,
+                         NumThreadsFromFlags())) {
+    std::fprintf(stderr, "%s\n", line.c_str());
   }
-  work();
-  for (std::thread& thread : pool) thread.join();
-  for (const std::exception_ptr& failure : failures) {
-    if (failure) std::rethrow_exception(failure);
-  }
+  outcome->summary.write_seconds = Now() - begin;
+  outcome->summary.total_seconds = Now() - total_begin;
+  outcome->summary.peak_memory_bytes = PeakMemoryBytes();
+  WriteSummary(outcome->summary, folder / "summary.json");
 }
 
-// What both kinds of input come to.
-struct Outcome {
-  std::vector<Pose2> trajectory;
-  std::vector<TimedPose> timed_trajectory;
-  std::vector<EmPhase> trace;
-  CostReport initial_cost;
-  CostReport final_cost;
-  EmReport em;
-  G2oFile g2o;
-  bool is_graph = false;
-  std::string title;
-};
-
-void WriteOutputs(const Graph& graph, const Outcome& outcome, Summary* summary,
-                  double total_begin) {
-  const std::filesystem::path dir(FLAGS_output_dir);
-  const double begin = Now();
-  MapDrawing drawing = DrawingFromGraph(graph, outcome.trajectory);
-  drawing.title = outcome.title;
-  std::vector<EmTraceRow> rows;
-  for (const EmPhase& phase : outcome.trace) rows.push_back({phase, {}});
-  std::vector<std::function<void()>> tasks = {
-      [&] { WriteMapPng(drawing, dir / "map.png"); },
-      [&] {
-        WriteFileAtomically(dir / "map.json", [&](std::ostream& output) {
-          WriteGraphJson(graph, output);
-        });
-      },
-      [&] {
-        WriteFileAtomically(dir / "graph.g2o", [&](std::ostream& output) {
-          WriteG2o(graph, outcome.is_graph ? &outcome.g2o : nullptr, output);
-        });
-      },
-      [&] { WriteMapSvg(drawing, dir / "map.svg"); },
-      [&] { WriteEmTrace(rows, dir / "em_trace.csv"); },
-  };
-  if (!outcome.timed_trajectory.empty()) {
-    tasks.push_back([&] {
-      WriteFileAtomically(dir / "trajectory.tum", [&](std::ostream& output) {
-        WriteTum(outcome.timed_trajectory, output);
-      });
-    });
-  }
-  RunTasks(tasks, NumThreadsFromFlags());
-
-  CountGraph(graph, summary);
-  summary->initial_cost = outcome.initial_cost.total();
-  summary->measurement_cost = outcome.final_cost.measurement;
-  summary->structure_cost = outcome.final_cost.structure;
-  summary->em_iterations = outcome.em.iterations;
-  summary->em_converged = outcome.em.converged;
-  summary->detect_seconds = outcome.em.detect_seconds;
-  summary->solve_seconds = outcome.em.solve_seconds;
-  summary->write_seconds = Now() - begin;
-  summary->total_seconds = Now() - total_begin;
-  summary->peak_memory_bytes = PeakMemoryBytes();
-  WriteSummary(*summary, dir / "summary.json");
+// What the summary says of costs and EM.
+void Summarize(const CostReport& initial, const CostReport& last,
+               const EmReport& em, Summary* summary) {
+  summary->initial_cost = initial.total();
+  summary->measurement_cost = last.measurement;
+  summary->structure_cost = last.structure;
+  summary->em_iterations = em.iterations;
+  summary->em_converged = em.converged;
+  summary->detect_seconds = em.detect_seconds;
+  summary->solve_seconds = em.solve_seconds;
 }
 
 int SolveLog(InputStream* input, const Registry& registry, double begin) {
-  Summary summary;
+  SolveOutcome outcome;
+  Summary& summary = outcome.summary;
   summary.input = FLAGS_input;
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
@@ -203,30 +132,31 @@ int SolveLog(InputStream* input, const Registry& registry, double begin) {
   summary.scan_seconds.assign(result.scan_seconds.begin(),
                               result.scan_seconds.end());
 
-  Outcome outcome;
-  outcome.trajectory = result.trajectory;
   for (std::size_t i = 0; i < result.trajectory.size(); ++i) {
     TimedPose timed;
     timed.timestamp = log.scans[i].timestamp;
     timed.timestamp_text = log.scans[i].timestamp_text;
     timed.pose = result.trajectory[i];
-    outcome.timed_trajectory.push_back(timed);
+    outcome.trajectory.push_back(timed);
   }
+  result.em.detect_seconds = result.detect_seconds;
+  result.em.solve_seconds = result.solve_seconds;
+  Summarize(result.initial_cost, result.final_cost, result.em, &summary);
+  outcome.graph = &solver.graph();
+  outcome.registry = &registry;
+  outcome.scans = &log.scans;
   outcome.trace = solver.trace();
-  outcome.initial_cost = result.initial_cost;
-  outcome.final_cost = result.final_cost;
-  outcome.em = result.em;
-  outcome.em.detect_seconds = result.detect_seconds;
-  outcome.em.solve_seconds = result.solve_seconds;
+  outcome.occupancy = OccupancyOptionsFromFlags();
   outcome.title =
       std::filesystem::path(input->name()).filename().string() +
       (FLAGS_structure ? ", with structure" : ", without structure");
-  WriteOutputs(solver.graph(), outcome, &summary, begin);
+  WriteOutputs(&outcome, begin);
   return kExitSuccess;
 }
 
 int SolveGraph(InputStream* input, const Registry& registry, double begin) {
-  Summary summary;
+  SolveOutcome outcome;
+  Summary& summary = outcome.summary;
   summary.input = FLAGS_input;
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
@@ -234,17 +164,16 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
 
   const double parse_begin = Now();
   Graph graph;
-  Outcome outcome;
-  outcome.is_graph = true;
+  G2oFile g2o;
   {
     std::istringstream text(input->ReadRest());
     if (!input->damage().empty()) {
       throw Error(input->name(), 0, input->damage(), "a whole graph");
     }
-    outcome.g2o = ReadG2o(text, input->name(), registry, &graph);
+    g2o = ReadG2o(text, input->name(), registry, &graph);
   }
   summary.parse_seconds = Now() - parse_begin;
-  for (const auto& tag : outcome.g2o.unknown_tags) {
+  for (const auto& tag : g2o.unknown_tags) {
     std::fprintf(stderr,
                  "%s: %d lines with the unknown tag %s kept as they are\n",
                  input->name().c_str(), tag.second, tag.first.c_str());
@@ -261,14 +190,17 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
         registry, {raw.begin(), raw.end()}, options.detector_parameters);
   }
   SolverSession session(&graph, registry, options.session);
-  outcome.initial_cost = session.Cost();
+  const CostReport initial_cost = session.Cost();
   EmOrchestrator em(&graph, &session, registry, std::move(hierarchy),
                     options.em);
   em.SetTrace([&](const EmPhase& phase) { outcome.trace.push_back(phase); });
-  outcome.em = em.Run(InterruptRequested);
-  outcome.final_cost = session.Cost();
+  const EmReport report = em.Run(InterruptRequested);
+  Summarize(initial_cost, session.Cost(), report, &summary);
+  outcome.graph = &graph;
+  outcome.registry = &registry;
+  outcome.g2o = &g2o;
   outcome.title = std::filesystem::path(input->name()).filename().string();
-  WriteOutputs(graph, outcome, &summary, begin);
+  WriteOutputs(&outcome, begin);
   return kExitSuccess;
 }
 
@@ -287,6 +219,8 @@ int Run() {
                  "--help\n");
     return kExitUsage;
   }
+  // Wrong lists are refused before the work.
+  SelectOutputs(FLAGS_outputs);
   InputStream input(FLAGS_input);
   const std::string_view prefix = input.Peek(1 << 16);
   const bool is_graph = LooksLikeG2o(prefix) && !LooksLikeCarmenLog(prefix);

@@ -14,6 +14,13 @@ DEFINE_string(
     "standard input");
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 
+DEFINE_string(outputs, "default",
+              "Files to write beside summary.json: all, default (all but "
+              "floorplan.geojson), none, or names separated by commas; a minus "
+              "in front takes one out: -report.html,-occupancy.pgm");
+DEFINE_double(grid_resolution, 0.05, "Side of a cell of occupancy.pgm, m");
+PLUMBLINE_FLAG_RANGE(grid_resolution, 0.001, 10.0);
+
 DEFINE_bool(structure, true, "Find structure; false: measurements only");
 DEFINE_string(hierarchy, "",
               "Detectors by level, levels separated by /, detectors of a level "
@@ -125,7 +132,8 @@ std::vector<double> ParseList(const std::string& flag,
 
 std::vector<FlagGroup> SolveFlagGroups() {
   return {
-      {"Input and output", {"input", "output_dir"}},
+      {"Input and output",
+       {"input", "output_dir", "outputs", "grid_resolution"}},
       {"Structure",
        {"structure", "hierarchy", "allowed_angles", "angle_resolution",
         "structure_sigma_segment_orientation",
@@ -181,6 +189,13 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.em.seed = FLAGS_seed;
   options.em_every = FLAGS_em_every;
   options.relocalize = FLAGS_refine != "none";
+  return options;
+}
+
+OccupancyOptions OccupancyOptionsFromFlags() {
+  OccupancyOptions options;
+  options.resolution = FLAGS_grid_resolution;
+  options.usable_range = FLAGS_usable_range;
   return options;
 }
 

@@ -4,6 +4,7 @@
 #include <gflags/gflags_declare.h>
 #include <plumbline/apps/app.h>
 #include <plumbline/apps/log_solver.h>
+#include <plumbline/apps/occupancy_grid.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/carmen_reader.h>
 
@@ -11,6 +12,7 @@
 
 DECLARE_string(input);
 DECLARE_string(output_dir);
+DECLARE_string(outputs);
 DECLARE_bool(structure);
 DECLARE_string(hierarchy);
 DECLARE_uint64(seed);
@@ -27,6 +29,9 @@ std::vector<FlagGroup> SolveFlagGroups();
 /// that structure tolerances are handed to. Throws Error for values that do
 /// not fit together or do not parse.
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry);
+
+/// Resolution and range of occupancy.pgm.
+OccupancyOptions OccupancyOptionsFromFlags();
 
 /// Laser flags for the log reader.
 CarmenOptions CarmenOptionsFromFlags();

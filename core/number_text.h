@@ -17,6 +17,24 @@ inline void AppendNumber(double value, std::string* text) {
   text->append(buffer, result.ptr);
 }
 
+/// Appends a number with so many digits behind the point, whatever the locale;
+/// never "-0.00". Numbers past 1e15 are written with an exponent.
+inline void AppendFixed(double value, int decimals, std::string* text) {
+  char buffer[64];
+  const bool is_large = !(value > -1e15 && value < 1e15);
+  const std::to_chars_result result =
+      is_large ? std::to_chars(buffer, buffer + sizeof(buffer), value)
+               : std::to_chars(buffer, buffer + sizeof(buffer), value,
+                               std::chars_format::fixed, decimals);
+  std::string_view digits(buffer,
+                          static_cast<std::size_t>(result.ptr - buffer));
+  if (digits[0] == '-' &&
+      digits.find_first_not_of("-0.") == std::string_view::npos) {
+    digits.remove_prefix(1);
+  }
+  text->append(digits);
+}
+
 /// Appends a whole number.
 inline void AppendNumber(std::int64_t value, std::string* text) {
   char buffer[32];

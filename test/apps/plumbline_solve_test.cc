@@ -36,14 +36,18 @@ using ::testing::StartsWith;
 
 const std::set<std::string>& FilesOfALog() {
   static const auto* files = new std::set<std::string>{
-      "em_trace.csv", "graph.g2o",    "map.json",      "map.png",
-      "map.svg",      "summary.json", "trajectory.tum"};
+      "em_trace.csv",   "floorplan.dxf", "floorplan.svg", "graph.g2o",
+      "map.json",       "map.png",       "map.svg",       "occupancy.pgm",
+      "occupancy.yaml", "summary.json",  "trajectory.tum"};
   return *files;
 }
 
 std::set<std::string> FilesOfAGraph() {
   std::set<std::string> files = FilesOfALog();
-  files.erase("trajectory.tum");
+  for (const char* name :
+       {"trajectory.tum", "occupancy.pgm", "occupancy.yaml"}) {
+    files.erase(name);
+  }
   return files;
 }
 
@@ -378,6 +382,54 @@ TEST_F(SolveTest, SameBytesEveryTime) {
   ExpectSame("a", "b");
   ExpectSame("a", "one");
   ExpectSame("a", "two");
+}
+
+TEST_F(SolveTest, FilesThatAreAskedFor) {
+  const std::string log = Write("office.log", Join(OfficeLines(60)));
+  std::string output;
+  using Names = std::set<std::string>;
+  ASSERT_EQ(Solve(log, "none", "--outputs=none", &output), 0) << output;
+  EXPECT_EQ(Files("none"), Names{"summary.json"});
+  ASSERT_EQ(Solve(log, "some", "--outputs=map.json,occupancy.pgm", &output), 0);
+  EXPECT_EQ(Files("some"), (Names{"map.json", "occupancy.pgm", "occupancy.yaml",
+                                  "summary.json"}));
+  ASSERT_EQ(Solve(log, "but", "--outputs=-map.png,-graph.g2o", &output), 0);
+  Names expected = FilesOfALog();
+  expected.erase("map.png");
+  expected.erase("graph.g2o");
+  EXPECT_EQ(Files("but"), expected);
+  ASSERT_EQ(Solve(log, "all", "--outputs=all", &output), 0);
+  expected = FilesOfALog();
+  expected.insert("floorplan.geojson");
+  EXPECT_EQ(Files("all"), expected);
+  EXPECT_EQ(Solve(log, "wrong", "--outputs=map.png,map.gif", &output), 2);
+  EXPECT_THAT(output, HasSubstr("unknown file 'map.gif': expected names"));
+  EXPECT_THAT(output, HasSubstr("floorplan.dxf"));
+  EXPECT_TRUE(Files("wrong").empty());
+}
+
+// A grid that no memory holds is left out, with a message; the rest is there.
+TEST_F(SolveTest, GridThatIsTooLarge) {
+  std::string text;
+  for (int i = 0; i < 5; ++i) {
+    const double x = 40000.0 * i;
+    text += "FLASER 3 5 5 5";
+    for (int j = 0; j < 2; ++j) {
+      text += " " + std::to_string(x) + " " + std::to_string(x) + " 0";
+    }
+    text += " " + std::to_string(100 + i) + " host 0\n";
+  }
+  std::string output;
+  ASSERT_EQ(Solve(Write("far.log", text), "out",
+                  "--odometry_refinement=false --refine=none", &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("occupancy.pgm not written: "));
+  EXPECT_THAT(output, HasSubstr("cells of 0.05 m"));
+  std::set<std::string> expected = FilesOfALog();
+  expected.erase("occupancy.pgm");
+  expected.erase("occupancy.yaml");
+  EXPECT_EQ(Files("out"), expected);
 }
 
 TEST_F(SolveTest, WithoutStructure) {

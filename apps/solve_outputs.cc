@@ -1,0 +1,218 @@
+#include <plumbline/apps/em_trace.h>
+#include <plumbline/apps/floor_plan.h>
+#include <plumbline/apps/floor_plan_dxf.h>
+#include <plumbline/apps/floor_plan_geojson.h>
+#include <plumbline/apps/floor_plan_svg.h>
+#include <plumbline/apps/map_drawing.h>
+#include <plumbline/apps/solve_outputs.h>
+#include <plumbline/core/atomic_file.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/graph_json.h>
+
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <sstream>
+#include <thread>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using std::filesystem::path;
+
+std::vector<Pose2> Poses(const SolveOutcome& outcome) {
+  std::vector<Pose2> poses;
+  poses.reserve(outcome.trajectory.size());
+  for (const TimedPose& timed : outcome.trajectory) poses.push_back(timed.pose);
+  return poses;
+}
+
+MapDrawing Drawing(const SolveOutcome& outcome) {
+  MapDrawing drawing = DrawingFromGraph(*outcome.graph, Poses(outcome));
+  drawing.title = outcome.title;
+  return drawing;
+}
+
+FloorPlan Plan(const SolveOutcome& outcome) {
+  FloorPlan plan = MakeFloorPlan(*outcome.graph, Poses(outcome));
+  plan.title = outcome.title;
+  return plan;
+}
+
+std::string WriteOccupancy(const SolveOutcome& outcome, const path& folder) {
+  std::optional<OccupancyGrid> grid;
+  try {
+    grid = MakeOccupancyGrid(*outcome.scans, Poses(outcome), outcome.occupancy);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  WriteOccupancyMap(*grid, folder / "occupancy");
+  return "";
+}
+
+// For writers that have no reason not to write.
+template <typename Write>
+auto Always(Write write) {
+  return [write](const SolveOutcome& outcome, const path& folder) {
+    write(outcome, folder);
+    return std::string();
+  };
+}
+
+// Runs the tasks on so many threads; the first exception, in the order of
+// tasks, is thrown again when all have ended.
+void RunTasks(const std::vector<std::function<void()>>& tasks, int threads) {
+  std::vector<std::exception_ptr> failures(tasks.size());
+  std::mutex mutex;
+  std::size_t next = 0;
+  auto work = [&] {
+    for (;;) {
+      std::size_t index;
+      {
+        std::lock_guard<std::mutex> lock(mutex);
+        if (next == tasks.size()) return;
+        index = next++;
+      }
+      try {
+        tasks[index]();
+      } catch (...) {
+        failures[index] = std::current_exception();
+      }
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int i = 1; i < threads && i < static_cast<int>(tasks.size()); ++i) {
+    pool.emplace_back(work);
+  }
+  work();
+  for (std::thread& thread : pool) thread.join();
+  for (const std::exception_ptr& failure : failures) {
+    if (failure) std::rethrow_exception(failure);
+  }
+}
+
+std::vector<SolveOutput> MakeSolveOutputs() {
+  std::vector<SolveOutput> outputs;
+  const auto add = [&](const char* name, const char* description,
+                       bool by_default, bool of_scans, auto write) {
+    outputs.push_back({name, description, by_default, of_scans, write});
+  };
+  add("map.png", "the map as a picture", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteMapPng(Drawing(outcome), folder / "map.png");
+      }));
+  add("map.svg", "the map as a picture that can be zoomed", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteMapSvg(Drawing(outcome), folder / "map.svg");
+      }));
+  add("map.json", "every feature and constraint", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFileAtomically(folder / "map.json", [&](std::ostream& output) {
+          WriteGraphJson(*outcome.graph, output);
+        });
+      }));
+  add("graph.g2o", "the same as g2o text", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFileAtomically(folder / "graph.g2o", [&](std::ostream& output) {
+          WriteG2o(*outcome.graph, outcome.g2o, output);
+        });
+      }));
+  add("em_trace.csv", "a row a phase of expectation maximization", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        std::vector<EmTraceRow> rows;
+        for (const EmPhase& phase : outcome.trace) rows.push_back({phase, {}});
+        WriteEmTrace(rows, folder / "em_trace.csv");
+      }));
+  add("trajectory.tum", "the pose of every scan", true, true,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFileAtomically(folder / "trajectory.tum",
+                            [&](std::ostream& output) {
+                              WriteTum(outcome.trajectory, output);
+                            });
+      }));
+  add("floorplan.dxf", "walls as CAD lines, layers by direction", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFloorPlanDxf(Plan(outcome), folder / "floorplan.dxf");
+      }));
+  add("floorplan.svg", "the plan on paper, to scale", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFloorPlanSvg(Plan(outcome), folder / "floorplan.svg");
+      }));
+  add("floorplan.geojson", "the plan as GeoJSON in metres of the map", false,
+      false, Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFloorPlanGeoJson(Plan(outcome), folder / "floorplan.geojson");
+      }));
+  add("occupancy.pgm", "a grid for ROS map_server and Nav2, and its .yaml",
+      true, true, WriteOccupancy);
+  return outputs;
+}
+
+}  // namespace
+
+const std::vector<SolveOutput>& SolveOutputs() {
+  static const auto* outputs = new std::vector<SolveOutput>(MakeSolveOutputs());
+  return *outputs;
+}
+
+std::set<std::string> SelectOutputs(const std::string& list) {
+  std::set<std::string> all;
+  std::set<std::string> by_default;
+  for (const SolveOutput& output : SolveOutputs()) {
+    all.insert(output.name);
+    if (output.by_default) by_default.insert(output.name);
+  }
+  std::set<std::string> selected;
+  if (!list.empty() && list[0] == '-') selected = by_default;
+  std::istringstream words(list);
+  std::string word;
+  while (std::getline(words, word, ',')) {
+    if (word.empty() || word == "none") continue;
+    if (word == "all") {
+      selected = all;
+    } else if (word == "default") {
+      selected.insert(by_default.begin(), by_default.end());
+    } else if (all.count(word) > 0) {
+      selected.insert(word);
+    } else if (word[0] == '-' && all.count(word.substr(1)) > 0) {
+      selected.erase(word.substr(1));
+    } else {
+      std::string names = "all, default, none";
+      for (const SolveOutput& output : SolveOutputs()) {
+        names += ", " + output.name;
+      }
+      throw Error("--outputs", 0, "unknown file '" + word + "'",
+                  "names separated by commas, a minus in front of those to "
+                  "leave out: " +
+                      names);
+    }
+  }
+  return selected;
+}
+
+std::vector<std::string> WriteSolveOutputs(const SolveOutcome& outcome,
+                                           const std::set<std::string>& names,
+                                           const path& folder, int threads) {
+  std::vector<const SolveOutput*> selected;
+  for (const SolveOutput& output : SolveOutputs()) {
+    if (names.count(output.name) == 0) continue;
+    if (output.of_scans && outcome.trajectory.empty()) continue;
+    selected.push_back(&output);
+  }
+  std::vector<std::string> reasons(selected.size());
+  std::vector<std::function<void()>> tasks;
+  for (std::size_t i = 0; i < selected.size(); ++i) {
+    tasks.push_back([&reasons, &selected, &outcome, &folder, i] {
+      reasons[i] = selected[i]->write(outcome, folder);
+    });
+  }
+  RunTasks(tasks, threads);
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < selected.size(); ++i) {
+    if (reasons[i].empty()) continue;
+    lines.push_back(selected[i]->name + " not written: " + reasons[i]);
+  }
+  return lines;
+}
+
+}  // namespace plumbline

@@ -92,10 +92,11 @@ LogSolverResult LogSolver::Run(
   builder.ReadRobot();
   result.final_cost = session_->Cost();
 
+  std::vector<Pose2> keys;
   auto trajectory = [&] {
     const double relocalization_begin = Now();
-    std::vector<Pose2> keys;
-    if (options_.relocalize) {
+    keys.clear();
+    if (options_.refine != Refinement::kNone) {
       keys = RelocalizeKeyScans(graph_, builder.records(),
                                 options_.relocalization);
     } else {
@@ -110,7 +111,8 @@ LogSolverResult LogSolver::Run(
   };
   result.trajectory = trajectory();
 
-  if (options_.complete_walls && options_.relocalize && !result.interrupted) {
+  if (options_.complete_walls && options_.refine != Refinement::kNone &&
+      !result.interrupted) {
     const double completion_begin = Now();
     Transaction walls = FindGlimpsedWalls(
         graph_, registry_, log.scans, result.trajectory, options_.completion);
@@ -126,6 +128,23 @@ LogSolverResult LogSolver::Run(
       result.final_cost = session_->Cost();
       result.trajectory = trajectory();
     }
+  }
+
+  if (options_.refine == Refinement::kFull && !result.interrupted) {
+    const double adjustment_begin = Now();
+    JointAdjustment adjustment(&graph_, session_.get(), registry_, log.scans,
+                               refined, builder.records(), keys,
+                               builder.robot_id(), options_.adjustment);
+    adjustment.Adjust();
+    const EmReport again = em_->Run(stop);
+    result.em.iterations += again.iterations;
+    result.em.converged = again.converged;
+    result.final_cost = session_->Cost();
+    result.trajectory =
+        InterpolateScans(refined, builder.records(), adjustment.KeyPoses());
+    result.scan_relations = adjustment.num_relations();
+    result.wall_votes = adjustment.num_votes();
+    result.adjustment_seconds = Now() - adjustment_begin;
   }
   result.detect_seconds = em_->totals().detect_seconds;
   result.solve_seconds = em_->totals().solve_seconds;

@@ -5,6 +5,7 @@
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/session.h>
+#include <plumbline/frontend/joint_adjustment.h>
 #include <plumbline/frontend/map_builder.h>
 #include <plumbline/frontend/odometry_refinement.h>
 #include <plumbline/frontend/relocalization.h>
@@ -19,6 +20,16 @@
 #include <vector>
 
 namespace plumbline {
+
+/// What the final trajectory and map are adjusted with.
+enum class Refinement {
+  /// The trajectory is what it was when each scan came in.
+  kNone,
+  /// Every scan is found again on the final map.
+  kMap,
+  /// And then poses, walls and structure are adjusted jointly.
+  kFull,
+};
 
 struct LogSolverOptions {
   /// Find structure. False: measurements only.
@@ -35,8 +46,8 @@ struct LogSolverOptions {
   /// Add walls that no single scan saw well, in the end.
   bool complete_walls = true;
   WallCompletionOptions completion;
-  /// False: the trajectory is what it was when each scan came in.
-  bool relocalize = true;
+  Refinement refine = Refinement::kFull;
+  JointAdjustmentOptions adjustment;
   /// Scans between EM steps while replaying; 0: only at the end.
   int em_every = 20;
   /// Constraints from the robot that an EM step while replaying reaches.
@@ -57,7 +68,12 @@ struct LogSolverResult {
   double solve_seconds = 0.0;
   double relocalization_seconds = 0.0;
   double completion_seconds = 0.0;
+  double adjustment_seconds = 0.0;
   std::int64_t glimpsed_walls = 0;
+  /// Of the joint adjustment: matches of key scans with each other, and places
+  /// whose returns speak for a wall.
+  std::int64_t scan_relations = 0;
+  std::int64_t wall_votes = 0;
   /// Seconds that each scan took, EM steps included.
   std::vector<float> scan_seconds;
   std::int64_t key_scans = 0;

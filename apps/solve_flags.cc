@@ -72,10 +72,11 @@ PLUMBLINE_FLAG_RANGE(link_radius, 0.5, 1000.0);
 DEFINE_int32(association_depth, 3,
              "Links from the robot searched for association");
 PLUMBLINE_FLAG_RANGE(association_depth, 1, 100);
-DEFINE_string(refine, "map",
-              "What the final trajectory is adjusted with: none, or map (every "
-              "scan found again on the final map)");
-PLUMBLINE_FLAG_CHOICES(refine, "none", "map");
+DEFINE_string(refine, "full",
+              "What the final trajectory and map are adjusted with: none, map "
+              "(every scan found again on the final map), or full (poses, "
+              "walls and structure jointly)");
+PLUMBLINE_FLAG_CHOICES(refine, "none", "map", "full");
 DEFINE_double(usable_range, 50.0, "Returns farther away are left out, m");
 PLUMBLINE_FLAG_RANGE(usable_range, 0.5, 10000.0);
 
@@ -188,7 +189,11 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.em.max_iterations = FLAGS_em_max_iterations;
   options.em.seed = FLAGS_seed;
   options.em_every = FLAGS_em_every;
-  options.relocalize = FLAGS_refine != "none";
+  options.refine = FLAGS_refine == "none"  ? Refinement::kNone
+                   : FLAGS_refine == "map" ? Refinement::kMap
+                                           : Refinement::kFull;
+  options.adjustment.points = options.odometry.points;
+  options.adjustment.num_threads = NumThreadsFromFlags();
   return options;
 }
 

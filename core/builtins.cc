@@ -15,6 +15,7 @@
 #include <plumbline/factors/point_point_distance.h>
 #include <plumbline/factors/pose_pose.h>
 #include <plumbline/factors/pose_segment_collinearity.h>
+#include <plumbline/factors/pose_segment_points.h>
 #include <plumbline/factors/rectangle_orientation.h>
 #include <plumbline/factors/segment_orientation.h>
 #include <plumbline/factors/segment_rectangle.h>
@@ -246,6 +247,14 @@ void RegisterRelations(Registry* registry) {
         return CostPointer(PoseSegmentCollinearityClamped::Create(
             a.expected, a.sqrt_information));
       });
+  AddRelation(registry, "pose_segment_points", "PLUMBLINE_POSE_SEGMENT_POINTS",
+              {poses, {"segment"}}, 3,
+              "normal of the segment in the pose's frame and distance of the "
+              "pose from it, minus u: points seen on it; -, -, m (Eq. 16)",
+              [](const RelationArguments& a) {
+                return CostPointer(
+                    PoseSegmentPoints::Create(a.expected, a.sqrt_information));
+              });
   AddRelation(registry, "line_orientation", "PLUMBLINE_LINE_ORIENTATION",
               {{"line"}, {"orientation"}}, 1,
               "o - alpha - u modulo pi; rad (Eq. 22)",

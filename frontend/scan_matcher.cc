@@ -193,6 +193,25 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
   return result;
 }
 
+double ScanMatcher::Overlap(const std::vector<ScanPoint>& scan,
+                            const Pose2& pose) const {
+  const double c = std::cos(pose[2]);
+  const double s = std::sin(pose[2]);
+  int tried = 0;
+  int found = 0;
+  for (const ScanPoint& point : scan) {
+    if (point.normal.squaredNorm() == 0.0) continue;
+    ++tried;
+    const Eigen::Vector2d normal(c * point.normal.x() - s * point.normal.y(),
+                                 s * point.normal.x() + c * point.normal.y());
+    if (NearestReference(TransformPoint(pose, point.position), normal,
+                         options_.initial_radius) >= 0) {
+      ++found;
+    }
+  }
+  return tried > 0 ? static_cast<double>(found) / tried : 0.0;
+}
+
 void ScanMatcher::BuildField() const {
   const double resolution = options_.grid_resolution;
   field_columns_ =

@@ -71,6 +71,11 @@ class ScanMatcher {
   MatchResult Refine(const std::vector<ScanPoint>& scan, const Pose2& guess,
                      const MatchPrior& prior) const;
 
+  /// Share of the returns with a normal that have a reference point within the
+  /// initial radius at this pose: what Refine would start from, at a fraction
+  /// of its cost. 0 without such returns.
+  double Overlap(const std::vector<ScanPoint>& scan, const Pose2& pose) const;
+
   /// Best pose on a lattice around `center`: translations up to
   /// `translation_window` (m) each way, rotations up to `rotation_window`
   /// (rad) each way. `score`, if not null, gets the mean likelihood of a

@@ -275,7 +275,7 @@ void RegisterParts(const std::string& name, const Log& log) {
 // log; relative to the second tenth, in which every part is at work already.
 void ScanCostAgainstMapSize(benchmark::State& state, const Log& log) {
   LogSolverOptions options;
-  options.relocalize = false;
+  options.refine = Refinement::kNone;
   std::vector<double> seconds(10, 0.0);
   std::vector<double> scans(10, 0.0);
   std::size_t features = 0;

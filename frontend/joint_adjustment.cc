@@ -1,0 +1,272 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/frontend/joint_adjustment.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr char kSource[] = "refinement";
+
+// A wall's place along itself is free: any value holds it, m.
+constexpr double kAlongSigma = 0.1;
+
+Pose2 PoseOf(const Feature& feature) {
+  return Pose2(feature.parameters[0], feature.parameters[1],
+               feature.parameters[2]);
+}
+
+void AddReturns(const std::vector<ScanPoint>& points, const Pose2& pose,
+                std::vector<ScanPoint>* returns) {
+  const double c = std::cos(pose[2]);
+  const double s = std::sin(pose[2]);
+  for (ScanPoint point : points) {
+    if (point.normal.squaredNorm() == 0.0) continue;
+    point.position = TransformPoint(pose, point.position);
+    point.normal = {c * point.normal.x() - s * point.normal.y(),
+                    s * point.normal.x() + c * point.normal.y()};
+    returns->push_back(point);
+  }
+}
+
+std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
+                                const std::vector<RefinedScan>& refined,
+                                const std::vector<KeyScanRecord>& records,
+                                const JointAdjustmentOptions& options) {
+  const std::size_t stride = options.place_stride;
+  std::vector<Place> places((records.size() + stride - 1) / stride);
+  ParallelFor(places.size(), options.num_threads, [&](std::size_t p) {
+    Place& place = places[p];
+    place.num_scans = 0;
+    std::vector<ScanPoint> points;
+    Pose2 key = Pose2::Zero();
+    for (std::size_t k = p * stride;
+         k < std::min(records.size(), (p + 1) * stride); ++k) {
+      if (k > p * stride) key = Compose(key, records[k].motion.mean);
+      const std::size_t begin = records[k].scan;
+      const std::size_t end =
+          k + 1 < records.size() ? records[k + 1].scan : refined.size();
+      for (std::size_t i = begin; i < end; ++i) {
+        ExtractScanPoints(scans[i], options.points, &points);
+        if (place.num_scans == 0) place.scan = points;
+        const Pose2 pose =
+            i == begin ? key : Compose(key, refined[i].since_key.mean);
+        if (i == begin) AddReturns(points, pose, &place.reference);
+        AddReturns(points, pose, &place.returns);
+        ++place.num_scans;
+      }
+    }
+  });
+  return places;
+}
+
+}  // namespace
+
+JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
+                                 const Registry& registry,
+                                 const std::vector<Scan>& scans,
+                                 const std::vector<RefinedScan>& refined,
+                                 const std::vector<KeyScanRecord>& records,
+                                 const std::vector<Pose2>& key_poses,
+                                 FeatureId robot,
+                                 const JointAdjustmentOptions& options)
+    : graph_(graph),
+      session_(session),
+      registry_(registry),
+      options_(options),
+      records_(records) {
+  if (options_.place_stride < 1) {
+    throw PLUMBLINE_ERROR(
+        "place_stride is " + std::to_string(options_.place_stride),
+        "1 or more");
+  }
+
+  if (records.size() != key_poses.size()) {
+    throw PLUMBLINE_ERROR(
+        std::to_string(key_poses.size()) + " poses",
+        "one for each of " + std::to_string(records.size()) + " key scans");
+  }
+  options_.relations.num_threads = options_.num_threads;
+  options_.votes.num_threads = options_.num_threads;
+  places_ = GatherPlaces(scans, refined, records_, options_);
+  std::vector<Pose2> poses;
+  for (std::size_t k = 0; k < key_poses.size(); k += options_.place_stride) {
+    poses.push_back(key_poses[k]);
+  }
+  relations_ = FindScanRelations(places_, poses, options_.relations);
+
+  Transaction transaction;
+  std::vector<FeatureId> provisional;
+  const FeatureType& pose_type = registry_.GetFeature("pose");
+  const RelationType& pose_pose = registry_.GetRelation("pose_pose");
+  for (const Pose2& pose : poses) {
+    Feature feature;
+    feature.type = &pose_type;
+    feature.parameters = {pose[0], pose[1], pose[2]};
+    feature.observations = 1;
+    feature.source = kSource;
+    provisional.push_back(transaction.AddFeature(feature));
+  }
+  for (std::size_t p = 1; p < poses.size(); ++p) {
+    UncertainPose2 motion;
+    const std::size_t end = p * options_.place_stride;
+    for (std::size_t k = end - options_.place_stride + 1; k <= end; ++k) {
+      motion = Compose(motion, records_[k].motion);
+    }
+    Constraint constraint;
+    constraint.type = &pose_pose;
+    constraint.features =
+        std::vector<FeatureId>{provisional[p - 1], provisional[p]};
+    constraint.expected = motion.mean;
+    const Eigen::Matrix3d information = motion.covariance.inverse();
+    constraint.information = 0.5 * (information + information.transpose());
+    constraint.source = kSource;
+    transaction.AddConstraint(std::move(constraint));
+  }
+  for (const ScanRelation& relation : relations_) {
+    Constraint constraint;
+    constraint.type = &pose_pose;
+    constraint.features = std::vector<FeatureId>{provisional[relation.from],
+                                                 provisional[relation.to]};
+    constraint.expected = relation.mean;
+    constraint.information = relation.information;
+    constraint.source = kSource;
+    transaction.AddConstraint(std::move(constraint));
+  }
+  const std::size_t motions = poses.empty() ? 0 : poses.size() - 1;
+
+  // What stood for the poses goes, where the returns speak themselves.
+  std::map<FeatureId, std::pair<int, std::size_t>> most_votes;
+  const std::vector<std::vector<WallVote>> votes =
+      CollectWallVotes(*graph_, places_, poses, options_.votes);
+  for (std::size_t k = 0; k < votes.size(); ++k) {
+    for (const WallVote& vote : votes[k]) {
+      const auto inserted =
+          most_votes.emplace(vote.wall, std::make_pair(vote.points, k));
+      if (vote.points > inserted.first->second.first) {
+        inserted.first->second = {vote.points, k};
+      }
+    }
+  }
+  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
+    if (constraint->kind != ConstraintClass::kMeasurement) continue;
+    bool goes = true;
+    for (const FeatureId id : constraint->features) {
+      goes = goes && (id == robot || most_votes.count(id) > 0);
+    }
+    for (const FeatureId id : constraint->features) goes = goes || id == robot;
+    if (goes) transaction.RemoveConstraint(constraint->id);
+  }
+  if (robot != kNoId) transaction.RemoveFeature(robot);
+  // Votes say nothing about a wall's place along itself, which is arbitrary:
+  // one pose each holds it where it is.
+  for (const auto& entry : most_votes) {
+    const std::size_t k = entry.second.second;
+    Constraint constraint;
+    constraint.type = &pose_pose;
+    constraint.features = std::vector<FeatureId>{entry.first, provisional[k]};
+    constraint.expected =
+        Between(PoseOf(graph_->GetFeature(entry.first)), poses[k]);
+    constraint.information =
+        Eigen::Vector3d(1.0 / (kAlongSigma * kAlongSigma), 0.0, 0.0)
+            .asDiagonal();
+    constraint.source = kSource;
+    transaction.AddConstraint(std::move(constraint));
+  }
+  const TransactionResult result = graph_->Apply(std::move(transaction));
+  poses_ = result.features;
+  for (std::size_t i = 0; i < relations_.size(); ++i) {
+    relation_constraints_.push_back(result.constraints[motions + i]);
+  }
+}
+
+void JointAdjustment::Vote() {
+  Transaction transaction;
+  for (const ConstraintId id : votes_) transaction.RemoveConstraint(id);
+  const RelationType& relation = registry_.GetRelation("pose_segment_points");
+  const std::vector<std::vector<WallVote>> votes =
+      CollectWallVotes(*graph_, places_, PlacePoses(), options_.votes);
+  for (std::size_t k = 0; k < votes.size(); ++k) {
+    for (const WallVote& vote : votes[k]) {
+      Constraint constraint;
+      constraint.type = &relation;
+      constraint.features = std::vector<FeatureId>{poses_[k], vote.wall};
+      constraint.expected = Eigen::Vector3d::Zero();
+      constraint.information = vote.information;
+      constraint.source = kSource;
+      transaction.AddConstraint(std::move(constraint));
+    }
+  }
+  votes_ = graph_->Apply(std::move(transaction)).constraints;
+}
+
+void JointAdjustment::Reweigh() {
+  const double scale = 1.0 / (options_.loss_scale * options_.loss_scale);
+  for (std::size_t i = 0; i < relations_.size(); ++i) {
+    const ScanRelation& relation = relations_[i];
+    const Pose2 here =
+        Between(PoseOf(graph_->GetFeature(poses_[relation.from])),
+                PoseOf(graph_->GetFeature(poses_[relation.to])));
+    Eigen::Vector3d error = here - relation.mean;
+    error[2] = NormalizeAngle(error[2]);
+    const double squared = error.dot(relation.information * error);
+    graph_->UpdateConstraint(relation_constraints_[i], relation.mean,
+                             relation.information / (1.0 + scale * squared));
+  }
+}
+
+void JointAdjustment::Adjust() {
+  for (int round = 0; round < options_.rounds; ++round) {
+    Vote();
+    Reweigh();
+    const SolveReport report = session_->SolveGlobal();
+    if (!report.usable) {
+      throw PLUMBLINE_ERROR("joint adjustment failed: " + report.message,
+                            "a usable solution");
+    }
+  }
+}
+
+std::vector<Pose2> JointAdjustment::PlacePoses() const {
+  std::vector<Pose2> poses;
+  poses.reserve(poses_.size());
+  for (const FeatureId id : poses_) {
+    poses.push_back(PoseOf(graph_->GetFeature(id)));
+  }
+  return poses;
+}
+
+std::vector<Pose2> JointAdjustment::KeyPoses() const {
+  const std::vector<Pose2> places = PlacePoses();
+  const std::size_t stride = options_.place_stride;
+  std::vector<Pose2> keys(records_.size(), Pose2::Zero());
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    const std::size_t begin = p * stride;
+    const std::size_t end = std::min(begin + stride, records_.size());
+    Pose2 relative = Pose2::Zero();
+    for (std::size_t k = begin; k < end; ++k) {
+      if (k > begin) relative = Compose(relative, records_[k].motion.mean);
+      keys[k] = relative;
+    }
+    Pose2 missing = Pose2::Zero();
+    if (p + 1 < places.size()) {
+      missing = Between(
+          Compose(places[p], Compose(relative, records_[end].motion.mean)),
+          places[p + 1]);
+    }
+    for (std::size_t k = begin; k < end; ++k) {
+      const double share = static_cast<double>(k - begin) / stride;
+      keys[k] = Compose(Compose(places[p], keys[k]), Pose2(share * missing));
+    }
+  }
+  return keys;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,96 @@
+#ifndef PLUMBLINE_FRONTEND_JOINT_ADJUSTMENT_H_
+#define PLUMBLINE_FRONTEND_JOINT_ADJUSTMENT_H_
+
+#include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/core/session.h>
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/map_builder.h>
+#include <plumbline/frontend/odometry_refinement.h>
+#include <plumbline/frontend/scan.h>
+#include <plumbline/frontend/scan_relations.h>
+#include <plumbline/frontend/wall_votes.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace plumbline {
+
+struct JointAdjustmentOptions {
+  ScanPointsOptions points;
+  /// Every so many key scans one is a place whose pose is adjusted; what was
+  /// seen up to the next one is bound to it by refined odometry.
+  int place_stride = 3;
+  ScanRelationOptions relations;
+  WallVoteOptions votes;
+  /// Chi-square at which a scan relation counts half (Cauchy).
+  double loss_scale = 2.0;
+  /// How often votes and weights are taken anew, each followed by a solve.
+  int rounds = 3;
+  /// The result does not depend on it.
+  int num_threads = 1;
+};
+
+/// Joint adjustment of poses, walls and structure: the last word of the scans
+/// on the map (ours; method.md, section 7, ends with finding the scans again on
+/// a map that stays as it is).
+///
+/// The poses of key scans, which the front-end had marginalized out one by
+/// one, come back into the graph. They are bound to each other by refined
+/// odometry and by matches of scans that saw the same place, at the same time
+/// or on another visit (FindScanRelations), and to the walls by every return
+/// that lies on one (CollectWallVotes). These are what the scans say in full,
+/// so the relations between walls that stood for the marginalized poses go;
+/// walls that no return votes for keep theirs. Structure stays as it is, live
+/// or broken, and can go on being found and broken on the graph.
+class JointAdjustment {
+ public:
+  /// Puts places into the graph, where `key_poses` say (map frame, one a
+  /// record). `robot`: the pose that the front-end keeps in the graph, which
+  /// leaves it (kNoId: none). `refined` has one entry a scan. Pointers are not
+  /// owned and must outlive this.
+  JointAdjustment(Graph* graph, SolverSession* session,
+                  const Registry& registry, const std::vector<Scan>& scans,
+                  const std::vector<RefinedScan>& refined,
+                  const std::vector<KeyScanRecord>& records,
+                  const std::vector<Pose2>& key_poses, FeatureId robot,
+                  const JointAdjustmentOptions& options);
+
+  /// Takes votes and weights anew at the present state and solves, `rounds`
+  /// times. Throws Error when a solve fails.
+  void Adjust();
+
+  /// The key poses as they stand, one a record: those between places by refined
+  /// odometry, what is missing at the next place spread over the way.
+  std::vector<Pose2> KeyPoses() const;
+
+  std::int64_t num_relations() const {
+    return static_cast<std::int64_t>(relations_.size());
+  }
+  std::int64_t num_votes() const {
+    return static_cast<std::int64_t>(votes_.size());
+  }
+
+ private:
+  std::vector<Pose2> PlacePoses() const;
+  void Vote();
+  void Reweigh();
+
+  Graph* graph_;
+  SolverSession* session_;
+  const Registry& registry_;
+  JointAdjustmentOptions options_;
+  const std::vector<KeyScanRecord>& records_;
+  std::vector<Place> places_;
+  // By place.
+  std::vector<FeatureId> poses_;
+  std::vector<ScanRelation> relations_;
+  // By relation.
+  std::vector<ConstraintId> relation_constraints_;
+  // Live vote constraints.
+  std::vector<ConstraintId> votes_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_JOINT_ADJUSTMENT_H_

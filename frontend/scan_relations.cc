@@ -1,0 +1,131 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
+#include <plumbline/frontend/scan_relations.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Places [begin, end).
+struct Submap {
+  int begin = 0;
+  int end = 0;
+  int middle() const { return (begin + end) / 2; }
+};
+
+std::vector<ScanPoint> Reference(const Submap& submap,
+                                 const std::vector<Place>& places,
+                                 const std::vector<Pose2>& poses) {
+  std::vector<ScanPoint> reference;
+  for (int k = submap.begin; k < submap.end; ++k) {
+    const Pose2 pose = Between(poses[submap.middle()], poses[k]);
+    const double c = std::cos(pose[2]);
+    const double s = std::sin(pose[2]);
+    for (const ScanPoint& point : places[k].reference) {
+      ScanPoint moved = point;
+      moved.position = TransformPoint(pose, point.position);
+      moved.normal = {c * point.normal.x() - s * point.normal.y(),
+                      s * point.normal.x() + c * point.normal.y()};
+      reference.push_back(moved);
+    }
+  }
+  return reference;
+}
+
+// For each submap the places to match with it, ascending.
+std::vector<std::vector<int>> Assign(const std::vector<Submap>& submaps,
+                                     const std::vector<Pose2>& poses,
+                                     const ScanRelationOptions& options) {
+  const auto cell = [&](const Pose2& pose) {
+    return std::make_pair(
+        static_cast<long>(std::floor(pose[0] / options.radius)),
+        static_cast<long>(std::floor(pose[1] / options.radius)));
+  };
+  std::map<std::pair<long, long>, std::vector<int>> grid;
+  for (std::size_t i = 0; i < submaps.size(); ++i) {
+    grid[cell(poses[submaps[i].middle()])].push_back(static_cast<int>(i));
+  }
+  std::vector<std::vector<int>> keys(submaps.size());
+  std::vector<std::pair<double, int>> near;
+  for (int k = 0; k < static_cast<int>(poses.size()); ++k) {
+    near.clear();
+    const auto center = cell(poses[k]);
+    for (long x = center.first - 1; x <= center.first + 1; ++x) {
+      for (long y = center.second - 1; y <= center.second + 1; ++y) {
+        const auto found = grid.find({x, y});
+        if (found == grid.end()) continue;
+        for (const int i : found->second) {
+          const Submap& submap = submaps[i];
+          if (k >= submap.begin && k < submap.end) continue;
+          const double distance =
+              (poses[submap.middle()] - poses[k]).head<2>().norm();
+          if (distance <= options.radius) near.emplace_back(distance, i);
+        }
+      }
+    }
+    std::sort(near.begin(), near.end());
+    if (static_cast<int>(near.size()) > options.max_submaps) {
+      near.resize(options.max_submaps);
+    }
+    for (const auto& entry : near) keys[entry.second].push_back(k);
+  }
+  return keys;
+}
+
+}  // namespace
+
+std::vector<ScanRelation> FindScanRelations(
+    const std::vector<Place>& places, const std::vector<Pose2>& poses,
+    const ScanRelationOptions& options) {
+  if (places.size() != poses.size()) {
+    throw PLUMBLINE_ERROR(std::to_string(places.size()) + " places and " +
+                              std::to_string(poses.size()) + " poses",
+                          "one pose a place");
+  }
+  if (options.submap_size < 1 || !(options.radius > 0.0)) {
+    throw PLUMBLINE_ERROR("submap_size or radius out of range",
+                          "positive values");
+  }
+  std::vector<Submap> submaps;
+  const int count = static_cast<int>(poses.size());
+  for (int begin = 0; begin < count; begin += options.submap_size) {
+    submaps.push_back({begin, std::min(count, begin + options.submap_size)});
+  }
+  const std::vector<std::vector<int>> keys = Assign(submaps, poses, options);
+
+  MatchPrior prior;
+  prior.information =
+      Eigen::Vector3d(
+          1.0 / (options.prior_translation * options.prior_translation),
+          1.0 / (options.prior_translation * options.prior_translation),
+          1.0 / (options.prior_rotation * options.prior_rotation))
+          .asDiagonal();
+  std::vector<std::vector<ScanRelation>> found(submaps.size());
+  ParallelFor(submaps.size(), options.num_threads, [&](std::size_t i) {
+    if (keys[i].empty()) return;
+    ScanMatcher matcher(options.matcher);
+    matcher.SetReference(Reference(submaps[i], places, poses));
+    if (matcher.empty()) return;
+    MatchPrior here = prior;
+    for (const int k : keys[i]) {
+      here.pose = Between(poses[submaps[i].middle()], poses[k]);
+      if (matcher.Overlap(places[k].scan, here.pose) < options.min_overlap)
+        continue;
+      const MatchResult match = matcher.Refine(places[k].scan, here.pose, here);
+      if (match.inlier_ratio < options.min_inlier_ratio) continue;
+      found[i].push_back(
+          {submaps[i].middle(), k, match.pose, match.information});
+    }
+  });
+  std::vector<ScanRelation> relations;
+  for (const auto& list : found) {
+    relations.insert(relations.end(), list.begin(), list.end());
+  }
+  return relations;
+}
+
+}  // namespace plumbline

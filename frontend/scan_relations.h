@@ -1,0 +1,70 @@
+#ifndef PLUMBLINE_FRONTEND_SCAN_RELATIONS_H_
+#define PLUMBLINE_FRONTEND_SCAN_RELATIONS_H_
+
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/scan_matcher.h>
+#include <plumbline/frontend/scan_points.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace plumbline {
+
+struct ScanRelationOptions {
+  ScanMatcherOptions matcher;
+  /// Consecutive places that make one submap.
+  int submap_size = 4;
+  /// How far a place may be from a submap's middle, m.
+  double radius = 4.0;
+  /// Submaps that one place is matched with, nearest first: bounds the cost
+  /// where a robot stays long.
+  int max_submaps = 40;
+  /// Shares of the scan's returns that must have a partner before and after
+  /// the match.
+  double min_overlap = 0.4;
+  double min_inlier_ratio = 0.5;
+  /// How far the present poses are believed while matching, m and rad.
+  double prior_translation = 0.3;
+  double prior_rotation = DegToRad(3.0);
+  /// The result does not depend on it.
+  int num_threads = 1;
+};
+
+/// Where the robot was, with what it saw from there.
+struct Place {
+  /// Returns of the place's own scan, in its frame.
+  std::vector<ScanPoint> scan;
+  /// Those of the key scans up to the next place, in the frame of the place:
+  /// what others are matched with.
+  std::vector<ScanPoint> reference;
+  /// Those of all scans up to the next place that lie on straight surfaces, in
+  /// the frame of the place, and how many scans they are from.
+  std::vector<ScanPoint> returns;
+  int num_scans = 1;
+};
+
+/// What the scans of two places that need not follow each other say about their
+/// relative pose.
+struct ScanRelation {
+  /// Indices of places; `from` is the middle of the submap.
+  int from = 0;
+  int to = 0;
+  /// Pose of `to` in the frame of `from`.
+  Pose2 mean = Pose2::Zero();
+  /// Inverse covariance of `mean` in the frame of `from` from the returns alone
+  /// (m, m, rad): rank deficient along a corridor.
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+};
+
+/// Matches each place's scan with the submaps of other places near it, seen
+/// shortly before or after or on another visit, point to line. `poses`: one a
+/// place, in one frame, good to within the matcher's initial radius where scans
+/// overlap. Relations come in the order of submaps, then of places. Cost:
+/// linear in the places.
+std::vector<ScanRelation> FindScanRelations(const std::vector<Place>& places,
+                                            const std::vector<Pose2>& poses,
+                                            const ScanRelationOptions& options);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_SCAN_RELATIONS_H_

@@ -1,0 +1,141 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/frontend/wall_votes.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <string>
+
+namespace plumbline {
+namespace {
+
+constexpr double kCell = 0.5;
+
+struct Wall {
+  FeatureId id = kNoId;
+  Eigen::Vector2d position;
+  Eigen::Vector2d direction;
+  // Towards the side that it was seen from.
+  Eigen::Vector2d normal;
+  double begin = 0.0;
+  double end = 0.0;
+};
+
+// Walls by the cells that a return on them may fall into.
+class WallGrid {
+ public:
+  WallGrid(const Graph& graph, const WallVoteOptions& options) {
+    for (const Feature* feature : graph.Features()) {
+      if (feature->type->name != "segment" || feature->level != 0) continue;
+      Wall wall;
+      wall.id = feature->id;
+      wall.position = {feature->parameters[0], feature->parameters[1]};
+      wall.direction = {std::cos(feature->parameters[2]),
+                        std::sin(feature->parameters[2])};
+      wall.normal = {-wall.direction.y(), wall.direction.x()};
+      wall.begin = feature->extent_begin - options.max_gap;
+      wall.end = feature->extent_end + options.max_gap;
+      const int index = static_cast<int>(walls_.size());
+      walls_.push_back(wall);
+      // Steps of half a cell along and across reach every cell of the strip.
+      const double step = 0.5 * kCell;
+      const int along =
+          static_cast<int>(std::ceil((wall.end - wall.begin) / step));
+      const int across =
+          static_cast<int>(std::ceil(2.0 * options.max_offset / step)) + 1;
+      for (int i = 0; i <= along; ++i) {
+        for (int j = 0; j <= across; ++j) {
+          const Eigen::Vector2d point =
+              wall.position +
+              (wall.begin + (wall.end - wall.begin) * i / std::max(1, along)) *
+                  wall.direction +
+              (2.0 * j / across - 1.0) * options.max_offset * wall.normal;
+          std::vector<int>& cell = cells_[Key(point)];
+          if (cell.empty() || cell.back() != index) cell.push_back(index);
+        }
+      }
+    }
+  }
+
+  const std::vector<int>* Near(const Eigen::Vector2d& point) const {
+    const auto found = cells_.find(Key(point));
+    return found == cells_.end() ? nullptr : &found->second;
+  }
+  const Wall& wall(int index) const { return walls_[index]; }
+
+ private:
+  static std::pair<std::int64_t, std::int64_t> Key(
+      const Eigen::Vector2d& point) {
+    return {static_cast<std::int64_t>(std::floor(point.x() / kCell)),
+            static_cast<std::int64_t>(std::floor(point.y() / kCell))};
+  }
+
+  std::vector<Wall> walls_;
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<int>> cells_;
+};
+
+}  // namespace
+
+std::vector<std::vector<WallVote>> CollectWallVotes(
+    const Graph& graph, const std::vector<Place>& places,
+    const std::vector<Pose2>& poses, const WallVoteOptions& options) {
+  if (places.size() != poses.size()) {
+    throw PLUMBLINE_ERROR(std::to_string(places.size()) + " places and " +
+                              std::to_string(poses.size()) + " poses",
+                          "one pose a place");
+  }
+  const WallGrid grid(graph, options);
+  const double min_cosine = std::cos(options.max_turn);
+  const double scale = 1.0 / (options.point_sigma * options.point_sigma *
+                              options.loss_scale * options.loss_scale);
+  std::vector<std::vector<WallVote>> votes(places.size());
+  ParallelFor(places.size(), options.num_threads, [&](std::size_t k) {
+    const Pose2& pose = poses[k];
+    const double c = std::cos(pose[2]);
+    const double s = std::sin(pose[2]);
+    const double share =
+        options.independence / (options.point_sigma * options.point_sigma *
+                                std::max(1, places[k].num_scans));
+    std::map<FeatureId, WallVote> of_wall;
+    for (const ScanPoint& point : places[k].returns) {
+      if (point.normal.squaredNorm() == 0.0) continue;
+      const Eigen::Vector2d position = TransformPoint(pose, point.position);
+      const std::vector<int>* near = grid.Near(position);
+      if (near == nullptr) continue;
+      const Eigen::Vector2d normal(c * point.normal.x() - s * point.normal.y(),
+                                   s * point.normal.x() + c * point.normal.y());
+      double best = options.max_offset;
+      FeatureId hit = kNoId;
+      for (const int index : *near) {
+        const Wall& wall = grid.wall(index);
+        const Eigen::Vector2d difference = position - wall.position;
+        const double offset = std::abs(difference.dot(wall.normal));
+        const double along = difference.dot(wall.direction);
+        if (offset < best && along >= wall.begin && along <= wall.end &&
+            normal.dot(wall.normal) >= min_cosine) {
+          best = offset;
+          hit = wall.id;
+        }
+      }
+      if (hit == kNoId) continue;
+      WallVote& vote = of_wall[hit];
+      vote.wall = hit;
+      ++vote.points;
+      const Eigen::Vector3d homogeneous(point.position.x(), point.position.y(),
+                                        1.0);
+      vote.information.noalias() += share / (1.0 + scale * best * best) *
+                                    homogeneous * homogeneous.transpose();
+    }
+    for (const auto& entry : of_wall) {
+      if (entry.second.points >= options.min_points) {
+        votes[k].push_back(entry.second);
+      }
+    }
+  });
+  return votes;
+}
+
+}  // namespace plumbline

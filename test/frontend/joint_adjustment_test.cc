@@ -1,0 +1,224 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/joint_adjustment.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::MakeScan;
+using testing::Noise;
+using testing::Wall;
+
+// A room of 10 m by 6 m with a pillar, driven round twice. Every scan is a key
+// scan; the refined odometry is the truth with a little drift. In the map the
+// walls and poses of the second half are off.
+class JointAdjustmentTest : public ::testing::Test {
+ protected:
+  JointAdjustmentTest() {
+    RegisterBuiltinRelations(&registry_);
+    world_ = testing::Room(10.0, 6.0);
+    for (const Wall& wall :
+         testing::Moved(testing::Room(0.8, 0.8), Pose2(1.0, 0.3, 0.0))) {
+      world_.push_back(wall);
+    }
+    testing::Laser laser;
+    laser.sigma = 0.01;
+    Noise noise(11);
+    const Pose2 step_drift(0.0005, 0.0, DegToRad(0.01));
+    for (int i = 0; i < 120; ++i) {
+      const double angle = 2.0 * kPi * i / 60.0;
+      truth_.emplace_back(3.2 * std::cos(angle), 1.9 * std::sin(angle),
+                          NormalizeAngle(angle + 0.5 * kPi));
+      scans_.push_back(MakeScan(world_, truth_.back(), laser, &noise));
+      RefinedScan refined;
+      KeyScanRecord record;
+      record.scan = i;
+      if (i > 0) {
+        record.motion.mean =
+            Compose(Between(truth_[i - 1], truth_[i]), step_drift);
+        record.motion.covariance =
+            Eigen::Vector3d(1e-4, 1e-4, 1e-5).asDiagonal();
+        refined.since_key = record.motion;
+      }
+      refined.is_key = true;
+      refined_.push_back(refined);
+      records_.push_back(record);
+      keys_.push_back(
+          i < 60 ? truth_[i]
+                 : Compose(Pose2(0.1, -0.08, DegToRad(1.0)), truth_[i]));
+    }
+    AddWalls();
+  }
+
+  // The four walls of the room, a little off but the first, and one wall that
+  // nobody sees, bound to the first.
+  void AddWalls() {
+    const Pose2 poses[] = {Pose2(0.0, -3.0, 0.0), Pose2(5.0, 0.0, 0.5 * kPi),
+                           Pose2(0.0, 3.0, kPi), Pose2(-5.0, 0.0, -0.5 * kPi)};
+    Transaction transaction;
+    std::vector<FeatureId> ids;
+    for (int i = 0; i < 5; ++i) {
+      Feature feature;
+      feature.type = &registry_.GetFeature("segment");
+      Pose2 pose = i < 4 ? poses[i] : Pose2(30.0, -3.0, 0.0);
+      if (i > 0 && i < 4) {
+        pose = Compose(pose, Pose2(0.3, 0.06, DegToRad(1.0)));
+      }
+      feature.parameters = {pose[0], pose[1], pose[2]};
+      feature.extent_begin = i % 2 == 0 ? -5.0 : -3.0;
+      feature.extent_end = -feature.extent_begin;
+      feature.fixed = i == 0;
+      feature.source = "frontend";
+      ids.push_back(transaction.AddFeature(feature));
+    }
+    Feature robot;
+    robot.type = &registry_.GetFeature("pose");
+    ids.push_back(transaction.AddFeature(robot));
+    for (int i = 1; i < 6; ++i) {
+      Constraint constraint;
+      constraint.type = &registry_.GetRelation("pose_pose");
+      constraint.features = std::vector<FeatureId>{ids[0], ids[i]};
+      constraint.expected = Eigen::Vector3d(1.0, 2.0, 3.0);
+      if (i == 4) constraint.expected = Eigen::Vector3d(30.0, 0.0, 0.0);
+      constraint.information = Eigen::Matrix3d::Identity();
+      transaction.AddConstraint(constraint);
+    }
+    const TransactionResult result = graph_.Apply(std::move(transaction));
+    walls_.assign(result.features.begin(), result.features.begin() + 4);
+    unseen_ = result.features[4];
+    robot_ = result.features[5];
+    unseen_link_ = result.constraints[3];
+  }
+
+  double WorstKey(const std::vector<Pose2>& keys) const {
+    double worst = 0.0;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      worst = std::max(worst, testing::PositionError(keys[i], truth_[i]));
+    }
+    return worst;
+  }
+
+  Registry registry_;
+  Graph graph_;
+  std::vector<Wall> world_;
+  std::vector<Scan> scans_;
+  std::vector<RefinedScan> refined_;
+  std::vector<KeyScanRecord> records_;
+  std::vector<Pose2> truth_;
+  std::vector<Pose2> keys_;
+  std::vector<FeatureId> walls_;
+  FeatureId unseen_ = kNoId;
+  FeatureId robot_ = kNoId;
+  ConstraintId unseen_link_ = kNoId;
+  JointAdjustmentOptions options_;
+};
+
+TEST_F(JointAdjustmentTest, PosesAndWallsComeTrue) {
+  SolverSession session(&graph_, registry_, {});
+  EXPECT_GT(WorstKey(keys_), 0.1);
+  JointAdjustment adjustment(&graph_, &session, registry_, scans_, refined_,
+                             records_, keys_, robot_, options_);
+  EXPECT_GT(adjustment.num_relations(), 40);
+  adjustment.Adjust();
+  EXPECT_GT(adjustment.num_votes(), 80);
+  const std::vector<Pose2> keys = adjustment.KeyPoses();
+  ASSERT_EQ(keys.size(), truth_.size());
+  EXPECT_LT(WorstKey(keys), 0.02);
+  const double offsets[] = {-3.0, 5.0, 3.0, -5.0};
+  for (int i = 0; i < 4; ++i) {
+    const Feature& wall = graph_.GetFeature(walls_[i]);
+    EXPECT_NEAR(wall.parameters[i % 2 == 0 ? 1 : 0], offsets[i], 0.01) << i;
+    EXPECT_NEAR(NormalizeAngle(wall.parameters[2] - 0.5 * kPi * i), 0.0,
+                DegToRad(0.15))
+        << i;
+    // Its place along itself is where it was.
+    EXPECT_NEAR(std::hypot(wall.parameters[0], wall.parameters[1]),
+                std::hypot(offsets[i], i == 0 ? 0.0 : 0.3), 0.05)
+        << i;
+  }
+}
+
+TEST_F(JointAdjustmentTest, WhatStoodForThePosesGoes) {
+  SolverSession session(&graph_, registry_, {});
+  const std::size_t features = graph_.num_features();
+  JointAdjustment adjustment(&graph_, &session, registry_, scans_, refined_,
+                             records_, keys_, robot_, options_);
+  EXPECT_EQ(graph_.FindFeature(robot_), nullptr);
+  // 120 key scans, every third a place.
+  EXPECT_EQ(graph_.num_features(), features - 1 + 40);
+  // A wall that no return votes for keeps what binds it.
+  EXPECT_NE(graph_.FindConstraint(unseen_link_), nullptr);
+  EXPECT_EQ(graph_.ConstraintsOf(unseen_).size(), 1u);
+  for (const Constraint* constraint : graph_.Constraints()) {
+    if (constraint->id == unseen_link_) continue;
+    EXPECT_EQ(constraint->source, "refinement");
+  }
+  adjustment.Adjust();
+  EXPECT_NEAR(graph_.GetFeature(unseen_).parameters[0], 30.0, 1e-3);
+}
+
+TEST_F(JointAdjustmentTest, WithoutDriftNothingMovesFar) {
+  SolverSession session(&graph_, registry_, {});
+  for (int i = 0; i < 120; ++i) {
+    keys_[i] = truth_[i];
+    if (i > 0) records_[i].motion.mean = Between(truth_[i - 1], truth_[i]);
+  }
+  JointAdjustment adjustment(&graph_, &session, registry_, scans_, refined_,
+                             records_, keys_, robot_, options_);
+  adjustment.Adjust();
+  EXPECT_LT(WorstKey(adjustment.KeyPoses()), 0.01);
+}
+
+TEST_F(JointAdjustmentTest, SameForAnyNumberOfThreads) {
+  std::vector<Pose2> results[2];
+  for (int run = 0; run < 2; ++run) {
+    options_.num_threads = run == 0 ? 1 : 3;
+    if (run == 1) {
+      // The same graph again.
+      Transaction all;
+      for (const Constraint* constraint : graph_.Constraints()) {
+        all.RemoveConstraint(constraint->id);
+      }
+      for (const Feature* feature : graph_.Features()) {
+        all.RemoveFeature(feature->id);
+      }
+      graph_.Apply(std::move(all));
+      AddWalls();
+    }
+    SolverSession session(&graph_, registry_, {});
+    JointAdjustment adjustment(&graph_, &session, registry_, scans_, refined_,
+                               records_, keys_, robot_, options_);
+    adjustment.Adjust();
+    results[run] = adjustment.KeyPoses();
+  }
+  EXPECT_EQ(results[0], results[1]);
+}
+
+TEST_F(JointAdjustmentTest, EmptyAndBrokenInput) {
+  SolverSession session(&graph_, registry_, {});
+  EXPECT_THROW(JointAdjustment(&graph_, &session, registry_, scans_, refined_,
+                               records_, {Pose2::Zero()}, robot_, options_),
+               Error);
+  options_.place_stride = 0;
+  EXPECT_THROW(JointAdjustment(&graph_, &session, registry_, scans_, refined_,
+                               records_, keys_, robot_, options_),
+               Error);
+  options_.place_stride = 3;
+  Graph empty;
+  SolverSession other(&empty, registry_, {});
+  JointAdjustment nothing(&empty, &other, registry_, {}, {}, {}, {}, kNoId,
+                          options_);
+  nothing.Adjust();
+  EXPECT_TRUE(nothing.KeyPoses().empty());
+  EXPECT_EQ(empty.num_features(), 0u);
+}
+
+}  // namespace
+}  // namespace plumbline

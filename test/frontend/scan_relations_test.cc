@@ -1,0 +1,149 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/scan_relations.h>
+
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::Laser;
+using testing::MakeScan;
+using testing::Noise;
+using testing::PointsOf;
+using testing::Wall;
+
+class ScanRelationsTest : public ::testing::Test {
+ protected:
+  // A robot drives along y = 0 twice.
+  void Drive(const std::vector<Wall>& walls) {
+    Noise noise(5);
+    Laser laser = testing::FullCircle();
+    laser.angle_step = DegToRad(2.0);
+    laser.beams = 180;
+    laser.sigma = 0.01;
+    for (int visit = 0; visit < 2; ++visit) {
+      for (int i = 0; i < 8; ++i) {
+        truth_.emplace_back(-3.5 + i, 0.1 * visit, 0.2 * visit);
+        Place place;
+        place.scan = PointsOf(MakeScan(walls, truth_.back(), laser, &noise));
+        place.reference = place.scan;
+        places_.push_back(place);
+      }
+    }
+  }
+
+  // The second visit is off by this much.
+  std::vector<Pose2> Drifted(const Pose2& drift) const {
+    std::vector<Pose2> poses = truth_;
+    for (std::size_t i = 8; i < poses.size(); ++i) {
+      poses[i] = Compose(drift, poses[i]);
+    }
+    return poses;
+  }
+
+  std::vector<Place> places_;
+  std::vector<Pose2> truth_;
+  ScanRelationOptions options_;
+};
+
+TEST_F(ScanRelationsTest, FindTheTruthAcrossVisits) {
+  Drive(testing::Room(10.0, 6.0));
+  const std::vector<ScanRelation> relations = FindScanRelations(
+      places_, Drifted(Pose2(0.12, -0.15, DegToRad(1.5))), options_);
+  int across = 0;
+  for (const ScanRelation& relation : relations) {
+    // Submaps of four places: 0 to 3 has its middle at 2 and so on.
+    EXPECT_EQ(relation.from % 4, 2);
+    EXPECT_NE(relation.from / 4, relation.to / 4);
+    const Pose2 true_relation =
+        Between(truth_[relation.from], truth_[relation.to]);
+    // Within a visit the reference is as good as the poses; across, too, since
+    // a submap is of one visit.
+    EXPECT_LT(testing::PositionError(relation.mean, true_relation), 0.02);
+    EXPECT_LT(testing::HeadingError(relation.mean, true_relation),
+              DegToRad(0.4));
+    EXPECT_LT((relation.information - relation.information.transpose()).norm(),
+              1e-6 * relation.information.norm());
+    if (relation.from / 8 != relation.to / 8) ++across;
+  }
+  EXPECT_GE(across, 16);
+}
+
+TEST_F(ScanRelationsTest, ACorridorSaysNothingAlong) {
+  Drive(testing::Corridor());
+  const std::vector<ScanRelation> relations =
+      FindScanRelations(places_, truth_, options_);
+  ASSERT_FALSE(relations.empty());
+  for (const ScanRelation& relation : relations) {
+    // From a pose that looks along the corridor: x is along.
+    const double heading = truth_[relation.from][2];
+    const Eigen::Vector3d along(std::cos(heading), -std::sin(heading), 0.0);
+    const Eigen::Vector3d across(std::sin(heading), std::cos(heading), 0.0);
+    EXPECT_LT(along.dot(relation.information * along),
+              0.02 * across.dot(relation.information * across));
+  }
+}
+
+TEST_F(ScanRelationsTest, NothingWhereNothingIsSeenByBoth) {
+  Drive(testing::Room(10.0, 6.0));
+  // The second visit is put next to the first, as if it were another room.
+  EXPECT_TRUE(
+      FindScanRelations({places_[2], places_[10]},
+                        {truth_[2], Compose(Pose2(0.0, 3.0, 0.0), truth_[10])},
+                        options_)
+          .empty());
+  options_.radius = 0.5;
+  EXPECT_TRUE(
+      FindScanRelations(places_, Drifted(Pose2(0.0, 20.0, 0.0)), options_)
+          .empty());
+}
+
+TEST_F(ScanRelationsTest, CostIsBoundedWhereTheRobotStays) {
+  Drive(testing::Room(10.0, 6.0));
+  options_.max_submaps = 1;
+  const std::vector<ScanRelation> relations =
+      FindScanRelations(places_, truth_, options_);
+  std::vector<int> count(places_.size(), 0);
+  for (const ScanRelation& relation : relations) ++count[relation.to];
+  for (const int n : count) EXPECT_LE(n, 1);
+  EXPECT_GE(relations.size(), 12u);
+}
+
+TEST_F(ScanRelationsTest, SameForAnyNumberOfThreads) {
+  Drive(testing::Room(10.0, 6.0));
+  const std::vector<Pose2> poses = Drifted(Pose2(0.1, 0.1, 0.01));
+  const std::vector<ScanRelation> one =
+      FindScanRelations(places_, poses, options_);
+  options_.num_threads = 3;
+  const std::vector<ScanRelation> three =
+      FindScanRelations(places_, poses, options_);
+  ASSERT_EQ(one.size(), three.size());
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(one[i].from, three[i].from);
+    EXPECT_EQ(one[i].to, three[i].to);
+    EXPECT_EQ(one[i].mean, three[i].mean);
+    EXPECT_EQ(one[i].information, three[i].information);
+  }
+}
+
+TEST_F(ScanRelationsTest, EmptyAndBrokenInput) {
+  EXPECT_TRUE(FindScanRelations({}, {}, options_).empty());
+  // Places that saw nothing.
+  EXPECT_TRUE(FindScanRelations(std::vector<Place>(9),
+                                std::vector<Pose2>(9, Pose2::Zero()), options_)
+                  .empty());
+  EXPECT_THROW(
+      FindScanRelations(std::vector<Place>(2), {Pose2::Zero()}, options_),
+      Error);
+  options_.radius = 0.0;
+  EXPECT_THROW(FindScanRelations({}, {}, options_), Error);
+  options_.radius = 4.0;
+  options_.submap_size = 0;
+  EXPECT_THROW(FindScanRelations({}, {}, options_), Error);
+}
+
+}  // namespace
+}  // namespace plumbline

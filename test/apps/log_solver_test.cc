@@ -77,6 +77,8 @@ TEST_F(LogSolverTest, WithoutStructureThereAreMeasurementsOnly) {
   options.structure = false;
   // Not looked at.
   options.hierarchy = "no_such_detector";
+  // The joint adjustment has other measurements than the replay.
+  options.refine = Refinement::kMap;
   LogSolver solver(registry_, options);
   const LogSolverResult result = solver.Run(Office(150));
   ASSERT_EQ(result.trajectory.size(), 150u);
@@ -89,6 +91,35 @@ TEST_F(LogSolverTest, WithoutStructureThereAreMeasurementsOnly) {
   }
   for (const Constraint* constraint : solver.graph().Constraints()) {
     EXPECT_EQ(constraint->kind, ConstraintClass::kMeasurement);
+  }
+}
+
+TEST_F(LogSolverTest, FullRefinementBringsThePosesBack) {
+  for (const Refinement refine : {Refinement::kMap, Refinement::kFull}) {
+    LogSolverOptions options;
+    options.refine = refine;
+    LogSolver solver(registry_, options);
+    const LogSolverResult result = solver.Run(Office(250));
+    ASSERT_EQ(result.trajectory.size(), 250u);
+    ExpectFinite(result.trajectory);
+    std::int64_t poses = 0;
+    std::int64_t votes = 0;
+    for (const Feature* feature : solver.graph().Features()) {
+      if (feature->type->name == "pose") ++poses;
+    }
+    for (const Constraint* constraint : solver.graph().Constraints()) {
+      if (constraint->type->name == "pose_segment_points") ++votes;
+    }
+    EXPECT_EQ(result.wall_votes, votes);
+    if (refine == Refinement::kFull) {
+      EXPECT_GT(result.scan_relations, 10);
+      EXPECT_GT(votes, 50);
+      // Every third key scan.
+      EXPECT_EQ(poses, (result.key_scans + 2) / 3);
+    } else {
+      EXPECT_EQ(result.scan_relations, 0);
+      EXPECT_EQ(poses, 1);
+    }
   }
 }
 

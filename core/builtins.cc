@@ -19,6 +19,7 @@
 #include <plumbline/factors/rectangle_orientation.h>
 #include <plumbline/factors/segment_orientation.h>
 #include <plumbline/factors/segment_rectangle.h>
+#include <plumbline/factors/segment_segment_collinearity.h>
 
 #include <algorithm>
 #include <cmath>
@@ -254,6 +255,15 @@ void RegisterRelations(Registry* registry) {
               [](const RelationArguments& a) {
                 return CostPointer(
                     PoseSegmentPoints::Create(a.expected, a.sqrt_information));
+              });
+  AddRelation(registry, "segment_segment_collinearity",
+              "PLUMBLINE_SEGMENT_SEGMENT_COLLINEARITY",
+              {{"segment"}, {"segment"}}, 2,
+              "distance of the second segment across the first and angle "
+              "between them, minus u; m, rad (Eq. 20)",
+              [](const RelationArguments& a) {
+                return CostPointer(SegmentSegmentCollinearity::Create(
+                    a.expected, a.sqrt_information));
               });
   AddRelation(registry, "line_orientation", "PLUMBLINE_LINE_ORIENTATION",
               {{"line"}, {"orientation"}}, 1,

@@ -489,22 +489,20 @@ struct EmOrchestrator::Impl final : public GraphListener {
 
   // E-step and breaking; true when something was broken or dropped.
   bool Break(const Scope& scope) {
-    const double change = session->UpdateDeltas(
-        scope.features == nullptr ? nullptr : &scope.variables);
-    if (change > kDeltaChange) is_dirty = true;
-    Transaction transaction;
-    // Residuals of a state that could not be solved for prove nothing.
-    if (options.break_constraints && is_usable) {
-      for (const Constraint* constraint : StructureOf(scope)) {
-        const double delta = constraint->delta > kDeltaFloor
-                                 ? constraint->delta
-                                 : session->Delta(*constraint);
-        if (delta >= options.delta_threshold) continue;
-        transaction.BreakConstraint(constraint->id);
-      }
+    bool has_broken = false;
+    for (bool is_done = false; !is_done;) {
+      const double change = session->UpdateDeltas(
+          scope.features == nullptr ? nullptr : &scope.variables);
+      if (change > kDeltaChange) is_dirty = true;
+      is_done = true;
+      // Residuals of a state that could not be solved for prove nothing.
+      if (!options.break_constraints || !is_usable) break;
+      Transaction transaction = WorstOf(scope, &is_done);
+      if (transaction.empty()) break;
+      has_broken = true;
+      graph->Apply(std::move(transaction));
+      if (!is_done) Optimize(scope);
     }
-    const bool has_broken = !transaction.empty();
-    if (has_broken) graph->Apply(std::move(transaction));
     if (scope.features == nullptr) {
       for (int level = 0; level <= highest_level; ++level) {
         const auto& ids = graph->VirtualFeatures(level);
@@ -513,6 +511,33 @@ struct EmOrchestrator::Impl final : public GraphListener {
     }
     const bool has_dropped = DropUnsupported();
     return has_broken || has_dropped;
+  }
+
+  // Breaks live structure below the threshold: all of it, or the worst of it
+  // (break_share); then `is_all` becomes false when some is left.
+  Transaction WorstOf(const Scope& scope, bool* is_all) {
+    std::vector<std::pair<ConstraintId, double>> bad;
+    double largest = 0.0;
+    for (const Constraint* constraint : StructureOf(scope)) {
+      const double delta = constraint->delta > kDeltaFloor
+                               ? constraint->delta
+                               : session->Delta(*constraint);
+      if (delta >= options.delta_threshold) continue;
+      const double squared = options.break_share > 0.0
+                                 ? session->SquaredResidual(*constraint)
+                                 : 0.0;
+      largest = std::max(largest, squared);
+      bad.emplace_back(constraint->id, squared);
+    }
+    Transaction transaction;
+    for (const auto& [id, squared] : bad) {
+      if (squared < options.break_share * largest) {
+        *is_all = false;
+      } else {
+        transaction.BreakConstraint(id);
+      }
+    }
+    return transaction;
   }
 
   int MinimumSupport(const Feature& feature) const {

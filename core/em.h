@@ -33,6 +33,10 @@ struct EmOptions {
   double delta_threshold = 0.3;
   /// False: wrong structure is kept (for comparison).
   bool break_constraints = true;
+  /// Break the worst first: those whose chi^2 is at least this share of the
+  /// largest, then solve and look again, so that what a wrong hypothesis bends
+  /// is not broken with it. 0: break all at once (the paper).
+  double break_share = 0.0;
   /// The loop ends at the latest after so many iterations.
   int max_iterations = 50;
   /// Converged: nothing added, nothing removed, and the relative change of the

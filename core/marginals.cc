@@ -1,11 +1,13 @@
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/marginals.h>
+#include <plumbline/factors/information.h>
 #include <plumbline/factors/pose2.h>
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -27,6 +29,49 @@ constexpr int kMaxPasses = 20;
 
 std::string Describe(const Feature& feature) {
   return feature.type->name + " " + std::to_string(feature.id);
+}
+
+// As SolverSession::Linearize, with the weight of the last E-step.
+LinearizedConstraint LinearizeByDelta(const Graph& graph,
+                                      const Constraint& constraint) {
+  using RowMajor =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  RelationArguments arguments;
+  arguments.expected = constraint.expected;
+  arguments.sqrt_information = SqrtInformation(constraint.information);
+  std::vector<const double*> parameters;
+  std::vector<RowMajor> rows;
+  std::vector<double*> jacobians;
+  for (const FeatureId id : constraint.features) {
+    const Feature& feature = graph.GetFeature(id);
+    arguments.features.push_back(&feature);
+    parameters.push_back(feature.data());
+    rows.emplace_back(constraint.type->residual_size, feature.type->size);
+  }
+  for (RowMajor& matrix : rows) jacobians.push_back(matrix.data());
+  const auto cost = constraint.type->make_cost(arguments);
+  LinearizedConstraint linearized;
+  linearized.residual.resize(constraint.type->residual_size);
+  bool is_finite = cost->Evaluate(parameters.data(), linearized.residual.data(),
+                                  jacobians.data()) &&
+                   linearized.residual.allFinite();
+  for (const RowMajor& matrix : rows) {
+    is_finite = is_finite && matrix.allFinite();
+  }
+  if (!is_finite) {
+    throw PLUMBLINE_ERROR(
+        constraint.type->name + " " + std::to_string(constraint.id) +
+            " cannot be linearized",
+        "a state at which the residual and its derivatives are finite");
+  }
+  const double weight = constraint.kind == ConstraintClass::kStructure
+                            ? std::sqrt(std::max(constraint.delta, kDeltaFloor))
+                            : 1.0;
+  linearized.residual *= weight;
+  for (const RowMajor& matrix : rows) {
+    linearized.jacobians.push_back(weight * matrix);
+  }
+  return linearized;
 }
 
 bool IsPose(const FeatureType& type) {
@@ -53,6 +98,17 @@ struct Marginals::Impl {
     Pose2 pose = Pose2::Zero();
     std::size_t part = 0;
   };
+
+  using Linearizer = std::function<LinearizedConstraint(const Constraint&)>;
+
+  Impl(const Graph& graph, const MarginalsOptions& options,
+       const Linearizer& linearize) {
+    const std::vector<FeatureId> ids = AddEntries(graph, options.features);
+    const std::vector<const Constraint*> constraints =
+        ConstraintsAmong(graph, ids);
+    FindParts(graph, ids, constraints, options.hold_gauge);
+    Factorize(linearize, ids, constraints);
+  }
 
   // Adds the features of the graph or scope, ascending; returns their ids.
   std::vector<FeatureId> AddEntries(const Graph& graph,
@@ -163,8 +219,7 @@ struct Marginals::Impl {
     }
   }
 
-  void Factorize(const SolverSession& session,
-                 const std::vector<FeatureId>& ids,
+  void Factorize(const Linearizer& linearize, const std::vector<FeatureId>& ids,
                  const std::vector<const Constraint*>& constraints) {
     for (const FeatureId id : ids) {
       Entry& entry = *entries[static_cast<std::size_t>(id)];
@@ -175,7 +230,7 @@ struct Marginals::Impl {
     if (columns == 0) return;
     std::vector<Eigen::Triplet<double>> triplets;
     for (const Constraint* constraint : constraints) {
-      const LinearizedConstraint linearized = session.Linearize(*constraint);
+      const LinearizedConstraint linearized = linearize(*constraint);
       std::vector<Eigen::MatrixXd> jacobians;
       for (std::size_t i = 0; i < constraint->features.size(); ++i) {
         jacobians.push_back(
@@ -276,6 +331,23 @@ struct Marginals::Impl {
     return entry;
   }
 
+  // Throws unless there is something to say about `to` seen from `from`.
+  void CheckRelative(FeatureId from, FeatureId to) const {
+    const Entry& a = Get(from);
+    const Entry& b = Get(to);
+    for (const Entry* entry : {&a, &b}) {
+      if (!entry->is_pose) {
+        throw PLUMBLINE_ERROR(entry->name + " has no relative pose",
+                              "a feature with the parameters x, y, theta");
+      }
+    }
+    // Parts that are both tied to the plane are connected by it.
+    if (a.part != b.part && !(has_gauge[a.part] && has_gauge[b.part])) {
+      throw PLUMBLINE_ERROR("nothing connects " + a.name + " and " + b.name,
+                            "features of one connected part");
+    }
+  }
+
   // sum of B_i Cov(i, j) B_j' over features and their Jacobians (rows x
   // parameters).
   Eigen::MatrixXd Propagate(
@@ -299,8 +371,10 @@ struct Marginals::Impl {
     return 0.5 * (covariance + covariance.transpose());
   }
 
-  const Eigen::MatrixXd& Covariance(FeatureId id) {
-    const Entry& entry = GetWithGauge(id);
+  // Covariance of a feature; without a gauge, of its place relative to what is
+  // held in its part.
+  const Eigen::MatrixXd& Block(FeatureId id) {
+    const Entry& entry = Get(id);
     const auto found = blocks.find(id);
     if (found != blocks.end()) return found->second;
     const Eigen::MatrixXd identity =
@@ -353,10 +427,10 @@ struct Marginals::Impl {
     }
   }
 
-  void Compute(const std::vector<FeatureId>& ids) {
+  void ComputeBlocks(const std::vector<FeatureId>& ids) {
     std::vector<FeatureId> missing;
     for (const FeatureId id : ids) {
-      if (GetWithGauge(id).column >= 0 && blocks.count(id) == 0) {
+      if (Get(id).column >= 0 && blocks.count(id) == 0) {
         missing.push_back(id);
       }
     }
@@ -408,20 +482,24 @@ struct Marginals::Impl {
 
 Marginals::Marginals(const Graph& graph, const SolverSession& session,
                      const MarginalsOptions& options)
-    : impl_(std::make_unique<Impl>()) {
-  const std::vector<FeatureId> ids = impl_->AddEntries(graph, options.features);
-  const std::vector<const Constraint*> constraints =
-      impl_->ConstraintsAmong(graph, ids);
-  impl_->FindParts(graph, ids, constraints, options.hold_gauge);
-  impl_->Factorize(session, ids, constraints);
-}
+    : impl_(std::make_unique<Impl>(graph, options,
+                                   [&](const Constraint& constraint) {
+                                     return session.Linearize(constraint);
+                                   })) {}
+
+Marginals::Marginals(const Graph& graph, const MarginalsOptions& options)
+    : impl_(std::make_unique<Impl>(graph, options,
+                                   [&](const Constraint& constraint) {
+                                     return LinearizeByDelta(graph, constraint);
+                                   })) {}
 
 Marginals::~Marginals() = default;
 Marginals::Marginals(Marginals&&) noexcept = default;
 Marginals& Marginals::operator=(Marginals&&) noexcept = default;
 
 Eigen::MatrixXd Marginals::Covariance(FeatureId id) {
-  return impl_->Covariance(id);
+  impl_->GetWithGauge(id);
+  return impl_->Block(id);
 }
 
 Eigen::MatrixXd Marginals::JointCovariance(const std::vector<FeatureId>& ids) {
@@ -441,32 +519,58 @@ Eigen::MatrixXd Marginals::JointCovariance(const std::vector<FeatureId>& ids) {
 }
 
 Eigen::Matrix3d Marginals::RelativeCovariance(FeatureId from, FeatureId to) {
+  impl_->CheckRelative(from, to);
+  if (from == to) return Eigen::Matrix3d::Zero();
   const Impl::Entry& a = impl_->Get(from);
   const Impl::Entry& b = impl_->Get(to);
-  for (const Impl::Entry* entry : {&a, &b}) {
-    if (!entry->is_pose) {
-      throw PLUMBLINE_ERROR(entry->name + " has no relative pose",
-                            "a feature with the parameters x, y, theta");
-    }
-  }
-  if (from == to) return Eigen::Matrix3d::Zero();
-  // Parts that are both tied to the plane are connected by it.
-  if (a.part != b.part &&
-      !(impl_->has_gauge[a.part] && impl_->has_gauge[b.part])) {
-    throw PLUMBLINE_ERROR("nothing connects " + a.name + " and " + b.name,
-                          "features of one connected part");
-  }
   return impl_->Propagate({{&a, BetweenJacobianFirst(a.pose, b.pose)},
                            {&b, BetweenJacobianSecond(a.pose)}});
 }
 
+std::vector<Eigen::Matrix3d> Marginals::RelativeCovariances(
+    FeatureId from, const std::vector<FeatureId>& to) {
+  for (const FeatureId id : to) impl_->CheckRelative(from, id);
+  impl_->ComputeBlocks(to);
+  const Impl::Entry& a = impl_->Get(from);
+  Eigen::MatrixXd columns;
+  Eigen::Matrix3d own = Eigen::Matrix3d::Zero();
+  if (a.column >= 0) {
+    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(impl_->columns, 3);
+    right.middleRows(a.column, a.tangent_size) = a.lift.transpose();
+    columns = impl_->ldlt.solve(right);
+    own = a.lift * columns.middleRows(a.column, a.tangent_size);
+  }
+  std::vector<Eigen::Matrix3d> covariances;
+  covariances.reserve(to.size());
+  for (const FeatureId id : to) {
+    const Impl::Entry& b = impl_->Get(id);
+    if (id == from) {
+      covariances.push_back(Eigen::Matrix3d::Zero());
+      continue;
+    }
+    Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
+    if (a.column >= 0 && b.column >= 0) {
+      cross = b.lift * columns.middleRows(b.column, b.tangent_size);
+    }
+    const Eigen::Matrix3d first = BetweenJacobianFirst(a.pose, b.pose);
+    const Eigen::Matrix3d second = BetweenJacobianSecond(a.pose);
+    const Eigen::Matrix3d mixed = second * cross * first.transpose();
+    const Eigen::Matrix3d covariance =
+        first * own * first.transpose() +
+        second * impl_->Block(id) * second.transpose() + mixed +
+        mixed.transpose();
+    covariances.push_back(0.5 * (covariance + covariance.transpose()));
+  }
+  return covariances;
+}
+
 void Marginals::Compute(const std::vector<FeatureId>& ids) {
-  impl_->Compute(ids);
+  for (const FeatureId id : ids) impl_->GetWithGauge(id);
+  impl_->ComputeBlocks(ids);
 }
 
 bool Marginals::IsDetermined(FeatureId id) {
-  return impl_->Covariance(id).diagonal().maxCoeff() <
-         1e-2 * kUndeterminedVariance;
+  return Covariance(id).diagonal().maxCoeff() < 1e-2 * kUndeterminedVariance;
 }
 
 }  // namespace plumbline

@@ -46,6 +46,9 @@ class Marginals {
   /// Error when a constraint cannot be evaluated.
   Marginals(const Graph& graph, const SolverSession& session,
             const MarginalsOptions& options = {});
+  /// The same without a session, for detectors: structure counts by the delta
+  /// of the last E-step.
+  explicit Marginals(const Graph& graph, const MarginalsOptions& options = {});
   ~Marginals();
   Marginals(Marginals&&) noexcept;
   Marginals& operator=(Marginals&&) noexcept;
@@ -66,6 +69,12 @@ class Marginals {
   /// features are unknown, have other parameters than x, y, theta, or when
   /// nothing connects them.
   Eigen::Matrix3d RelativeCovariance(FeatureId from, FeatureId to);
+
+  /// RelativeCovariance of each of `to` seen from one feature, in their order:
+  /// costs the solves for the columns of `from`, and the covariances of `to`
+  /// once, whatever their number.
+  std::vector<Eigen::Matrix3d> RelativeCovariances(
+      FeatureId from, const std::vector<FeatureId>& to);
 
   /// Prepares the covariances of all these features at once: cheaper than one
   /// by one when they are many. Throws Error as Covariance does.

@@ -5,6 +5,7 @@
 #include <plumbline/detectors/line_ransac.h>
 #include <plumbline/detectors/orientation_mixture.h>
 #include <plumbline/detectors/orientation_relation.h>
+#include <plumbline/detectors/same_wall.h>
 
 #include <utility>
 
@@ -13,8 +14,8 @@ namespace plumbline {
 void RegisterBuiltinDetectors(Registry* registry) {
   for (DetectorType type :
        {CenterClusterType(), CircleCenterType(), CircleRansacType(),
-        LineRansacType(), OrientationMixtureType(),
-        OrientationRelationType()}) {
+        LineRansacType(), OrientationMixtureType(), OrientationRelationType(),
+        SameWallType()}) {
     if (registry->FindDetector(type.name) == nullptr) {
       registry->Register(std::move(type));
     }

@@ -485,6 +485,34 @@ TEST_F(EmTest, AHypothesisThatBecomesTrueIsBelievedAgain) {
   EXPECT_EQ(Live(), 6);
 }
 
+TEST_F(EmTest, WorstFirstSparesWhatAWrongOneBends) {
+  // The wall is at 0 degrees (seen to 1 degree). One hypothesis says so, the
+  // other wants 6 degrees: together they turn it to 2.7.
+  for (const double share : {0.0, 0.75}) {
+    SCOPED_TRACE(share);
+    const FeatureId wall = AddSegment(0.0);
+    Transaction transaction;
+    for (const double degrees : {0.0, 6.0}) {
+      Feature orientation = Orientation(registry_, DegToRad(degrees));
+      orientation.fixed = true;
+      transaction.AddConstraint(
+          Structure(registry_, "segment_orientation", wall,
+                    transaction.AddFeature(orientation), 0.0, 0.5));
+    }
+    const TransactionResult added = graph_.Apply(std::move(transaction));
+    EmOptions options;
+    options.break_share = share;
+    Make(options).Run();
+    const auto state = [&](int i) {
+      return graph_.GetConstraint(added.constraints[i]).state;
+    };
+    EXPECT_EQ(state(0),
+              share > 0.0 ? ConstraintState::kLive : ConstraintState::kBroken);
+    EXPECT_EQ(state(1), ConstraintState::kBroken);
+    EXPECT_NEAR(graph_.GetFeature(wall).parameters[2], 0.0, 1e-6);
+  }
+}
+
 TEST_F(EmTest, AHypothesisIsBrokenOnlySoOften) {
   for (int i = 0; i < 5; ++i) AddSegment(0.0);
   const FeatureId wall = AddSegment(5.9);

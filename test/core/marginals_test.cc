@@ -382,5 +382,54 @@ TEST_F(MarginalsTest, LinearizationIsThatOfTheSolve) {
               HasSubstr("constraint 0 is broken"));
 }
 
+TEST_F(MarginalsTest, ManyRelativeCovariancesAtOnce) {
+  const std::vector<FeatureId> ids = MakeWay(true);
+  Marginals one_by_one(graph_, *session_);
+  Marginals at_once(graph_);
+  const std::vector<Eigen::Matrix3d> covariances =
+      at_once.RelativeCovariances(ids[1], {ids[3], ids[0], ids[1]});
+  EXPECT_TRUE(covariances[0].isApprox(
+      one_by_one.RelativeCovariance(ids[1], ids[3]), 1e-9));
+  EXPECT_TRUE(covariances[1].isApprox(
+      one_by_one.RelativeCovariance(ids[1], ids[0]), 1e-9));
+  EXPECT_EQ(covariances[2], Eigen::Matrix3d::Zero());
+  // From the fixed one, and to nothing.
+  EXPECT_TRUE(at_once.RelativeCovariances(ids[0], {ids[2]})[0].isApprox(
+      one_by_one.RelativeCovariance(ids[0], ids[2]), 1e-9));
+  EXPECT_TRUE(at_once.RelativeCovariances(ids[0], {}).empty());
+}
+
+TEST_F(MarginalsTest, ManyRelativeCovariancesWithoutGauge) {
+  const std::vector<FeatureId> ids = MakeWay(false);
+  Marginals marginals(graph_);
+  const std::vector<FeatureId> others(15, ids[3]);
+  const std::vector<Eigen::Matrix3d> covariances =
+      marginals.RelativeCovariances(ids[1], others);
+  const Eigen::Matrix3d expected = marginals.RelativeCovariance(ids[1], ids[3]);
+  for (const Eigen::Matrix3d& covariance : covariances) {
+    EXPECT_TRUE(covariance.isApprox(expected, 1e-9));
+  }
+  const FeatureId alone = Add("pose", {0.0, 0.0, 0.0});
+  EXPECT_THROW(Marginals(graph_).RelativeCovariances(ids[0], {alone}), Error);
+}
+
+TEST_F(MarginalsTest, StructureCountsByItsDeltaWithoutASession) {
+  const FeatureId a = Add("segment", {0.0, 0.0, 0.0}, true);
+  const FeatureId b = Add("segment", {1.0, 0.0, 0.0});
+  Connect("pose_pose", {a, b}, Eigen::Vector3d(1.0, 0.0, 0.0),
+          Eigen::Vector3d(25.0, 25.0, 25.0));
+  const ConstraintId structure = Connect(
+      "pose_pose", {a, b}, Eigen::Vector3d(1.0, 0.0, 0.0),
+      Eigen::Vector3d(100.0, 100.0, 100.0), ConstraintClass::kStructure);
+  graph_.GetConstraint(structure).delta = 0.5;
+  // Information 25 + 0.5 * 100.
+  EXPECT_NEAR(Marginals(graph_).RelativeCovariance(a, b)(1, 1), 1.0 / 75.0,
+              1e-12);
+  Transaction transaction;
+  transaction.BreakConstraint(structure);
+  graph_.Apply(std::move(transaction));
+  EXPECT_NEAR(Marginals(graph_).RelativeCovariance(a, b)(1, 1), 0.04, 1e-12);
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -189,7 +189,7 @@ TEST_F(BuiltinsTest, RegisteringTwiceDoesNothing) {
   const FeatureType* point = registry_.FindFeature("point");
   RegisterBuiltinRelations(&registry_);
   EXPECT_EQ(registry_.FindFeature("point"), point);
-  EXPECT_EQ(registry_.relations().size(), 13u);
+  EXPECT_EQ(registry_.relations().size(), 15u);
   EXPECT_EQ(registry_.losses().size(), 7u);
 }
 

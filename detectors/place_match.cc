@@ -1,0 +1,461 @@
+#include <plumbline/core/error.h>
+#include <plumbline/detectors/place_match.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// Walls in line to this (m) and within this angle are one line.
+constexpr double kSameLineOffset = 0.15;
+constexpr double kSameLineAngle = DegToRad(3.0);
+// Lines whose directions differ by less tell of the same direction of the
+// displacement.
+constexpr double kParallel = DegToRad(20.0);
+// A line counts in full from this length on, m.
+constexpr double kFullLength = 1.0;
+// A wall in conflict costs as much, nats.
+constexpr double kConflict = 1.0;
+// Wall whose direction differs more cannot hide the other, rad.
+constexpr double kConflictAngle = DegToRad(10.0);
+// Of two candidates for a wall the worse is left out when it is farther off by
+// more, m.
+constexpr double kClearlyWorse = 0.03;
+constexpr int kRefinements = 3;
+constexpr int kSolverRounds = 2;
+// Displacements this close are one, m.
+constexpr double kCell = 0.03;
+
+struct Wall {
+  Vector2d position;
+  Vector2d along;
+  Vector2d normal;
+  double direction;
+  double begin;
+  double end;
+  double noise;
+};
+
+Wall Prepare(const PlaceWall& wall, const PlaceMatchOptions& options) {
+  Wall prepared;
+  prepared.position = wall.position;
+  prepared.direction = wall.direction;
+  prepared.along = {std::cos(wall.direction), std::sin(wall.direction)};
+  prepared.normal = {-prepared.along.y(), prepared.along.x()};
+  prepared.begin = wall.begin;
+  prepared.end = wall.end;
+  const double length = std::max(wall.end - wall.begin, 0.1);
+  prepared.noise = options.direction_noise / (length * std::sqrt(length));
+  return prepared;
+}
+
+Wall Move(const Wall& wall, const Vector2d& pivot,
+          const Vector3d& displacement) {
+  Wall moved = wall;
+  const double c = std::cos(displacement[2]);
+  const double s = std::sin(displacement[2]);
+  Eigen::Matrix2d rotation;
+  rotation << c, -s, s, c;
+  moved.position =
+      pivot + rotation * (wall.position - pivot) + displacement.head<2>();
+  moved.along = rotation * wall.along;
+  moved.normal = rotation * wall.normal;
+  moved.direction = wall.direction + displacement[2];
+  return moved;
+}
+
+// How `second` lies beside `first`.
+struct Comparison {
+  double overlap;  // m, negative for a gap
+  double middle;   // of the overlap, m along the first
+  double offset;   // of the second at the middle, to the left of the first
+  double angle;
+  // Along the second.
+  double second_middle;
+};
+
+Comparison Compare(const Wall& first, const Wall& second) {
+  Comparison c;
+  c.angle = NormalizeAngle(second.direction - first.direction);
+  const Vector2d begin = second.position + second.begin * second.along;
+  const Vector2d end = second.position + second.end * second.along;
+  const double from = first.along.dot(begin - first.position);
+  const double to = first.along.dot(end - first.position);
+  const double low = std::max(first.begin, std::min(from, to));
+  const double high = std::min(first.end, std::max(from, to));
+  c.overlap = high - low;
+  c.middle = 0.5 * (low + high);
+  const double cosine = first.along.dot(second.along);
+  const double reference = first.along.dot(second.position - first.position);
+  c.second_middle =
+      std::abs(cosine) > 0.1 ? (c.middle - reference) / cosine : 0.0;
+  const Vector2d point =
+      second.position + c.second_middle * second.along - first.position;
+  c.offset = first.normal.dot(point);
+  return c;
+}
+
+class Matcher {
+ public:
+  Matcher(const std::vector<PlaceWall>& first,
+          const std::vector<PlaceWall>& second, const Vector2d& pivot,
+          const Matrix3d& covariance, const PlaceMatchOptions& options)
+      : options_(options),
+        pivot_(pivot),
+        covariance_(covariance),
+        prior_(covariance.inverse()) {
+    for (const PlaceWall& wall : first)
+      first_.push_back(Prepare(wall, options));
+    for (const PlaceWall& wall : second) {
+      second_.push_back(Prepare(wall, options));
+    }
+    FindCandidates();
+  }
+
+  PlaceMatch Match() {
+    PlaceMatch result;
+    if (candidates_.empty()) return result;
+    Try(Vector3d::Zero());
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+      Try(Solve({candidates_[i]}));
+      for (std::size_t j = 0; j < i; ++j) {
+        const double cross =
+            std::abs(std::sin(first_[candidates_[i].first].direction -
+                              first_[candidates_[j].first].direction));
+        if (cross < std::sin(kParallel)) continue;
+        if (candidates_[i].second == candidates_[j].second) continue;
+        Try(Solve({candidates_[i], candidates_[j]}));
+      }
+    }
+    if (hypotheses_.empty()) return result;
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < hypotheses_.size(); ++i) {
+      if (hypotheses_[i].worth > hypotheses_[best].worth) best = i;
+    }
+    return Conclude(best);
+  }
+
+ private:
+  struct Candidate {
+    int first;
+    int second;
+  };
+  struct Line {
+    // Of the second place.
+    int wall;
+    double overlap = 0.0;
+    // log of the inverse chance of a hit, nats, and half width of the search.
+    double gain = 0.0;
+    double range = 0.0;
+  };
+  struct Hypothesis {
+    Vector3d displacement;
+    double worth;
+  };
+  struct Explanation {
+    std::vector<WallMatch> matches;
+    // Best match of each wall: candidate for the refinement.
+    std::vector<Candidate> best;
+    double worth = 0.0;
+  };
+
+  double AngleGate(const Wall& a, const Wall& b, double variance) const {
+    return options_.gate *
+           std::sqrt(variance +
+                     options_.angle_tolerance * options_.angle_tolerance +
+                     a.noise * a.noise + b.noise * b.noise);
+  }
+
+  // Half width of the search for a wall at `point` in direction `unit`.
+  double Range(const Vector2d& unit, const Vector2d& point) const {
+    const Vector2d lever = point - pivot_;
+    const Vector3d jacobian(unit.x(), unit.y(),
+                            unit.dot(Vector2d(-lever.y(), lever.x())));
+    return options_.gate *
+           std::sqrt(std::max(0.0, jacobian.dot(covariance_ * jacobian)));
+  }
+
+  void FindCandidates() {
+    ranges_.resize(second_.size());
+    rivals_.resize(second_.size());
+    by_second_.resize(second_.size());
+    for (std::size_t j = 0; j < second_.size(); ++j) {
+      const Wall& wall = second_[j];
+      const Vector2d middle =
+          wall.position + 0.5 * (wall.begin + wall.end) * wall.along;
+      const double across = Range(wall.normal, middle) + options_.tolerance;
+      const double along = Range(wall.along, middle);
+      ranges_[j] = across;
+      std::vector<double> offsets;
+      for (std::size_t i = 0; i < first_.size(); ++i) {
+        const Comparison c = Compare(first_[i], wall);
+        if (std::abs(c.angle) > AngleGate(first_[i], wall, covariance_(2, 2))) {
+          continue;
+        }
+        if (c.overlap + along < options_.min_overlap) continue;
+        const Vector2d to_first = first_[i].position - middle;
+        const double offset = -first_[i].normal.dot(to_first);
+        if (std::abs(offset) > across) continue;
+        by_second_[j].push_back(static_cast<int>(i));
+        candidates_.push_back({static_cast<int>(i), static_cast<int>(j)});
+        offsets.push_back(offset);
+      }
+      // Different lines among them.
+      std::sort(offsets.begin(), offsets.end());
+      int lines = 0;
+      double last = 0.0;
+      for (const double offset : offsets) {
+        if (lines == 0 || offset - last > kSameLineOffset) {
+          ++lines;
+          last = offset;
+        }
+      }
+      rivals_[j] = std::max(1, lines);
+    }
+  }
+
+  // Most probable displacement when these pairs are one wall each.
+  Vector3d Solve(const std::vector<Candidate>& pairs) const {
+    Vector3d displacement = Vector3d::Zero();
+    const double sigma_offset = 0.5 * options_.tolerance;
+    for (int round = 0; round < kSolverRounds; ++round) {
+      Matrix3d normal = prior_;
+      Vector3d right = -prior_ * displacement;
+      for (const Candidate& pair : pairs) {
+        const Wall& first = first_[pair.first];
+        const Wall moved = Move(second_[pair.second], pivot_, displacement);
+        Comparison c = Compare(first, moved);
+        if (c.overlap <= 0.0) {
+          // Not side by side yet: the second's own middle.
+          c.second_middle = 0.5 * (moved.begin + moved.end);
+          c.offset = first.normal.dot(
+              moved.position + c.second_middle * moved.along - first.position);
+        }
+        const Vector2d lever = moved.position + c.second_middle * moved.along -
+                               pivot_ - displacement.head<2>();
+        const Vector3d across(
+            first.normal.x(), first.normal.y(),
+            first.normal.dot(Vector2d(-lever.y(), lever.x())));
+        const double weight = 1.0 / (sigma_offset * sigma_offset);
+        normal += weight * across * across.transpose();
+        right -= weight * c.offset * across;
+        const double sigma_angle_squared =
+            options_.angle_tolerance * options_.angle_tolerance +
+            first.noise * first.noise + moved.noise * moved.noise;
+        normal(2, 2) += 1.0 / sigma_angle_squared;
+        right[2] -= c.angle / sigma_angle_squared;
+      }
+      displacement += normal.ldlt().solve(right);
+    }
+    return displacement;
+  }
+
+  Explanation Explain(const Vector3d& displacement) const {
+    Explanation explanation;
+    std::vector<Line> lines;
+    double conflicts = 0.0;
+    double misfit = 0.0;
+    for (std::size_t j = 0; j < second_.size(); ++j) {
+      if (by_second_[j].empty()) continue;
+      const Wall moved = Move(second_[j], pivot_, displacement);
+      double least = options_.tolerance;
+      double in_conflict = 0.0;
+      std::vector<WallMatch> found;
+      for (const int i : by_second_[j]) {
+        const Comparison c = Compare(first_[i], moved);
+        if (c.overlap < options_.min_overlap) continue;
+        const double offset = std::abs(c.offset);
+        if (offset <= options_.tolerance &&
+            std::abs(c.angle) <= AngleGate(first_[i], moved, 0.0)) {
+          found.push_back(
+              {i, static_cast<int>(j), c.second_middle, c.overlap, c.offset});
+          least = std::min(least, offset);
+        } else if (offset <= options_.conflict_depth &&
+                   std::abs(c.angle) <= kConflictAngle) {
+          in_conflict = std::max(in_conflict, c.overlap);
+        }
+      }
+      if (found.empty()) {
+        conflicts += std::min(1.0, in_conflict / kFullLength);
+        continue;
+      }
+      double overlap = 0.0;
+      const WallMatch* closest = nullptr;
+      for (const WallMatch& match : found) {
+        if (std::abs(match.offset) > least + kClearlyWorse) continue;
+        explanation.matches.push_back(match);
+        overlap += match.overlap;
+        if (closest == nullptr || match.overlap > closest->overlap) {
+          closest = &match;
+        }
+      }
+      explanation.best.push_back({closest->first, closest->second});
+      const double left = 2.0 * closest->offset / options_.tolerance;
+      misfit += std::min(1.0, overlap / kFullLength) * left * left;
+      AddToLines(static_cast<int>(j), overlap, &lines);
+    }
+    double worth =
+        -kConflict * conflicts - 0.5 * displacement.dot(prior_ * displacement);
+    for (const Line& line : lines) {
+      worth += line.gain * std::min(1.0, line.overlap / kFullLength);
+    }
+    explanation.worth = worth;
+    return explanation;
+  }
+
+  // Takes a matched wall of the second place into the line that it is part of.
+  void AddToLines(int wall, double overlap, std::vector<Line>* lines) const {
+    const Wall& own = second_[wall];
+    const Vector2d middle =
+        own.position + 0.5 * (own.begin + own.end) * own.along;
+    for (Line& line : *lines) {
+      const Wall& other = second_[line.wall];
+      if (std::abs(NormalizeAngle(own.direction - other.direction)) <=
+              kSameLineAngle &&
+          std::abs(other.normal.dot(middle - other.position)) <=
+              kSameLineOffset) {
+        line.overlap += overlap;
+        return;
+      }
+    }
+    Line line;
+    line.wall = wall;
+    line.overlap = overlap;
+    line.range = ranges_[wall];
+    line.gain = std::log(
+        std::max(1.5, ranges_[wall] / (rivals_[wall] * options_.tolerance)));
+    lines->push_back(line);
+  }
+
+  void Try(Vector3d displacement) {
+    for (int round = 0;; ++round) {
+      if (displacement.dot(prior_ * displacement) >
+          options_.gate * options_.gate) {
+        return;
+      }
+      const std::array<long, 3> cell = {
+          std::lround(displacement[0] / kCell),
+          std::lround(displacement[1] / kCell),
+          std::lround(displacement[2] / DegToRad(0.3))};
+      if (!tried_.insert(cell).second) return;
+      const Explanation explanation = Explain(displacement);
+      if (explanation.matches.empty()) return;
+      hypotheses_.push_back({displacement, explanation.worth});
+      if (round == kRefinements) return;
+      displacement = Solve(explanation.best);
+    }
+  }
+
+  PlaceMatch Conclude(std::size_t best) const {
+    PlaceMatch result;
+    result.displacement = hypotheses_[best].displacement;
+    const Explanation explanation = Explain(result.displacement);
+    std::vector<Line> lines;
+    for (const WallMatch& match : explanation.matches) {
+      if (IsAmbiguous(match, best)) continue;
+      result.matches.push_back(match);
+      AddToLines(match.second, match.overlap, &lines);
+    }
+    // Directions that the lines are of: the first line of each fixes the
+    // displacement.
+    struct Direction {
+      Vector2d along;
+      double range = 0.0;
+      bool has_opposite = false;
+    };
+    std::vector<Direction> directions;
+    bool is_wide = false;
+    for (const Line& line : lines) {
+      const Wall& wall = second_[line.wall];
+      const double weight = std::min(1.0, line.overlap / kFullLength);
+      result.search = std::max(result.search, line.range);
+      is_wide = is_wide || line.range > options_.narrow + options_.tolerance;
+      Direction* same = nullptr;
+      for (Direction& direction : directions) {
+        const double cross = direction.along.x() * wall.along.y() -
+                             direction.along.y() * wall.along.x();
+        if (std::abs(cross) <= std::sin(kParallel)) {
+          same = &direction;
+          break;
+        }
+      }
+      double gain = line.gain * weight;
+      if (same == nullptr) {
+        // Two directions fix it; what a third says is said beyond that.
+        if (directions.size() < 2) {
+          gain -= std::log(std::max(1.0, line.range / options_.tolerance));
+        }
+        directions.push_back({wall.along, line.range, false});
+      } else if (!same->has_opposite && same->along.dot(wall.along) < 0.0) {
+        same->has_opposite = true;
+        gain *= 0.5;
+      }
+      result.evidence += gain;
+    }
+    if (is_wide && result.evidence < options_.min_evidence) {
+      result.matches.clear();
+    }
+    std::vector<Candidate> kept;
+    for (const WallMatch& match : result.matches) {
+      kept.push_back({match.first, match.second});
+    }
+    if (!kept.empty()) result.displacement = Solve(kept);
+    return result;
+  }
+
+  bool IsAmbiguous(const WallMatch& match, std::size_t best) const {
+    const Hypothesis& own = hypotheses_[best];
+    const Wall moved = Move(second_[match.second], pivot_, own.displacement);
+    const Vector2d point = moved.position + match.along * moved.along;
+    for (const Hypothesis& rival : hypotheses_) {
+      if (rival.worth < own.worth - options_.rival_margin) continue;
+      const Wall elsewhere =
+          Move(second_[match.second], pivot_, rival.displacement);
+      const Vector2d other = elsewhere.position + match.along * elsewhere.along;
+      if (std::abs(moved.normal.dot(other - point)) > options_.rival_offset) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const PlaceMatchOptions& options_;
+  Vector2d pivot_;
+  Matrix3d covariance_;
+  Matrix3d prior_;
+  std::vector<Wall> first_;
+  std::vector<Wall> second_;
+  std::vector<Candidate> candidates_;
+  // Of each wall of the second place: half width of its search, number of lines
+  // of the first place in it, and the candidates.
+  std::vector<double> ranges_;
+  std::vector<int> rivals_;
+  std::vector<std::vector<int>> by_second_;
+  std::set<std::array<long, 3>> tried_;
+  std::vector<Hypothesis> hypotheses_;
+};
+
+}  // namespace
+
+PlaceMatch MatchPlaces(const std::vector<PlaceWall>& first,
+                       const std::vector<PlaceWall>& second,
+                       const Vector2d& pivot, const Matrix3d& covariance,
+                       const PlaceMatchOptions& options) {
+  if (!covariance.allFinite() || covariance.llt().info() != Eigen::Success) {
+    throw PLUMBLINE_ERROR("the covariance of a displacement is not one",
+                          "a positive definite matrix");
+  }
+  return Matcher(first, second, pivot, covariance, options).Match();
+}
+
+}  // namespace plumbline

@@ -100,7 +100,7 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
   for (std::size_t k = 0; k < key_poses.size(); k += options_.place_stride) {
     poses.push_back(key_poses[k]);
   }
-  relations_ = FindScanRelations(places_, poses, options_.relations);
+  finder_ = std::make_unique<ScanMatchFinder>(places_, options_.relations);
 
   Transaction transaction;
   std::vector<FeatureId> provisional;
@@ -130,18 +130,6 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
     constraint.source = kSource;
     transaction.AddConstraint(std::move(constraint));
   }
-  for (const ScanRelation& relation : relations_) {
-    Constraint constraint;
-    constraint.type = &pose_pose;
-    constraint.features = std::vector<FeatureId>{provisional[relation.from],
-                                                 provisional[relation.to]};
-    constraint.expected = relation.mean;
-    constraint.information = relation.information;
-    constraint.source = kSource;
-    transaction.AddConstraint(std::move(constraint));
-  }
-  const std::size_t motions = poses.empty() ? 0 : poses.size() - 1;
-
   // What stood for the poses goes, where the returns speak themselves.
   std::map<FeatureId, std::pair<int, std::size_t>> most_votes;
   const std::vector<std::vector<WallVote>> votes =
@@ -182,9 +170,27 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
   }
   const TransactionResult result = graph_->Apply(std::move(transaction));
   poses_ = result.features;
-  for (std::size_t i = 0; i < relations_.size(); ++i) {
-    relation_constraints_.push_back(result.constraints[motions + i]);
+  Match();
+}
+
+void JointAdjustment::Match() {
+  Transaction transaction;
+  for (const ConstraintId id : relation_constraints_) {
+    transaction.RemoveConstraint(id);
   }
+  relations_ = finder_->Find(PlacePoses());
+  const RelationType& pose_pose = registry_.GetRelation("pose_pose");
+  for (const ScanRelation& relation : relations_) {
+    Constraint constraint;
+    constraint.type = &pose_pose;
+    constraint.features =
+        std::vector<FeatureId>{poses_[relation.from], poses_[relation.to]};
+    constraint.expected = relation.mean;
+    constraint.information = relation.information;
+    constraint.source = kSource;
+    transaction.AddConstraint(std::move(constraint));
+  }
+  relation_constraints_ = graph_->Apply(std::move(transaction)).constraints;
 }
 
 void JointAdjustment::Vote() {
@@ -223,14 +229,24 @@ void JointAdjustment::Reweigh() {
 }
 
 void JointAdjustment::Adjust() {
-  for (int round = 0; round < options_.rounds; ++round) {
-    Vote();
-    Reweigh();
-    const SolveReport report = session_->SolveGlobal();
-    if (!report.usable) {
-      throw PLUMBLINE_ERROR("joint adjustment failed: " + report.message,
-                            "a usable solution");
+  for (int pass = 0; pass < options_.max_passes; ++pass) {
+    const std::vector<Pose2> before = PlacePoses();
+    for (int round = 0; round < options_.rounds; ++round) {
+      Vote();
+      Reweigh();
+      const SolveReport report = session_->SolveGlobal();
+      if (!report.usable) {
+        throw PLUMBLINE_ERROR("joint adjustment failed: " + report.message,
+                              "a usable solution");
+      }
     }
+    const std::vector<Pose2> after = PlacePoses();
+    double moved = 0.0;
+    for (std::size_t p = 0; p < after.size(); ++p) {
+      moved = std::max(moved, (after[p] - before[p]).head<2>().norm());
+    }
+    if (moved <= options_.settled_distance) break;
+    if (pass + 1 < options_.max_passes) Match();
   }
 }
 

@@ -12,6 +12,7 @@
 #include <plumbline/frontend/wall_votes.h>
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace plumbline {
@@ -27,6 +28,10 @@ struct JointAdjustmentOptions {
   double loss_scale = 2.0;
   /// How often votes and weights are taken anew, each followed by a solve.
   int rounds = 3;
+  /// After that places that have come near each other are matched, and all is
+  /// done again, at most so often and while a pose moves by more than this, m.
+  int max_passes = 5;
+  double settled_distance = 0.05;
   /// The result does not depend on it.
   int num_threads = 1;
 };
@@ -38,7 +43,7 @@ struct JointAdjustmentOptions {
 /// The poses of key scans, which the front-end had marginalized out one by
 /// one, come back into the graph. They are bound to each other by refined
 /// odometry and by matches of scans that saw the same place, at the same time
-/// or on another visit (FindScanRelations), and to the walls by every return
+/// or on another visit (ScanMatchFinder), and to the walls by every return
 /// that lies on one (CollectWallVotes). These are what the scans say in full,
 /// so the relations between walls that stood for the marginalized poses go;
 /// walls that no return votes for keep theirs. Structure stays as it is, live
@@ -57,7 +62,8 @@ class JointAdjustment {
                   const JointAdjustmentOptions& options);
 
   /// Takes votes and weights anew at the present state and solves, `rounds`
-  /// times. Throws Error when a solve fails.
+  /// times, then matches what has come near and starts again, until the poses
+  /// have settled. Throws Error when a solve fails.
   void Adjust();
 
   /// The key poses as they stand, one a record: those between places by refined
@@ -73,6 +79,7 @@ class JointAdjustment {
 
  private:
   std::vector<Pose2> PlacePoses() const;
+  void Match();
   void Vote();
   void Reweigh();
 
@@ -84,6 +91,7 @@ class JointAdjustment {
   std::vector<Place> places_;
   // By place.
   std::vector<FeatureId> poses_;
+  std::unique_ptr<ScanMatchFinder> finder_;
   std::vector<ScanRelation> relations_;
   // By relation.
   std::vector<ConstraintId> relation_constraints_;

@@ -78,52 +78,83 @@ std::vector<std::vector<int>> Assign(const std::vector<Submap>& submaps,
 
 }  // namespace
 
-std::vector<ScanRelation> FindScanRelations(
-    const std::vector<Place>& places, const std::vector<Pose2>& poses,
-    const ScanRelationOptions& options) {
-  if (places.size() != poses.size()) {
-    throw PLUMBLINE_ERROR(std::to_string(places.size()) + " places and " +
-                              std::to_string(poses.size()) + " poses",
-                          "one pose a place");
-  }
+ScanMatchFinder::ScanMatchFinder(const std::vector<Place>& places,
+                                 const ScanRelationOptions& options)
+    : places_(places), options_(options) {
   if (options.submap_size < 1 || !(options.radius > 0.0)) {
     throw PLUMBLINE_ERROR("submap_size or radius out of range",
                           "positive values");
   }
+  attempts_.resize((places.size() + options.submap_size - 1) /
+                   options.submap_size);
+}
+
+std::vector<ScanRelation> ScanMatchFinder::Find(
+    const std::vector<Pose2>& poses) {
+  if (places_.size() != poses.size()) {
+    throw PLUMBLINE_ERROR(std::to_string(places_.size()) + " places and " +
+                              std::to_string(poses.size()) + " poses",
+                          "one pose a place");
+  }
   std::vector<Submap> submaps;
   const int count = static_cast<int>(poses.size());
-  for (int begin = 0; begin < count; begin += options.submap_size) {
-    submaps.push_back({begin, std::min(count, begin + options.submap_size)});
+  for (int begin = 0; begin < count; begin += options_.submap_size) {
+    submaps.push_back({begin, std::min(count, begin + options_.submap_size)});
   }
-  const std::vector<std::vector<int>> keys = Assign(submaps, poses, options);
+  const std::vector<std::vector<int>> keys = Assign(submaps, poses, options_);
 
   MatchPrior prior;
   prior.information =
       Eigen::Vector3d(
-          1.0 / (options.prior_translation * options.prior_translation),
-          1.0 / (options.prior_translation * options.prior_translation),
-          1.0 / (options.prior_rotation * options.prior_rotation))
+          1.0 / (options_.prior_translation * options_.prior_translation),
+          1.0 / (options_.prior_translation * options_.prior_translation),
+          1.0 / (options_.prior_rotation * options_.prior_rotation))
           .asDiagonal();
-  std::vector<std::vector<ScanRelation>> found(submaps.size());
-  ParallelFor(submaps.size(), options.num_threads, [&](std::size_t i) {
-    if (keys[i].empty()) return;
-    ScanMatcher matcher(options.matcher);
-    matcher.SetReference(Reference(submaps[i], places, poses));
-    if (matcher.empty()) return;
+  std::vector<std::int64_t> tried(submaps.size(), 0);
+  ParallelFor(submaps.size(), options_.num_threads, [&](std::size_t i) {
+    const int middle = submaps[i].middle();
+    std::map<int, Attempt> attempts;
+    ScanMatcher matcher(options_.matcher);
+    bool has_reference = false;
     MatchPrior here = prior;
     for (const int k : keys[i]) {
-      here.pose = Between(poses[submaps[i].middle()], poses[k]);
-      if (matcher.Overlap(places[k].scan, here.pose) < options.min_overlap)
-        continue;
-      const MatchResult match = matcher.Refine(places[k].scan, here.pose, here);
-      if (match.inlier_ratio < options.min_inlier_ratio) continue;
-      found[i].push_back(
-          {submaps[i].middle(), k, match.pose, match.information});
+      here.pose = Between(poses[middle], poses[k]);
+      const auto known = attempts_[i].find(k);
+      if (known != attempts_[i].end()) {
+        const Pose2 change = Between(known->second.pose, here.pose);
+        if (change.head<2>().norm() <= options_.retry_distance &&
+            std::abs(change[2]) <= options_.retry_rotation) {
+          attempts.insert(*known);
+          continue;
+        }
+      }
+      if (!has_reference) {
+        matcher.SetReference(Reference(submaps[i], places_, poses));
+        has_reference = true;
+      }
+      ++tried[i];
+      Attempt attempt;
+      attempt.pose = here.pose;
+      if (!matcher.empty() &&
+          matcher.Overlap(places_[k].scan, here.pose) >= options_.min_overlap) {
+        const MatchResult match =
+            matcher.Refine(places_[k].scan, here.pose, here);
+        if (match.inlier_ratio >= options_.min_inlier_ratio) {
+          attempt.is_match = true;
+          attempt.relation = {middle, k, match.pose, match.information};
+        }
+      }
+      attempts.emplace(k, attempt);
     }
+    attempts_[i] = std::move(attempts);
   });
+  num_tried_ = 0;
+  for (const std::int64_t number : tried) num_tried_ += number;
   std::vector<ScanRelation> relations;
-  for (const auto& list : found) {
-    relations.insert(relations.end(), list.begin(), list.end());
+  for (const auto& attempts : attempts_) {
+    for (const auto& entry : attempts) {
+      if (entry.second.is_match) relations.push_back(entry.second.relation);
+    }
   }
   return relations;
 }

@@ -6,6 +6,8 @@
 #include <plumbline/frontend/scan_points.h>
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <map>
 #include <vector>
 
 namespace plumbline {
@@ -26,6 +28,10 @@ struct ScanRelationOptions {
   /// How far the present poses are believed while matching, m and rad.
   double prior_translation = 0.3;
   double prior_rotation = DegToRad(3.0);
+  /// Two places whose relative pose has changed by more, m or rad, since they
+  /// were matched or tried are matched anew.
+  double retry_distance = 0.1;
+  double retry_rotation = DegToRad(1.5);
   /// The result does not depend on it.
   int num_threads = 1;
 };
@@ -57,13 +63,38 @@ struct ScanRelation {
 };
 
 /// Matches each place's scan with the submaps of other places near it, seen
-/// shortly before or after or on another visit, point to line. `poses`: one a
-/// place, in one frame, good to within the matcher's initial radius where scans
-/// overlap. Relations come in the order of submaps, then of places. Cost:
-/// linear in the places.
-std::vector<ScanRelation> FindScanRelations(const std::vector<Place>& places,
-                                            const std::vector<Pose2>& poses,
-                                            const ScanRelationOptions& options);
+/// shortly before or after or on another visit, point to line. It remembers
+/// what it has matched: when the poses have changed, only what has moved or
+/// come near since is matched anew.
+class ScanMatchFinder {
+ public:
+  /// `places` must outlive this. Throws Error when options are out of range.
+  ScanMatchFinder(const std::vector<Place>& places,
+                  const ScanRelationOptions& options);
+
+  /// All relations at these poses: one a place, in one frame, good to within
+  /// the matcher's initial radius where scans overlap. They come in the order
+  /// of submaps, then of places. Cost: linear in the places.
+  std::vector<ScanRelation> Find(const std::vector<Pose2>& poses);
+
+  /// Pairs that the last call matched or tried to.
+  std::int64_t num_tried() const { return num_tried_; }
+
+ private:
+  // What is known of a submap and a place.
+  struct Attempt {
+    // Relative pose when it was made.
+    Pose2 pose = Pose2::Zero();
+    bool is_match = false;
+    ScanRelation relation;
+  };
+
+  const std::vector<Place>& places_;
+  ScanRelationOptions options_;
+  // By submap and place.
+  std::vector<std::map<int, Attempt>> attempts_;
+  std::int64_t num_tried_ = 0;
+};
 
 }  // namespace plumbline
 

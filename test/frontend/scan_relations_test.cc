@@ -9,6 +9,12 @@
 namespace plumbline {
 namespace {
 
+std::vector<ScanRelation> FindScanRelations(
+    const std::vector<Place>& places, const std::vector<Pose2>& poses,
+    const ScanRelationOptions& options) {
+  return ScanMatchFinder(places, options).Find(poses);
+}
+
 using testing::Laser;
 using testing::MakeScan;
 using testing::Noise;
@@ -127,6 +133,24 @@ TEST_F(ScanRelationsTest, SameForAnyNumberOfThreads) {
     EXPECT_EQ(one[i].mean, three[i].mean);
     EXPECT_EQ(one[i].information, three[i].information);
   }
+}
+
+TEST_F(ScanRelationsTest, OnlyWhatHasMovedIsMatchedAnew) {
+  Drive(testing::Room(10.0, 6.0));
+  ScanMatchFinder finder(places_, options_);
+  const std::size_t first = finder.Find(Drifted(Pose2(0.0, 1.0, 0.0))).size();
+  EXPECT_GT(finder.num_tried(), 30);
+  // A little: everything stands.
+  EXPECT_EQ(finder.Find(Drifted(Pose2(0.03, 1.0, 0.0))).size(), first);
+  EXPECT_EQ(finder.num_tried(), 0);
+  // Come near: the second visit is seen to overlap with the first.
+  const std::vector<Pose2> near = Drifted(Pose2(0.1, 0.1, 0.0));
+  const std::vector<ScanRelation> relations = finder.Find(near);
+  EXPECT_GT(relations.size(), first);
+  EXPECT_GT(finder.num_tried(), 10);
+  const std::vector<ScanRelation> afresh =
+      FindScanRelations(places_, near, options_);
+  EXPECT_EQ(relations.size(), afresh.size());
 }
 
 TEST_F(ScanRelationsTest, EmptyAndBrokenInput) {

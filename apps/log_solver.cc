@@ -154,6 +154,8 @@ LogSolverResult LogSolver::Run(
   result.refused_matches = refiner.refusals();
   result.segment_matches = builder.num_matches();
   result.segments_created = builder.num_created();
+  result.records = builder.records();
+  result.refined = std::move(refined);
   return result;
 }
 

@@ -83,6 +83,10 @@ struct LogSolverResult {
   std::int64_t segments_created = 0;
   /// Ended early because `stop` said so: what there is, is whole.
   bool interrupted = false;
+  /// What the front-end made of each scan and of the key scans: enough to
+  /// replay the log in another way (apps/without_structure.h).
+  std::vector<RefinedScan> refined;
+  std::vector<KeyScanRecord> records;
 };
 
 /// Replays a log: front-end, EM steps near the robot on the way, EM on the

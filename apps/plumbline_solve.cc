@@ -71,6 +71,11 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin) {
   const std::filesystem::path folder(FLAGS_output_dir);
   const double begin = Now();
   CountGraph(*outcome->graph, &outcome->summary);
+  // What the report says; the summary, written last, has the whole.
+  outcome->summary.total_seconds = begin - total_begin;
+  outcome->summary.peak_memory_bytes = PeakMemoryBytes();
+  outcome->flags = OwnFlags();
+  outcome->delta_threshold = FLAGS_delta_threshold;
   for (const std::string& line :
        WriteSolveOutputs(*outcome, SelectOutputs(FLAGS_outputs), folder,
                          NumThreadsFromFlags())) {
@@ -145,6 +150,9 @@ int SolveLog(InputStream* input, const Registry& registry, double begin) {
   outcome.graph = &solver.graph();
   outcome.registry = &registry;
   outcome.scans = &log.scans;
+  outcome.without_structure = [&] {
+    return ReplayWithoutStructure(log.scans, registry, options, result);
+  };
   outcome.trace = solver.trace();
   outcome.occupancy = OccupancyOptionsFromFlags();
   outcome.title =
@@ -199,6 +207,9 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   outcome.graph = &graph;
   outcome.registry = &registry;
   outcome.g2o = &g2o;
+  outcome.without_structure = [&] {
+    return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
+  };
   outcome.title = std::filesystem::path(input->name()).filename().string();
   WriteOutputs(&outcome, begin);
   return kExitSuccess;

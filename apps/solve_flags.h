@@ -14,6 +14,7 @@ DECLARE_string(input);
 DECLARE_string(output_dir);
 DECLARE_string(outputs);
 DECLARE_bool(structure);
+DECLARE_double(delta_threshold);
 DECLARE_string(hierarchy);
 DECLARE_uint64(seed);
 DECLARE_int32(num_threads);

@@ -4,6 +4,7 @@
 #include <plumbline/apps/floor_plan_geojson.h>
 #include <plumbline/apps/floor_plan_svg.h>
 #include <plumbline/apps/map_drawing.h>
+#include <plumbline/apps/report.h>
 #include <plumbline/apps/solve_outputs.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
@@ -38,6 +39,20 @@ FloorPlan Plan(const SolveOutcome& outcome) {
   FloorPlan plan = MakeFloorPlan(*outcome.graph, Poses(outcome));
   plan.title = outcome.title;
   return plan;
+}
+
+Report MakeReport(const SolveOutcome& outcome) {
+  Report report;
+  report.graph = outcome.graph;
+  if (outcome.without_structure) report.before = outcome.without_structure();
+  report.path = Poses(outcome);
+  for (const EmPhase& phase : outcome.trace)
+    report.trace.push_back({phase, {}});
+  report.summary = outcome.summary;
+  report.flags = outcome.flags;
+  report.delta_threshold = outcome.delta_threshold;
+  report.title = outcome.title;
+  return report;
 }
 
 std::string WriteOccupancy(const SolveOutcome& outcome, const path& folder) {
@@ -101,6 +116,10 @@ std::vector<SolveOutput> MakeSolveOutputs() {
   add("map.png", "the map as a picture", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {
         WriteMapPng(Drawing(outcome), folder / "map.png");
+      }));
+  add("report.html", "all of it as one page for a browser", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteReport(MakeReport(outcome), folder / "report.html");
       }));
   add("map.svg", "the map as a picture that can be zoomed", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {

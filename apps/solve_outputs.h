@@ -4,6 +4,7 @@
 #include <plumbline/apps/occupancy_grid.h>
 #include <plumbline/apps/relations.h>
 #include <plumbline/apps/summary.h>
+#include <plumbline/apps/without_structure.h>
 #include <plumbline/core/em.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/graph_g2o.h>
@@ -33,6 +34,11 @@ struct SolveOutcome {
   /// "office.clf.gz, with structure"
   std::string title;
   OccupancyOptions occupancy;
+  double delta_threshold = 0.0;
+  /// All of them, for the report.
+  std::vector<FlagValue> flags;
+  /// Makes the map without structure, for the report; may be null.
+  std::function<MapWithoutStructure()> without_structure;
   /// Complete but for the times and memory of writing.
   Summary summary;
 };

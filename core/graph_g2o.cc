@@ -2,9 +2,12 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/number_text.h>
+#include <plumbline/factors/angle.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <istream>
 #include <limits>
 #include <ostream>
@@ -19,6 +22,7 @@ namespace {
 constexpr char kFeatureTag[] = "PLUMBLINE_FEATURE";
 constexpr char kConstraintTag[] = "PLUMBLINE_CONSTRAINT";
 constexpr char kFixTag[] = "FIX";
+constexpr char kLaserTag[] = "ROBOTLASER1";
 constexpr char kDefaultSource[] = "g2o";
 // Room for new ids above it.
 constexpr std::int64_t kLargestFileId =
@@ -74,47 +78,251 @@ bool ParseSource(std::string_view text, std::string* source) {
   return true;
 }
 
+// A tag and how its line is written. Null formats: the type's own tag, in
+// order.
+struct VertexTag {
+  const FeatureType* type;
+  const G2oVertexFormat* format;
+};
+struct EdgeTag {
+  const RelationType* type;
+  const G2oEdgeFormat* format;
+};
+
+int FeaturePlace(const G2oEdgeFormat* format, int feature) {
+  return format == nullptr || format->feature_places.empty()
+             ? feature
+             : format->feature_places[feature];
+}
+
+int RowPlace(const G2oEdgeFormat* format, int row) {
+  return format == nullptr || format->row_places.empty()
+             ? row
+             : format->row_places[row];
+}
+
+// Rows and columns of the entries of an information matrix in the order of the
+// line.
+std::vector<std::pair<int, int>> InformationOrder(const G2oEdgeFormat* format,
+                                                  int size) {
+  if (format != nullptr && !format->information_order.empty()) {
+    return format->information_order;
+  }
+  std::vector<std::pair<int, int>> order;
+  for (int i = 0; i < size; ++i) {
+    for (int j = i; j < size; ++j) order.emplace_back(i, j);
+  }
+  return order;
+}
+
+// Information of a relative pose, turned by the angle.
+void TurnInformation(double angle, Eigen::MatrixXd* information) {
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  turn(0, 0) = turn(1, 1) = std::cos(angle);
+  turn(1, 0) = std::sin(angle);
+  turn(0, 1) = -turn(1, 0);
+  const Eigen::Matrix3d turned = turn * *information * turn.transpose();
+  *information = 0.5 * (turned + turned.transpose());
+}
+
+bool IsTurned(const G2oOptions& options, const Constraint& constraint) {
+  return options.information_at_second &&
+         constraint.type->sighting == Sighting::kPose &&
+         constraint.information.rows() == 3;
+}
+
+// -- Writing elements ---------------------------------------------------------
+
+// What follows the parameters of a vertex in a file: "458 460".
+using ExtraText = std::string_view;
+
+void AppendVertex(const Feature& feature, const G2oVertexFormat* format,
+                  std::int64_t file_id, ExtraText extra, std::string* text) {
+  *text += format == nullptr ? feature.type->g2o_tag : format->tag;
+  *text += ' ';
+  AppendNumber(file_id, text);
+  std::array<double, kMaxFeatureSize> numbers = feature.parameters;
+  if (format != nullptr && format->write) format->write(numbers.data());
+  for (int i = 0; i < feature.type->size; ++i) {
+    *text += ' ';
+    AppendNumber(numbers[i], text);
+  }
+  if (!extra.empty()) {
+    *text += ' ';
+    *text += extra;
+  }
+}
+
+void AppendFix(std::int64_t file_id, std::string* text) {
+  *text += kFixTag;
+  *text += ' ';
+  AppendNumber(file_id, text);
+}
+
+bool IsPlain(const Feature& feature) {
+  return feature.level == 0 && !feature.is_virtual &&
+         feature.anchor[0] == 0.0 && feature.anchor[1] == 0.0 &&
+         feature.extent_begin == 0.0 && feature.extent_end == 0.0 &&
+         feature.observations == 0 && feature.source == kDefaultSource;
+}
+
+void AppendAttributes(const Feature& feature, std::int64_t file_id,
+                      std::string* text) {
+  *text += kFeatureTag;
+  *text += ' ';
+  AppendNumber(file_id, text);
+  *text += ' ';
+  AppendNumber(static_cast<std::int64_t>(feature.level), text);
+  *text += feature.is_virtual ? " 1" : " 0";
+  for (const double number : {feature.anchor[0], feature.anchor[1],
+                              feature.extent_begin, feature.extent_end}) {
+    *text += ' ';
+    AppendNumber(number, text);
+  }
+  *text += ' ';
+  AppendNumber(static_cast<std::int64_t>(feature.observations), text);
+  *text += ' ';
+  AppendSource(feature.source, text);
+}
+
+void AppendEdge(const Constraint& constraint, const G2oEdgeFormat* format,
+                const G2oOptions& options,
+                const std::vector<std::int64_t>& file_ids, std::string* text) {
+  const int size = constraint.type->residual_size;
+  const int arity = static_cast<int>(constraint.features.size());
+  *text += format == nullptr ? constraint.type->g2o_tag : format->tag;
+  std::vector<std::int64_t> ids(constraint.features.size());
+  for (int i = 0; i < arity; ++i) {
+    ids[FeaturePlace(format, i)] = file_ids[constraint.features[i]];
+  }
+  for (const std::int64_t id : ids) {
+    *text += ' ';
+    AppendNumber(id, text);
+  }
+  Eigen::VectorXd expected = constraint.expected;
+  Eigen::MatrixXd information = constraint.information;
+  if (IsTurned(options, constraint)) {
+    TurnInformation(-expected[2], &information);
+  }
+  if (format != nullptr && format->write) format->write(expected.data());
+  Eigen::VectorXd values(size);
+  Eigen::MatrixXd entries(size, size);
+  for (int i = 0; i < size; ++i) {
+    values[RowPlace(format, i)] = expected[i];
+    for (int j = 0; j < size; ++j) {
+      entries(RowPlace(format, i), RowPlace(format, j)) = information(i, j);
+    }
+  }
+  for (int i = 0; i < size; ++i) {
+    *text += ' ';
+    AppendNumber(values[i], text);
+  }
+  for (const auto& [row, column] : InformationOrder(format, size)) {
+    *text += ' ';
+    AppendNumber(entries(row, column), text);
+  }
+}
+
+bool IsPlain(const Constraint& constraint) {
+  return constraint.kind == ConstraintClass::kMeasurement &&
+         constraint.state == ConstraintState::kLive &&
+         constraint.delta == 1.0 && constraint.source == kDefaultSource;
+}
+
+void AppendAttributes(const Constraint& constraint, std::string* text) {
+  *text += kConstraintTag;
+  *text += constraint.kind == ConstraintClass::kStructure ? " structure"
+                                                          : " measurement";
+  *text += constraint.state == ConstraintState::kBroken ? " broken " : " live ";
+  AppendNumber(constraint.delta, text);
+  *text += ' ';
+  AppendSource(constraint.source, text);
+}
+
+// What an element says, whatever its format.
+G2oFile::Fingerprint FingerprintOf(const Feature& feature) {
+  std::string element;
+  AppendVertex(feature, nullptr, 0, {}, &element);
+  std::string attributes;
+  AppendAttributes(feature, 0, &attributes);
+  return {std::hash<std::string>()(element),
+          std::hash<std::string>()(attributes)};
+}
+
+G2oFile::Fingerprint FingerprintOf(const Constraint& constraint,
+                                   const std::vector<std::int64_t>& file_ids) {
+  std::string element;
+  AppendEdge(constraint, nullptr, {}, file_ids, &element);
+  std::string attributes;
+  AppendAttributes(constraint, &attributes);
+  return {std::hash<std::string>()(element),
+          std::hash<std::string>()(attributes)};
+}
+
+// -- Reading ------------------------------------------------------------------
+
 // What stands on a PLUMBLINE_FEATURE line.
 struct FeatureLine {
   int line;
-  std::string text;
-  FeatureId position;
   std::int64_t file_id;
   Feature attributes;
 };
 
 struct FixLine {
   int line;
-  FeatureId position;
   std::int64_t file_id;
+};
+
+// A vertex with fields that name others, which may come later in the file.
+struct ExtraFields {
+  std::size_t feature;
+  const G2oVertexFormat* format;
+  std::vector<std::int64_t> numbers;
 };
 
 // An edge as it was read: its vertices may come later in the file.
 struct Edge {
   int line;
-  std::string text;
-  // The own line below it, which shares its fate.
-  std::string own_text;
-  FeatureId position;
+  // Whether a PLUMBLINE_CONSTRAINT line follows.
+  bool has_attributes = false;
   std::vector<std::int64_t> file_ids;
   Constraint constraint;
 };
 
 class Reader {
  public:
-  Reader(const std::string& name, const Registry& registry)
-      : name_(name), registry_(registry) {}
+  Reader(const std::string& name, const Registry& registry,
+         const G2oOptions& options)
+      : name_(name) {
+    file_.options = options;
+    for (const FeatureType* type : registry.features()) {
+      vertex_tags_[type->g2o_tag] = {type, nullptr};
+      for (const G2oVertexFormat& format : type->other_g2o_formats) {
+        vertex_tags_[format.tag] = {type, &format};
+      }
+    }
+    for (const RelationType* type : registry.relations()) {
+      edge_tags_[type->g2o_tag] = {type, nullptr};
+      for (const G2oEdgeFormat& format : type->other_g2o_formats) {
+        edge_tags_[format.tag] = {type, &format};
+      }
+    }
+  }
 
   G2oFile Read(std::istream& input, Graph* graph) {
     if (graph->num_features() > 0 || graph->num_constraints() > 0) {
       throw PLUMBLINE_ERROR("the graph holds features already",
                             "an empty graph");
     }
-    first_id_ = graph->feature_id_end();
-    file_.file_ids.assign(first_id_, kNoId);
+    first_feature_ = graph->feature_id_end();
+    first_constraint_ = graph->constraint_id_end();
+    file_.file_ids.assign(static_cast<std::size_t>(first_feature_), kNoId);
     std::string line;
     while (std::getline(input, line)) {
+      // The last line counts as ended unless the input ended before.
+      file_.ends_with_line_feed = !input.eof();
       ++line_;
+      file_.lines.push_back({G2oLine::Kind::kText, line, kNoId});
       ReadLine(line);
     }
     if (input.bad()) throw Error(name_, line_, "cannot read on", "");
@@ -134,6 +342,7 @@ class Reader {
       }
       throw;
     }
+    TakeFingerprints(*graph);
     return std::move(file_);
   }
 
@@ -186,66 +395,75 @@ class Reader {
     }
   }
 
-  // The feature whose vertex was read last.
-  FeatureId Position() const {
-    if (features_.empty()) return kNoId;
-    return first_id_ + static_cast<FeatureId>(features_.size()) - 1;
-  }
-
-  void Keep(const std::string& line, FeatureId position) {
-    file_.unknown_lines.push_back(line);
-    file_.unknown_line_positions.push_back(position);
-  }
+  // The line that is being read.
+  G2oLine& Line() { return file_.lines.back(); }
 
   void ReadLine(const std::string& line) {
     Split(line, &fields_);
-    if (fields_.empty()) return;
-    if (fields_[0][0] == '#') {
-      Keep(line, Position());
-      return;
-    }
+    if (fields_.empty() || fields_[0][0] == '#') return;
     const std::string tag(fields_[0]);
     const Above above = above_;
     above_ = Above::kNothing;
     if (tag == kConstraintTag) {
-      if (above == Above::kUnknown) {
-        Keep(line, Position());
-      } else if (above == Above::kEdge) {
-        ReadConstraintLine(line);
-      } else {
+      if (above == Above::kEdge) {
+        ReadConstraintLine();
+      } else if (above != Above::kUnknown) {
         Fail(line_, tag + " without an edge", "an edge above it");
       }
-    } else if (tag == kFixTag) {
+      return;
+    }
+    if (tag == kFixTag) {
       if (fields_.size() < 2) {
         Fail(line_, "FIX without an id", "ids of vertices");
       }
+      Line().kind = G2oLine::Kind::kFix;
       for (std::size_t i = 1; i < fields_.size(); ++i) {
-        fix_lines_.push_back({line_, Position(), Id(fields_[i])});
+        fix_lines_.push_back({line_, Id(fields_[i])});
       }
-    } else if (tag == kFeatureTag) {
-      ReadFeatureLine(line);
-    } else if (const FeatureType* type = registry_.FindFeatureByTag(tag)) {
-      ReadVertex(*type);
-    } else if (const RelationType* relation =
-                   registry_.FindRelationByTag(tag)) {
-      ReadEdge(*relation, line);
-      above_ = Above::kEdge;
-    } else {
-      ++file_.unknown_tags[tag];
-      std::int64_t id = 0;
-      if (MayBeVertex(tag) && fields_.size() > 1 &&
-          ParseNumber(fields_[1], &id)) {
-        unknown_ids_.insert(id);
-      }
-      Keep(line, Position());
-      above_ = Above::kUnknown;
+      return;
     }
+    if (tag == kFeatureTag) {
+      ReadFeatureLine();
+      return;
+    }
+    if (tag == kLaserTag) {
+      ReadLaser();
+      return;
+    }
+    const auto vertex = vertex_tags_.find(tag);
+    if (vertex != vertex_tags_.end()) {
+      ReadVertex(vertex->second);
+      return;
+    }
+    const auto edge = edge_tags_.find(tag);
+    if (edge != edge_tags_.end()) {
+      ReadEdge(edge->second);
+      above_ = Above::kEdge;
+      return;
+    }
+    ++file_.unknown_tags[tag];
+    std::int64_t id = 0;
+    if (MayBeVertex(tag) && fields_.size() > 1 &&
+        ParseNumber(fields_[1], &id)) {
+      unknown_ids_.insert(id);
+    }
+    above_ = Above::kUnknown;
   }
 
-  void ReadVertex(const FeatureType& type) {
+  void ReadVertex(const VertexTag& tag) {
+    const FeatureType& type = *tag.type;
     std::string what = "id";
-    for (const std::string& name : type.parameter_names) what += ", " + name;
-    ExpectFields(type.size + 1, what);
+    if (tag.format == nullptr) {
+      for (const std::string& name : type.parameter_names) what += ", " + name;
+    } else {
+      what += ", " + std::to_string(type.size) + " numbers";
+      for (const std::string& name : tag.format->extra_fields) {
+        what += ", " + name;
+      }
+    }
+    const std::size_t extra =
+        tag.format == nullptr ? 0 : tag.format->extra_fields.size();
+    ExpectFields(static_cast<std::size_t>(type.size) + 1 + extra, what);
     const std::int64_t id = Id(fields_[1]);
     if (!index_.emplace(id, features_.size()).second) {
       Fail(line_, "id " + std::to_string(id) + " is taken", "each vertex once");
@@ -256,18 +474,35 @@ class Reader {
     for (int i = 0; i < type.size; ++i) {
       feature.parameters[i] = Number(fields_[i + 2]);
     }
+    if (tag.format != nullptr && tag.format->read) {
+      tag.format->read(feature.parameters.data());
+    }
+    if (extra > 0) {
+      ExtraFields fields = {features_.size(), tag.format, {}};
+      for (std::size_t i = 0; i < extra; ++i) {
+        const std::string_view field =
+            fields_[static_cast<std::size_t>(type.size) + 2 + i];
+        if (tag.format->extra_fields_are_ids) {
+          fields.numbers.push_back(
+              Integer(field, tag.format->extra_fields[i], -1, kLargestFileId));
+        } else {
+          Number(field);
+        }
+      }
+      if (tag.format->read_extra) extra_fields_.push_back(std::move(fields));
+    }
+    Line().kind = G2oLine::Kind::kVertex;
+    Line().id = first_feature_ + static_cast<FeatureId>(features_.size());
     features_.push_back(std::move(feature));
     file_.file_ids.push_back(id);
   }
 
-  void ReadFeatureLine(const std::string& line) {
+  void ReadFeatureLine() {
     ExpectFields(9,
                  "id, level, virtual, anchor_x, anchor_y, extent_begin, "
                  "extent_end, observations, source");
     FeatureLine own;
     own.line = line_;
-    own.text = line;
-    own.position = Position();
     own.file_id = Id(fields_[1]);
     Feature& feature = own.attributes;
     feature.level = static_cast<int>(
@@ -282,41 +517,84 @@ class Reader {
     feature_lines_.push_back(std::move(own));
   }
 
-  void ReadEdge(const RelationType& type, const std::string& line) {
-    const std::size_t arity = type.feature_types.size();
+  // type start_angle field_of_view resolution maximum_range accuracy
+  // remission_mode, the ranges and the remissions with their numbers before
+  // them, poses of laser and robot and more.
+  void ReadLaser() {
+    constexpr std::size_t kBefore = 7;
+    constexpr std::size_t kPoses = 6;
+    if (features_.empty()) {
+      Fail(line_, std::string(kLaserTag) + " before all vertices",
+           "the vertex that it belongs to above it");
+    }
+    std::size_t field = kBefore + 1;
+    for (int list = 0; list < 2; ++list) {
+      if (field >= fields_.size()) break;
+      field += 1 + static_cast<std::size_t>(
+                       Integer(fields_[field], "number of readings", 0,
+                               std::numeric_limits<int>::max()));
+    }
+    if (field + kPoses > fields_.size()) {
+      Fail(line_,
+           std::string(kLaserTag) + " has " +
+               std::to_string(fields_.size() - 1) + " fields",
+           "7 numbers, ranges and remissions each with their number before "
+           "them, and two poses");
+    }
+    for (std::size_t i = 1; i < field + kPoses; ++i) Number(fields_[i]);
+    ++file_.laser_scans;
+  }
+
+  void ReadEdge(const EdgeTag& tag) {
+    const RelationType& type = *tag.type;
+    const int arity = static_cast<int>(type.feature_types.size());
     const int size = type.residual_size;
-    ExpectFields(arity + size + size * (size + 1) / 2,
-                 std::to_string(arity) + " ids, " + std::to_string(size) +
-                     " expected values, the upper triangle of the information");
+    ExpectFields(static_cast<std::size_t>(arity + size + size * (size + 1) / 2),
+                 std::to_string(arity) + (arity == 1 ? " id, " : " ids, ") +
+                     std::to_string(size) +
+                     (size == 1 ? " expected value" : " expected values") +
+                     ", the upper triangle of the information");
     Edge edge;
     edge.line = line_;
-    edge.text = line;
-    edge.position = Position();
-    std::size_t field = 1;
-    for (std::size_t i = 0; i < arity; ++i) {
-      edge.file_ids.push_back(Id(fields_[field++]));
+    for (int i = 0; i < arity; ++i) {
+      edge.file_ids.push_back(Id(fields_[1 + FeaturePlace(tag.format, i)]));
     }
     Constraint& constraint = edge.constraint;
     constraint.type = &type;
     constraint.source = kDefaultSource;
     constraint.expected.resize(size);
+    for (int i = 0; i < size; ++i) {
+      constraint.expected[i] =
+          Number(fields_[1 + arity + RowPlace(tag.format, i)]);
+    }
+    if (tag.format != nullptr && tag.format->read) {
+      tag.format->read(constraint.expected.data());
+    }
+    Eigen::MatrixXd entries(size, size);
+    int field = 1 + arity + size;
+    for (const auto& [row, column] : InformationOrder(tag.format, size)) {
+      entries(row, column) = Number(fields_[field++]);
+      entries(column, row) = entries(row, column);
+    }
     constraint.information.resize(size, size);
     for (int i = 0; i < size; ++i) {
-      constraint.expected[i] = Number(fields_[field++]);
-    }
-    for (int i = 0; i < size; ++i) {
-      for (int j = i; j < size; ++j) {
-        constraint.information(i, j) = Number(fields_[field++]);
-        constraint.information(j, i) = constraint.information(i, j);
+      for (int j = 0; j < size; ++j) {
+        constraint.information(i, j) =
+            entries(RowPlace(tag.format, i), RowPlace(tag.format, j));
       }
     }
+    if (IsTurned(file_.options, constraint)) {
+      TurnInformation(constraint.expected[2], &constraint.information);
+    }
+    Line().kind = G2oLine::Kind::kEdge;
     edges_.push_back(std::move(edge));
   }
 
   // `above_` was an edge.
-  void ReadConstraintLine(const std::string& line) {
+  void ReadConstraintLine() {
     ExpectFields(4, "class, state, delta, source");
-    edges_.back().own_text = line;
+    Line().kind = G2oLine::Kind::kConstraintAttributes;
+    edges_.back().has_attributes = true;
     Constraint& constraint = edges_.back().constraint;
     if (fields_[1] == "structure") {
       constraint.kind = ConstraintClass::kStructure;
@@ -337,25 +615,31 @@ class Reader {
     constraint.source = Source(fields_[4]);
   }
 
-  // The vertex with this id; null when its tag is unknown.
-  Feature* FindVertex(int line, std::int64_t file_id) {
+  // The index of the vertex with this id; features_.size() when its tag is
+  // unknown.
+  std::size_t FindVertex(int line, std::int64_t file_id) const {
     const auto found = index_.find(file_id);
-    if (found != index_.end()) return &features_[found->second];
+    if (found != index_.end()) return found->second;
     if (unknown_ids_.count(file_id) == 0) {
       Fail(line, "no vertex " + std::to_string(file_id),
            "the id of a vertex in the file");
     }
-    return nullptr;
+    return features_.size();
   }
 
   void AddFeatures(Transaction* transaction) {
     for (const FixLine& fix : fix_lines_) {
-      Feature* feature = FindVertex(fix.line, fix.file_id);
-      if (feature != nullptr) {
-        feature->fixed = true;
-      } else {
-        Keep(kFixTag + (" " + std::to_string(fix.file_id)), fix.position);
+      const std::size_t index = FindVertex(fix.line, fix.file_id);
+      if (index < features_.size()) features_[index].fixed = true;
+    }
+    for (const ExtraFields& fields : extra_fields_) {
+      std::vector<const Feature*> named;
+      for (const std::int64_t number : fields.numbers) {
+        const auto found = index_.find(number);
+        named.push_back(found == index_.end() ? nullptr
+                                              : &features_[found->second]);
       }
+      fields.format->read_extra(named, &features_[fields.feature]);
     }
     std::unordered_set<std::int64_t> seen;
     for (const FeatureLine& own : feature_lines_) {
@@ -365,18 +649,19 @@ class Reader {
                  std::to_string(own.file_id),
              "one a vertex");
       }
-      Feature* feature = FindVertex(own.line, own.file_id);
-      if (feature == nullptr) {
-        Keep(own.text, own.position);
-        continue;
-      }
-      feature->level = own.attributes.level;
-      feature->is_virtual = own.attributes.is_virtual;
-      feature->anchor = own.attributes.anchor;
-      feature->extent_begin = own.attributes.extent_begin;
-      feature->extent_end = own.attributes.extent_end;
-      feature->observations = own.attributes.observations;
-      feature->source = own.attributes.source;
+      const std::size_t index = FindVertex(own.line, own.file_id);
+      if (index == features_.size()) continue;
+      G2oLine& line = file_.lines[static_cast<std::size_t>(own.line - 1)];
+      line.kind = G2oLine::Kind::kFeatureAttributes;
+      line.id = first_feature_ + static_cast<FeatureId>(index);
+      Feature& feature = features_[index];
+      feature.level = own.attributes.level;
+      feature.is_virtual = own.attributes.is_virtual;
+      feature.anchor = own.attributes.anchor;
+      feature.extent_begin = own.attributes.extent_begin;
+      feature.extent_end = own.attributes.extent_end;
+      feature.observations = own.attributes.observations;
+      feature.source = own.attributes.source;
     }
     for (const Feature& feature : features_) transaction->AddFeature(feature);
   }
@@ -385,24 +670,51 @@ class Reader {
   std::vector<const Edge*> AddConstraints(Transaction* transaction) {
     std::vector<const Edge*> added;
     for (Edge& edge : edges_) {
+      const std::size_t index = static_cast<std::size_t>(edge.line - 1);
       bool known = true;
       for (const std::int64_t file_id : edge.file_ids) {
-        if (FindVertex(edge.line, file_id) == nullptr) {
-          known = false;
-          continue;
-        }
-        edge.constraint.features.push_back(
-            Transaction::ProvisionalId(index_[file_id]));
+        const std::size_t vertex = FindVertex(edge.line, file_id);
+        known = known && vertex < features_.size();
+        edge.constraint.features.push_back(Transaction::ProvisionalId(vertex));
       }
-      if (!known) {
-        Keep(edge.text, edge.position);
-        if (!edge.own_text.empty()) Keep(edge.own_text, edge.position);
-        continue;
+      ConstraintId id = kNoId;
+      if (known) {
+        id = first_constraint_ + static_cast<ConstraintId>(added.size());
+        transaction->AddConstraint(std::move(edge.constraint));
+        added.push_back(&edge);
+      } else {
+        file_.lines[index].kind = G2oLine::Kind::kText;
       }
-      transaction->AddConstraint(std::move(edge.constraint));
-      added.push_back(&edge);
+      file_.lines[index].id = id;
+      if (edge.has_attributes) SetAttributesLine(index + 1, id);
     }
     return added;
+  }
+
+  // Comments and blank lines may stand between an edge and its own line.
+  void SetAttributesLine(std::size_t index, ConstraintId id) {
+    while (file_.lines[index].kind != G2oLine::Kind::kConstraintAttributes) {
+      ++index;
+    }
+    file_.lines[index].id = id;
+    if (id == kNoId) file_.lines[index].kind = G2oLine::Kind::kText;
+  }
+
+  void TakeFingerprints(const Graph& graph) {
+    file_.feature_fingerprints.resize(
+        static_cast<std::size_t>(graph.feature_id_end()));
+    file_.was_fixed.resize(file_.feature_fingerprints.size());
+    for (const Feature* feature : graph.Features()) {
+      const auto id = static_cast<std::size_t>(feature->id);
+      file_.feature_fingerprints[id] = FingerprintOf(*feature);
+      file_.was_fixed[id] = feature->fixed;
+    }
+    file_.constraint_fingerprints.resize(
+        static_cast<std::size_t>(graph.constraint_id_end()));
+    for (const Constraint* constraint : graph.Constraints()) {
+      file_.constraint_fingerprints[static_cast<std::size_t>(constraint->id)] =
+          FingerprintOf(*constraint, file_.file_ids);
+    }
   }
 
   // Whether the first field after an unknown tag can be the id of a vertex.
@@ -413,21 +725,26 @@ class Reader {
   }
 
   const std::string& name_;
-  const Registry& registry_;
+  std::unordered_map<std::string, VertexTag> vertex_tags_;
+  std::unordered_map<std::string, EdgeTag> edge_tags_;
   int line_ = 0;
   std::vector<std::string_view> fields_;
   Above above_ = Above::kNothing;
-  FeatureId first_id_ = 0;
+  FeatureId first_feature_ = 0;
+  ConstraintId first_constraint_ = 0;
   std::vector<Feature> features_;
   // Position in features_ by the id in the file.
   std::unordered_map<std::int64_t, std::size_t> index_;
   // Ids of vertices with unknown tags.
   std::unordered_set<std::int64_t> unknown_ids_;
   std::vector<FixLine> fix_lines_;
+  std::vector<ExtraFields> extra_fields_;
   std::vector<FeatureLine> feature_lines_;
   std::vector<Edge> edges_;
   G2oFile file_;
 };
+
+// -- Writing ------------------------------------------------------------------
 
 // Ids in the file for all features of the graph, by feature id.
 std::vector<std::int64_t> FileIds(const Graph& graph, const G2oFile* file) {
@@ -437,133 +754,261 @@ std::vector<std::int64_t> FileIds(const Graph& graph, const G2oFile* file) {
     ids = file->file_ids;
     for (const std::int64_t id : ids) next = std::max(next, id + 1);
     std::vector<std::string_view> fields;
-    for (const std::string& line : file->unknown_lines) {
+    for (const G2oLine& line : file->lines) {
+      if (line.kind != G2oLine::Kind::kText) continue;
       std::int64_t id = 0;
-      Split(line, &fields);
+      Split(line.text, &fields);
       if (fields.size() > 1 && ParseNumber(fields[1], &id) &&
           id <= kLargestFileId) {
         next = std::max(next, id + 1);
       }
     }
   }
-  ids.resize(graph.feature_id_end(), kNoId);
+  ids.resize(static_cast<std::size_t>(graph.feature_id_end()), kNoId);
   for (const Feature* feature : graph.Features()) {
     if (ids[feature->id] == kNoId) ids[feature->id] = next++;
   }
   return ids;
 }
 
-void AppendFeature(const Feature& feature, std::int64_t file_id,
-                   std::string* text) {
-  *text += feature.type->g2o_tag;
-  *text += ' ';
-  AppendNumber(file_id, text);
-  for (int i = 0; i < feature.type->size; ++i) {
-    *text += ' ';
-    AppendNumber(feature.parameters[i], text);
-  }
-  *text += '\n';
-  if (feature.fixed) {
-    *text += kFixTag;
-    *text += ' ';
-    AppendNumber(file_id, text);
-    *text += '\n';
-  }
-  const bool is_plain =
-      feature.level == 0 && !feature.is_virtual && feature.anchor[0] == 0.0 &&
-      feature.anchor[1] == 0.0 && feature.extent_begin == 0.0 &&
-      feature.extent_end == 0.0 && feature.observations == 0 &&
-      feature.source == kDefaultSource;
-  if (is_plain) return;
-  *text += kFeatureTag;
-  *text += ' ';
-  AppendNumber(file_id, text);
-  *text += ' ';
-  AppendNumber(static_cast<std::int64_t>(feature.level), text);
-  *text += feature.is_virtual ? " 1" : " 0";
-  for (const double number : {feature.anchor[0], feature.anchor[1],
-                              feature.extent_begin, feature.extent_end}) {
-    *text += ' ';
-    AppendNumber(number, text);
-  }
-  *text += ' ';
-  AppendNumber(static_cast<std::int64_t>(feature.observations), text);
-  *text += ' ';
-  AppendSource(feature.source, text);
-  *text += '\n';
-}
+class Writer {
+ public:
+  Writer(const Graph& graph, const G2oFile* file)
+      : graph_(graph), file_(file), file_ids_(FileIds(graph, file)) {}
 
-void AppendConstraint(const Constraint& constraint,
-                      const std::vector<std::int64_t>& file_ids,
-                      std::string* text) {
-  *text += constraint.type->g2o_tag;
-  for (const FeatureId id : constraint.features) {
-    *text += ' ';
-    AppendNumber(file_ids[id], text);
+  std::string Write() {
+    if (file_ != nullptr) {
+      MarkAttributes();
+      for (const G2oLine& line : file_->lines) AppendLine(line);
+      if (!file_->ends_with_line_feed && !text_.empty()) text_.pop_back();
+    }
+    const bool is_open = !text_.empty() && text_.back() != '\n';
+    const std::size_t end = text_.size();
+    for (const Feature* feature : graph_.Features()) {
+      if (IsOfFile(*feature)) continue;
+      AppendVertex(*feature, nullptr, file_ids_[feature->id], {}, &text_);
+      EndLine();
+      if (feature->fixed) {
+        AppendFix(file_ids_[feature->id], &text_);
+        EndLine();
+      }
+      if (!IsPlain(*feature)) AppendAttributeLine(*feature);
+    }
+    for (const Constraint* constraint : graph_.Constraints()) {
+      if (IsOfFile(*constraint)) continue;
+      AppendEdge(*constraint, nullptr, Options(), file_ids_, &text_);
+      EndLine();
+      if (!IsPlain(*constraint)) AppendAttributeLine(*constraint);
+    }
+    if (is_open && text_.size() > end) text_.insert(end, "\n");
+    return std::move(text_);
   }
-  for (Eigen::Index i = 0; i < constraint.expected.size(); ++i) {
-    *text += ' ';
-    AppendNumber(constraint.expected[i], text);
+
+ private:
+  G2oOptions Options() const {
+    return file_ == nullptr ? G2oOptions() : file_->options;
   }
-  for (Eigen::Index i = 0; i < constraint.information.rows(); ++i) {
-    for (Eigen::Index j = i; j < constraint.information.cols(); ++j) {
-      *text += ' ';
-      AppendNumber(constraint.information(i, j), text);
+
+  bool IsOfFile(const Feature& feature) const {
+    return file_ != nullptr && static_cast<std::size_t>(feature.id) <
+                                   file_->feature_fingerprints.size();
+  }
+  bool IsOfFile(const Constraint& constraint) const {
+    return file_ != nullptr && static_cast<std::size_t>(constraint.id) <
+                                   file_->constraint_fingerprints.size();
+  }
+
+  // Which elements have a line of attributes in the file.
+  void MarkAttributes() {
+    feature_has_attributes_.resize(file_->feature_fingerprints.size());
+    constraint_has_attributes_.resize(file_->constraint_fingerprints.size());
+    for (const G2oLine& line : file_->lines) {
+      if (line.kind == G2oLine::Kind::kFeatureAttributes) {
+        feature_has_attributes_[static_cast<std::size_t>(line.id)] = true;
+      } else if (line.kind == G2oLine::Kind::kConstraintAttributes) {
+        constraint_has_attributes_[static_cast<std::size_t>(line.id)] = true;
+      }
     }
   }
-  *text += '\n';
-  const bool is_plain = constraint.kind == ConstraintClass::kMeasurement &&
-                        constraint.state == ConstraintState::kLive &&
-                        constraint.delta == 1.0 &&
-                        constraint.source == kDefaultSource;
-  if (is_plain) return;
-  *text += kConstraintTag;
-  *text += constraint.kind == ConstraintClass::kStructure ? " structure"
-                                                          : " measurement";
-  *text += constraint.state == ConstraintState::kBroken ? " broken " : " live ";
-  AppendNumber(constraint.delta, text);
-  *text += ' ';
-  AppendSource(constraint.source, text);
-  *text += '\n';
-}
+
+  void EndLine() { text_ += '\n'; }
+
+  void AppendAttributeLine(const Feature& feature) {
+    AppendAttributes(feature, file_ids_[feature.id], &text_);
+    EndLine();
+  }
+  void AppendAttributeLine(const Constraint& constraint) {
+    AppendAttributes(constraint, &text_);
+    EndLine();
+  }
+
+  void AppendText(const G2oLine& line) {
+    text_ += line.text;
+    EndLine();
+  }
+
+  void AppendLine(const G2oLine& line) {
+    switch (line.kind) {
+      case G2oLine::Kind::kText:
+        AppendText(line);
+        break;
+      case G2oLine::Kind::kVertex:
+        AppendVertexLine(line);
+        break;
+      case G2oLine::Kind::kFix:
+        AppendFixLine(line);
+        break;
+      case G2oLine::Kind::kEdge:
+        AppendEdgeLine(line);
+        break;
+      case G2oLine::Kind::kFeatureAttributes: {
+        const Feature* feature = graph_.FindFeature(line.id);
+        if (feature == nullptr) break;
+        if (FingerprintOf(*feature).attributes ==
+            FingerprintInFile(*feature).attributes) {
+          AppendText(line);
+        } else {
+          AppendAttributeLine(*feature);
+        }
+        break;
+      }
+      case G2oLine::Kind::kConstraintAttributes: {
+        const Constraint* constraint = graph_.FindConstraint(line.id);
+        if (constraint == nullptr) break;
+        if (FingerprintOf(*constraint, file_ids_).attributes ==
+            FingerprintInFile(*constraint).attributes) {
+          AppendText(line);
+        } else {
+          AppendAttributeLine(*constraint);
+        }
+        break;
+      }
+    }
+  }
+
+  const G2oFile::Fingerprint& FingerprintInFile(const Feature& feature) const {
+    return file_->feature_fingerprints[static_cast<std::size_t>(feature.id)];
+  }
+  const G2oFile::Fingerprint& FingerprintInFile(
+      const Constraint& constraint) const {
+    return file_
+        ->constraint_fingerprints[static_cast<std::size_t>(constraint.id)];
+  }
+
+  void AppendVertexLine(const G2oLine& line) {
+    const Feature* feature = graph_.FindFeature(line.id);
+    if (feature == nullptr) return;
+    const auto index = static_cast<std::size_t>(line.id);
+    const G2oFile::Fingerprint fingerprint = FingerprintOf(*feature);
+    if (fingerprint.element == FingerprintInFile(*feature).element) {
+      AppendText(line);
+    } else {
+      Split(line.text, &fields_);
+      const G2oVertexFormat* format = nullptr;
+      for (const G2oVertexFormat& other : feature->type->other_g2o_formats) {
+        if (other.tag == fields_[0]) format = &other;
+      }
+      // The extra fields as they stand there.
+      const std::size_t extra =
+          format == nullptr ? 0 : format->extra_fields.size();
+      ExtraText extra_text;
+      if (extra > 0) {
+        const char* begin = fields_[fields_.size() - extra].begin();
+        extra_text = ExtraText(
+            begin, static_cast<std::size_t>(fields_.back().end() - begin));
+      }
+      AppendVertex(*feature, format, file_ids_[feature->id], extra_text,
+                   &text_);
+      EndLine();
+    }
+    if (feature->fixed && !file_->was_fixed[index]) {
+      AppendFix(file_ids_[feature->id], &text_);
+      EndLine();
+    }
+    if (!feature_has_attributes_[index] &&
+        fingerprint.attributes != FingerprintInFile(*feature).attributes) {
+      AppendAttributeLine(*feature);
+    }
+  }
+
+  void AppendFixLine(const G2oLine& line) {
+    if (feature_of_id_.empty()) {
+      for (std::size_t id = 0; id < file_->file_ids.size(); ++id) {
+        if (file_->file_ids[id] != kNoId) {
+          feature_of_id_[file_->file_ids[id]] = static_cast<FeatureId>(id);
+        }
+      }
+    }
+    Split(line.text, &fields_);
+    std::string kept;
+    bool is_changed = false;
+    for (std::size_t i = 1; i < fields_.size(); ++i) {
+      std::int64_t file_id = 0;
+      ParseNumber(fields_[i], &file_id);
+      const auto found = feature_of_id_.find(file_id);
+      // Vertices with unknown tags stay fixed.
+      bool is_fixed = true;
+      if (found != feature_of_id_.end()) {
+        const Feature* feature = graph_.FindFeature(found->second);
+        is_fixed = feature != nullptr && feature->fixed;
+      }
+      if (is_fixed) {
+        kept += ' ';
+        kept += fields_[i];
+      } else {
+        is_changed = true;
+      }
+    }
+    if (!is_changed) {
+      AppendText(line);
+    } else if (!kept.empty()) {
+      text_ += kFixTag + kept;
+      EndLine();
+    }
+  }
+
+  void AppendEdgeLine(const G2oLine& line) {
+    const Constraint* constraint = graph_.FindConstraint(line.id);
+    if (constraint == nullptr) return;
+    const G2oFile::Fingerprint fingerprint =
+        FingerprintOf(*constraint, file_ids_);
+    if (fingerprint.element == FingerprintInFile(*constraint).element) {
+      AppendText(line);
+    } else {
+      Split(line.text, &fields_);
+      const G2oEdgeFormat* format = nullptr;
+      for (const G2oEdgeFormat& other : constraint->type->other_g2o_formats) {
+        if (other.tag == fields_[0]) format = &other;
+      }
+      AppendEdge(*constraint, format, Options(), file_ids_, &text_);
+      EndLine();
+    }
+    if (!constraint_has_attributes_[static_cast<std::size_t>(line.id)] &&
+        fingerprint.attributes != FingerprintInFile(*constraint).attributes) {
+      AppendAttributeLine(*constraint);
+    }
+  }
+
+  const Graph& graph_;
+  const G2oFile* file_;
+  std::vector<std::int64_t> file_ids_;
+  std::vector<bool> feature_has_attributes_;
+  std::vector<bool> constraint_has_attributes_;
+  std::unordered_map<std::int64_t, FeatureId> feature_of_id_;
+  std::vector<std::string_view> fields_;
+  std::string text_;
+};
 
 }  // namespace
 
 G2oFile ReadG2o(std::istream& input, const std::string& name,
-                const Registry& registry, Graph* graph) {
-  return Reader(name, registry).Read(input, graph);
+                const Registry& registry, Graph* graph,
+                const G2oOptions& options) {
+  return Reader(name, registry, options).Read(input, graph);
 }
 
 void WriteG2o(const Graph& graph, const G2oFile* file, std::ostream& output) {
-  const std::vector<std::int64_t> file_ids = FileIds(graph, file);
-  // Unknown lines in the order of the vertices that they follow.
-  std::vector<std::pair<FeatureId, const std::string*>> unknown;
-  if (file != nullptr) {
-    for (std::size_t i = 0; i < file->unknown_lines.size(); ++i) {
-      const bool placed = i < file->unknown_line_positions.size();
-      unknown.emplace_back(placed ? file->unknown_line_positions[i] : kNoId,
-                           &file->unknown_lines[i]);
-    }
-    std::stable_sort(
-        unknown.begin(), unknown.end(),
-        [](const auto& a, const auto& b) { return a.first < b.first; });
-  }
-  auto next = unknown.begin();
-  std::string text;
-  const auto append_unknown = [&](FeatureId before) {
-    for (; next != unknown.end() && next->first < before; ++next) {
-      text += *next->second;
-      text += '\n';
-    }
-  };
-  for (const Feature* feature : graph.Features()) {
-    append_unknown(feature->id);
-    AppendFeature(*feature, file_ids[feature->id], &text);
-  }
-  append_unknown(graph.feature_id_end());
-  for (const Constraint* constraint : graph.Constraints()) {
-    AppendConstraint(*constraint, file_ids, &text);
-  }
+  const std::string text = Writer(graph, file).Write();
   output.write(text.data(), static_cast<std::streamsize>(text.size()));
 }
 

@@ -12,22 +12,66 @@
 
 namespace plumbline {
 
-/// What a g2o file held besides the graph, kept so that it can be written back.
+struct G2oOptions {
+  /// Frame in which the information of relative poses (EDGE_SE2, EDGE2) is
+  /// given: that of the first pose (false: the error is inverse(p1) (+) p2
+  /// minus what was measured, as in this project and in Ceres' example), or
+  /// that of the second pose as measured (true: the error is
+  /// inverse(measured) (+) inverse(p1) (+) p2, as g2o has it). The two agree
+  /// where x and y have the same information and no correlation.
+  bool information_at_second = false;
+};
+
+/// A line of a g2o file.
+struct G2oLine {
+  enum class Kind {
+    /// Comments, blank lines, unknown tags, laser scans: kept verbatim.
+    kText,
+    kVertex,
+    kEdge,
+    kFix,
+    /// This project's own lines, see ReadG2o.
+    kFeatureAttributes,
+    kConstraintAttributes,
+  };
+  Kind kind = Kind::kText;
+  /// As it was read, without the line feed.
+  std::string text;
+  /// Feature or constraint that it belongs to; kNoId for text and FIX.
+  std::int64_t id = kNoId;
+};
+
+/// What a g2o file held besides the graph, kept so that it can be written back
+/// byte for byte.
 struct G2oFile {
-  /// Comments and lines with tags that no plug-in knows, verbatim.
-  std::vector<std::string> unknown_lines;
-  /// For each of them the feature whose vertex came last before it, kNoId at
-  /// the top: a laser scan belongs to the vertex above it.
-  std::vector<FeatureId> unknown_line_positions;
+  G2oOptions options;
+  /// Every line, in order.
+  std::vector<G2oLine> lines;
+  bool ends_with_line_feed = true;
   /// How often each unknown tag occurred.
   std::map<std::string, int> unknown_tags;
-  /// Id in the file of each feature, by feature id.
+  /// How many laser scans there were; each belongs to the vertex above it.
+  int laser_scans = 0;
+  /// Id in the file of each feature, by feature id; kNoId where there is none.
   std::vector<std::int64_t> file_ids;
+
+  /// Hashes of what WriteG2o would have written at the time of reading (vertex
+  /// or edge, attributes), by feature id and by constraint id, to tell what
+  /// changed since, and which features had been fixed.
+  struct Fingerprint {
+    std::size_t element = 0;
+    std::size_t attributes = 0;
+  };
+  std::vector<Fingerprint> feature_fingerprints;
+  std::vector<Fingerprint> constraint_fingerprints;
+  std::vector<bool> was_fixed;
 };
 
 /// Reads g2o text into an empty graph: vertices and edges by the registry's
-/// tags, in any order, and FIX. Features and constraints are numbered in the
-/// order of the file.
+/// tags (those of other formats included: TORO's VERTEX2 and EDGE2, lines by
+/// their normals), in any order, FIX, and ROBOTLASER1, which is kept with the
+/// vertex above it. Features and constraints are numbered in the order of the
+/// file.
 ///
 /// Lines of this project's own carry what g2o has no place for, so that writing
 /// what was written and read gives the same bytes; g2o passes over them:
@@ -45,15 +89,20 @@ struct G2oFile {
 /// An edge to a vertex with an unknown tag, and own lines of unknown vertices
 /// and edges, are kept verbatim like the unknown ones. Throws Error with
 /// `name`:line for dangling or duplicate ids, wrong counts, numbers that do not
-/// parse or are not finite, features that do not fit, and information that is
-/// not positive semidefinite; the graph is empty then.
+/// parse or are not finite, features that do not fit, information that is not
+/// positive semidefinite, and a laser scan without a vertex above it; the graph
+/// is empty then.
 G2oFile ReadG2o(std::istream& input, const std::string& name,
-                const Registry& registry, Graph* graph);
+                const Registry& registry, Graph* graph,
+                const G2oOptions& options = {});
 
-/// Writes a graph as g2o text; `file` (may be null) gives ids and unknown lines
-/// back. Features that are not of the file get ids past all that it uses.
-/// Numbers are written so that reading gives the same doubles; information
-/// matrices by their upper triangle.
+/// Writes a graph as g2o text. With the `file` that it was read from, every
+/// line of it comes back as it was, byte for byte, but for the elements that
+/// have changed (same place, same tag), those that are gone (left out), and new
+/// ones (at the end; ids past all that the file uses). Without (null), features
+/// and then constraints in the order of ids. Numbers are written so that
+/// reading gives the same doubles; information matrices by their upper
+/// triangle.
 void WriteG2o(const Graph& graph, const G2oFile* file, std::ostream& output);
 
 }  // namespace plumbline

@@ -99,17 +99,72 @@ const T& Add(ByName<T>* types, T type, const std::string& kind) {
 
 }  // namespace
 
+namespace {
+
+// All tags of a feature type or relation.
+template <typename T>
+std::vector<std::string> TagsOf(const T& type) {
+  std::vector<std::string> tags = {type.g2o_tag};
+  for (const auto& format : type.other_g2o_formats) tags.push_back(format.tag);
+  return tags;
+}
+
+template <typename T>
+bool HasTag(const T& type, const std::string& tag) {
+  return type.g2o_tag == tag ||
+         std::any_of(type.other_g2o_formats.begin(),
+                     type.other_g2o_formats.end(),
+                     [&tag](const auto& format) { return format.tag == tag; });
+}
+
+// True for an order of 0 to size - 1, or none.
+bool IsOrderOf(std::vector<int> places, std::size_t size) {
+  if (places.empty()) return true;
+  std::sort(places.begin(), places.end());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (places[i] != static_cast<int>(i)) return false;
+  }
+  return places.size() == size;
+}
+
+// True for every entry of an upper triangle once, or none.
+bool IsTriangle(std::vector<std::pair<int, int>> entries, int size) {
+  if (entries.empty()) return true;
+  std::sort(entries.begin(), entries.end());
+  std::size_t i = 0;
+  for (int row = 0; row < size; ++row) {
+    for (int column = row; column < size; ++column, ++i) {
+      if (i >= entries.size() || entries[i] != std::make_pair(row, column)) {
+        return false;
+      }
+    }
+  }
+  return i == entries.size();
+}
+
+}  // namespace
+
 Registry& Registry::Global() {
   static Registry registry;
   return registry;
 }
 
+void Registry::CheckTags(std::vector<std::string> tags) const {
+  for (const std::string& tag : tags) {
+    CheckWord(tag, "g2o tag");
+    Check(FindFeatureByTag(tag) == nullptr && FindRelationByTag(tag) == nullptr,
+          "g2o tag '" + tag + "' is registered already",
+          "a tag that is not taken");
+  }
+  std::sort(tags.begin(), tags.end());
+  const auto twice = std::adjacent_find(tags.begin(), tags.end());
+  Check(twice == tags.end(),
+        "g2o tag '" + (twice == tags.end() ? "" : *twice) + "' is given twice",
+        "each format with a tag of its own");
+}
+
 const FeatureType& Registry::Register(FeatureType type) {
-  CheckWord(type.g2o_tag, "g2o tag");
-  Check(FindFeatureByTag(type.g2o_tag) == nullptr &&
-            FindRelationByTag(type.g2o_tag) == nullptr,
-        "g2o tag '" + type.g2o_tag + "' is registered already",
-        "a tag that is not taken");
+  CheckTags(TagsOf(type));
   Check(type.size >= 1 && type.size <= kMaxFeatureSize,
         "feature type '" + type.name + "' has " + std::to_string(type.size) +
             " parameters",
@@ -122,11 +177,7 @@ const FeatureType& Registry::Register(FeatureType type) {
 }
 
 const RelationType& Registry::Register(RelationType type) {
-  CheckWord(type.g2o_tag, "g2o tag");
-  Check(FindFeatureByTag(type.g2o_tag) == nullptr &&
-            FindRelationByTag(type.g2o_tag) == nullptr,
-        "g2o tag '" + type.g2o_tag + "' is registered already",
-        "a tag that is not taken");
+  CheckTags(TagsOf(type));
   Check(type.residual_size >= 1,
         "relation '" + type.name + "' has " +
             std::to_string(type.residual_size) + " rows",
@@ -136,6 +187,14 @@ const RelationType& Registry::Register(RelationType type) {
                          [](const auto& names) { return names.empty(); }),
         "relation '" + type.name + "' does not say what it relates",
         "the names of the feature types that fit, for each feature");
+  for (const G2oEdgeFormat& format : type.other_g2o_formats) {
+    Check(IsOrderOf(format.feature_places, type.feature_types.size()) &&
+              IsOrderOf(format.row_places,
+                        static_cast<std::size_t>(type.residual_size)) &&
+              IsTriangle(format.information_order, type.residual_size),
+          "the order of fields of g2o tag '" + format.tag + "' does not fit",
+          "every feature, row and entry of the upper triangle once");
+  }
   Check(type.make_cost != nullptr,
         "relation '" + type.name + "' makes no cost function", "make_cost");
   return Add(&relations_, std::move(type), "relation");
@@ -181,14 +240,14 @@ const DetectorType& Registry::GetDetector(const std::string& name) const {
 
 const FeatureType* Registry::FindFeatureByTag(const std::string& tag) const {
   for (const auto& entry : features_) {
-    if (entry.second->g2o_tag == tag) return entry.second.get();
+    if (HasTag(*entry.second, tag)) return entry.second.get();
   }
   return nullptr;
 }
 
 const RelationType* Registry::FindRelationByTag(const std::string& tag) const {
   for (const auto& entry : relations_) {
-    if (entry.second->g2o_tag == tag) return entry.second.get();
+    if (HasTag(*entry.second, tag)) return entry.second.get();
   }
   return nullptr;
 }

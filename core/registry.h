@@ -12,6 +12,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -22,6 +23,43 @@ class StructureDetector;  // core/detector.h
 /// are refused by the detector's factory with an Error.
 using DetectorParameters = std::map<std::string, double>;
 
+/// Another way to write a feature in g2o text, for files that use it.
+struct G2oVertexFormat {
+  std::string tag;
+  /// Names of numbers that follow the parameters; kept as they are.
+  std::vector<std::string> extra_fields;
+  /// They are ids of vertices, -1 for none.
+  bool extra_fields_are_ids = false;
+  /// Turns the numbers of the file into parameters, and back, in place; null
+  /// when they are the same.
+  std::function<void(double* numbers)> read;
+  std::function<void(double* parameters)> write;
+  /// Called when all vertices are there, with the features that the ids among
+  /// the extra fields name (null where there is none); may set attributes
+  /// (extent). Null when the fields say nothing.
+  std::function<void(const std::vector<const Feature*>& named,
+                     Feature* feature)>
+      read_extra;
+};
+
+/// Another way to write a relation in g2o text, for files that use it.
+struct G2oEdgeFormat {
+  std::string tag;
+  /// For each feature its place among the ids of the line; empty: in order.
+  std::vector<int> feature_places;
+  /// For each row its place among the values of the line, and in the
+  /// information matrix; empty: in order.
+  std::vector<int> row_places;
+  /// Rows and columns (places in the line's order of values, row <= column) of
+  /// the entries of the information, as they follow each other; empty: the
+  /// upper triangle by rows.
+  std::vector<std::pair<int, int>> information_order;
+  /// Turns the values of the file (already in the order of rows) into the
+  /// expected value, and back, in place; null when they are the same.
+  std::function<void(double* values)> read;
+  std::function<void(double* expected)> write;
+};
+
 /// A kind of node.
 struct FeatureType {
   /// Name in files and flags: "segment".
@@ -30,6 +68,7 @@ struct FeatureType {
   int size = 0;
   /// Tag of the vertex in g2o text; a tag of our own starts with PLUMBLINE_.
   std::string g2o_tag;
+  std::vector<G2oVertexFormat> other_g2o_formats;
   /// Names of the parameters with units, in order: {"x m", "y m", "theta rad"}.
   std::vector<std::string> parameter_names;
   std::string description;
@@ -56,12 +95,24 @@ struct RelationArguments {
   std::vector<const Feature*> features;
 };
 
+/// What a relation's expected value says about its second feature, seen from
+/// the first, a pose: enough for a start of the whole graph
+/// (core/initial_guess.h).
+enum class Sighting {
+  kNone,
+  /// Position and heading: x, y, theta.
+  kPose,
+  /// Position: x, y.
+  kPosition,
+};
+
 /// A kind of edge.
 struct RelationType {
   /// Name in files and flags: "segment_orientation".
   std::string name;
   /// Tag of the edge in g2o text.
   std::string g2o_tag;
+  std::vector<G2oEdgeFormat> other_g2o_formats;
   /// For each feature in order the names of the types that fit there.
   std::vector<std::vector<std::string>> feature_types;
   /// Rows of the residual; also the size of `expected`.
@@ -71,6 +122,13 @@ struct RelationType {
   /// Makes the cost function; throws Error when the arguments do not fit.
   std::function<std::unique_ptr<ceres::CostFunction>(const RelationArguments&)>
       make_cost;
+  Sighting sighting = Sighting::kNone;
+  /// For a relation of two features whose expected value tells all of the
+  /// second, given the first: sets the second's parameters so that the residual
+  /// is zero. Null when there is no such.
+  std::function<void(const Eigen::VectorXd& expected, const Feature& first,
+                     Feature* second)>
+      place_second;
 };
 
 /// A weighting of structure constraints, by the name used in --delta_mode.
@@ -128,7 +186,7 @@ class Registry {
   const RelationType& GetRelation(const std::string& name) const;
   const LossType& GetLoss(const std::string& name) const;
   const DetectorType& GetDetector(const std::string& name) const;
-  /// By g2o tag; null when there is none.
+  /// By g2o tag, that of another format included; null when there is none.
   const FeatureType* FindFeatureByTag(const std::string& tag) const;
   const RelationType* FindRelationByTag(const std::string& tag) const;
 
@@ -139,6 +197,9 @@ class Registry {
   std::vector<const DetectorType*> detectors() const;
 
  private:
+  /// Throws Error when one of them is no word, or is taken.
+  void CheckTags(std::vector<std::string> tags) const;
+
   std::map<std::string, std::unique_ptr<FeatureType>> features_;
   std::map<std::string, std::unique_ptr<RelationType>> relations_;
   std::map<std::string, std::unique_ptr<LossType>> losses_;

@@ -102,6 +102,27 @@ TEST(RegistryTest, RefusesIncompleteTypes) {
   RelationType unrelated = Link();
   unrelated.feature_types[1].clear();
   EXPECT_THROW(registry.Register(unrelated), Error);
+  // Tags of other formats, and orders that leave something out.
+  registry.Register(Dot());
+  RelationType alias = Link();
+  alias.name = "alias";
+  alias.g2o_tag = "EDGE_ALIAS";
+  alias.other_g2o_formats.resize(1);
+  alias.other_g2o_formats[0].tag = "VERTEX_DOT";
+  EXPECT_THROW(registry.Register(alias), Error);
+  alias.other_g2o_formats[0].tag = "EDGE_ALIAS";
+  EXPECT_THROW(registry.Register(alias), Error);
+  alias.other_g2o_formats[0].tag = "EDGE_OTHER";
+  alias.other_g2o_formats[0].feature_places = {1, 1};
+  EXPECT_THROW(registry.Register(alias), Error);
+  alias.other_g2o_formats[0].feature_places = {1, 0};
+  alias.other_g2o_formats[0].row_places = {1};
+  EXPECT_THROW(registry.Register(alias), Error);
+  alias.other_g2o_formats[0].row_places = {};
+  alias.other_g2o_formats[0].information_order = {{0, 1}};
+  EXPECT_THROW(registry.Register(alias), Error);
+  alias.other_g2o_formats[0].information_order = {};
+  EXPECT_NO_THROW(registry.Register(alias));
   LossType loss;
   loss.name = "nothing";
   EXPECT_THROW(registry.Register(loss), Error);
@@ -131,9 +152,9 @@ TEST(RegistryTest, EverythingComesInTheOrderOfNames) {
   for (const FeatureType* type : registry.features()) {
     names.push_back(type->name);
   }
-  EXPECT_THAT(names,
-              ::testing::ElementsAre("circle", "line", "orientation", "point",
-                                     "pose", "rectangle", "segment"));
+  EXPECT_THAT(names, ::testing::ElementsAre("circle", "end_points", "line",
+                                            "orientation", "point", "pose",
+                                            "rectangle", "segment"));
 }
 
 TEST(RegistryTest, GlobalIsOneInstance) {
@@ -187,9 +208,11 @@ class BuiltinsTest : public ::testing::Test {
 
 TEST_F(BuiltinsTest, RegisteringTwiceDoesNothing) {
   const FeatureType* point = registry_.FindFeature("point");
+  const std::size_t relations = registry_.relations().size();
   RegisterBuiltinRelations(&registry_);
   EXPECT_EQ(registry_.FindFeature("point"), point);
-  EXPECT_EQ(registry_.relations().size(), 15u);
+  EXPECT_GT(relations, 0u);
+  EXPECT_EQ(registry_.relations().size(), relations);
   EXPECT_EQ(registry_.losses().size(), 7u);
 }
 
@@ -202,6 +225,14 @@ TEST_F(BuiltinsTest, TagsOfG2o) {
             registry_.FindRelation("pose_pose"));
   EXPECT_EQ(registry_.FindRelationByTag("PLUMBLINE_SEGMENT_ORIENTATION"),
             registry_.FindRelation("segment_orientation"));
+  // Those of other formats.
+  EXPECT_EQ(registry_.FindFeatureByTag("VERTEX2"),
+            registry_.FindFeature("pose"));
+  EXPECT_EQ(registry_.FindFeatureByTag("VERTEX_LINE2D"),
+            registry_.FindFeature("line"));
+  EXPECT_EQ(registry_.FindRelationByTag("EDGE2"),
+            registry_.FindRelation("pose_pose"));
+  EXPECT_EQ(registry_.FindRelationByTag("EDGE3"), nullptr);
 }
 
 TEST_F(BuiltinsTest, RelationsNameKnownFeatureTypes) {
@@ -218,17 +249,58 @@ TEST_F(BuiltinsTest, RelationsNameKnownFeatureTypes) {
 
 TEST_F(BuiltinsTest, EveryCombinationOfTypesMakesACost) {
   for (const RelationType* relation : registry_.relations()) {
-    ASSERT_EQ(relation->feature_types.size(), 2u);
-    for (const std::string& first : relation->feature_types[0]) {
-      for (const std::string& second : relation->feature_types[1]) {
-        SCOPED_TRACE(relation->name + " " + first + " " + second);
-        const Eigen::VectorXd residual = Residual(
-            relation->name, Eigen::VectorXd::Zero(relation->residual_size),
-            {Make(first, {0.1, 0.2, 0.3}), Make(second, {1.0, 2.0, 3.0})});
-        EXPECT_TRUE(residual.allFinite());
+    // All choices of types, one after the other like the digits of a number.
+    const auto& types = relation->feature_types;
+    std::vector<std::size_t> choice(types.size(), 0);
+    bool is_done = false;
+    while (!is_done) {
+      std::string trace = relation->name;
+      std::vector<Feature> features;
+      for (std::size_t i = 0; i < types.size(); ++i) {
+        const std::string& name = types[i][choice[i]];
+        trace += " " + name;
+        const double shift = static_cast<double>(i);
+        features.push_back(
+            Make(name, {0.1 + shift, 0.2 + shift, 0.3, 1.0, 2.0}));
+      }
+      SCOPED_TRACE(trace);
+      const Eigen::VectorXd residual =
+          Residual(relation->name,
+                   Eigen::VectorXd::Zero(relation->residual_size), features);
+      EXPECT_TRUE(residual.allFinite());
+      is_done = true;
+      for (std::size_t i = 0; i < choice.size() && is_done; ++i) {
+        is_done = ++choice[i] == types[i].size();
+        if (is_done) choice[i] = 0;
       }
     }
   }
+}
+
+// Where the relation says that the second feature is, its residual is zero.
+TEST_F(BuiltinsTest, PlacesOfTheSecondFeature) {
+  const std::map<std::string, std::vector<double>> expected = {
+      {"pose_pose", {2.0, -1.0, 0.5}},
+      {"pose_point", {2.0, -1.0}},
+      {"pose_line", {1.5, -2.0}},
+      {"pose_end_points", {2.0, -1.0, 3.0, 4.0}}};
+  std::size_t found = 0;
+  for (const RelationType* relation : registry_.relations()) {
+    if (relation->place_second == nullptr) {
+      EXPECT_EQ(relation->sighting, Sighting::kNone) << relation->name;
+      continue;
+    }
+    SCOPED_TRACE(relation->name);
+    ASSERT_EQ(expected.count(relation->name), 1u);
+    ++found;
+    const Eigen::VectorXd value = Numbers(expected.at(relation->name));
+    const Feature first = Make("pose", {3.0, 4.0, 2.5});
+    Feature second = Make(relation->feature_types[1][0], {});
+    second.anchor = {10.0, -20.0};
+    relation->place_second(value, first, &second);
+    EXPECT_LT(Residual(relation->name, value, {first, second}).norm(), 1e-12);
+  }
+  EXPECT_EQ(found, expected.size());
 }
 
 TEST_F(BuiltinsTest, ValuesByHand) {

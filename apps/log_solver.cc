@@ -1,7 +1,9 @@
 #include <plumbline/apps/log_solver.h>
 #include <plumbline/detectors/default_hierarchy.h>
 
+#include <algorithm>
 #include <chrono>
+#include <string>
 #include <utility>
 
 namespace plumbline {
@@ -13,16 +15,27 @@ double Now() {
       .count();
 }
 
+std::string HierarchyOf(const LogSolverOptions& options) {
+  return options.hierarchy.empty() ? DefaultHierarchy({"segment"})
+                                   : options.hierarchy;
+}
+
+// With same_wall as the last detector of level 0, unless it is there.
+std::string WithSameWall(std::string hierarchy) {
+  if (hierarchy.find("same_wall") != std::string::npos) return hierarchy;
+  const std::size_t end = std::min(hierarchy.find('/'), hierarchy.size());
+  hierarchy.insert(end, end > 0 ? ",same_wall" : "same_wall");
+  return hierarchy;
+}
+
 }  // namespace
 
 LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
     : registry_(registry), options_(options) {
   Hierarchy hierarchy;
   if (options_.structure) {
-    hierarchy =
-        MakeHierarchy(options_.hierarchy.empty() ? DefaultHierarchy({"segment"})
-                                                 : options_.hierarchy,
-                      registry_, {"segment"}, options_.detector_parameters);
+    hierarchy = MakeHierarchy(HierarchyOf(options_), registry_, {"segment"},
+                              options_.detector_parameters);
   }
   session_ =
       std::make_unique<SolverSession>(&graph_, registry_, options_.session);
@@ -31,6 +44,37 @@ LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
 }
 
 LogSolver::~LogSolver() = default;
+
+void LogSolver::BeginClosing() {
+  const Eigen::Vector3d scale(1.0 / options_.closing_position_scale,
+                              1.0 / options_.closing_position_scale, 1.0);
+  for (const Constraint* constraint : std::as_const(graph_).Constraints()) {
+    if (constraint->kind != ConstraintClass::kMeasurement ||
+        constraint->state != ConstraintState::kLive ||
+        constraint->type->name != "pose_pose") {
+      continue;
+    }
+    graph_.UpdateConstraint(
+        constraint->id, constraint->expected,
+        scale.asDiagonal() * constraint->information * scale.asDiagonal());
+  }
+  EmOptions options = options_.em;
+  options.break_share = options_.closing_break_share;
+  before_closing_ = em_->totals();
+  em_ = std::make_unique<EmOrchestrator>(
+      &graph_, session_.get(), registry_,
+      MakeHierarchy(WithSameWall(HierarchyOf(options_)), registry_, {"segment"},
+                    options_.detector_parameters),
+      options);
+  TraceEm();
+}
+
+void LogSolver::TraceEm() {
+  em_->SetTrace([this](EmPhase phase) {
+    phase.iteration += before_closing_.iterations;
+    trace_.push_back(std::move(phase));
+  });
+}
 
 LogSolverResult LogSolver::Run(
     const Log& log,
@@ -87,8 +131,15 @@ LogSolverResult LogSolver::Run(
 
   builder.WriteRobot();
   result.initial_cost = session_->Cost();
-  em_->SetTrace([this](const EmPhase& phase) { trace_.push_back(phase); });
+  TraceEm();
   result.em = em_->Run(stop);
+  if (options_.structure && options_.global_association &&
+      !result.interrupted && !(stop && stop())) {
+    BeginClosing();
+    const EmReport closing = em_->Run(stop);
+    result.em.iterations += closing.iterations;
+    result.em.converged = closing.converged;
+  }
   builder.ReadRobot();
   result.final_cost = session_->Cost();
 
@@ -146,8 +197,10 @@ LogSolverResult LogSolver::Run(
     result.wall_votes = adjustment.num_votes();
     result.adjustment_seconds = Now() - adjustment_begin;
   }
-  result.detect_seconds = em_->totals().detect_seconds;
-  result.solve_seconds = em_->totals().solve_seconds;
+  result.detect_seconds =
+      before_closing_.detect_seconds + em_->totals().detect_seconds;
+  result.solve_seconds =
+      before_closing_.solve_seconds + em_->totals().solve_seconds;
 
   result.key_scans = static_cast<std::int64_t>(builder.records().size());
   result.wide_searches = refiner.wide_searches();

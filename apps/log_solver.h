@@ -43,6 +43,19 @@ struct LogSolverOptions {
   SessionOptions session;
   EmOptions em;
   RelocalizationOptions relocalization;
+  /// Close loops once the whole log is in and its structure is found: the EM
+  /// loop runs again with same_wall among the detectors of level 0. Needs
+  /// structure.
+  bool global_association = true;
+  /// Standard deviations of positions in the relations between features are
+  /// taken this many times larger from then on. Only the last robot pose was
+  /// kept, so the relations neglect what their errors have in common, and the
+  /// way round a loop would be stiffer than it is: on the public logs walls
+  /// seen again lie 3 to 5 of their standard deviations off.
+  double closing_position_scale = 3.0;
+  /// EmOptions::break_share while closing: a wrong closure bends the map and
+  /// must not take right ones with it.
+  double closing_break_share = 0.25;
   /// Add walls that no single scan saw well, in the end.
   bool complete_walls = true;
   WallCompletionOptions completion;
@@ -111,11 +124,18 @@ class LogSolver {
   const std::vector<EmPhase>& trace() const { return trace_; }
 
  private:
+  // Loosens the relations between features and lets closures be proposed.
+  void BeginClosing();
+  // Rows of the trace, counted on over both orchestrators.
+  void TraceEm();
+
   const Registry& registry_;
   LogSolverOptions options_;
   Graph graph_;
   std::unique_ptr<SolverSession> session_;
   std::unique_ptr<EmOrchestrator> em_;
+  // Of the orchestrator that was there before closing began.
+  EmReport before_closing_;
   std::vector<EmPhase> trace_;
 };
 

@@ -50,6 +50,14 @@ DEFINE_double(structure_sigma_point_point_coincidence, 0.05,
               "Tolerance of the centre of a circle against a common centre, m");
 PLUMBLINE_FLAG_RANGE(structure_sigma_point_point_coincidence, 1e-5, 10.0);
 
+DEFINE_double(structure_sigma_same_wall, 0.02,
+              "Tolerance of a wall seen on two visits against itself, across, "
+              "m");
+PLUMBLINE_FLAG_RANGE(structure_sigma_same_wall, 1e-4, 1.0);
+DEFINE_double(structure_sigma_same_wall_angle, 0.3,
+              "The same in direction, degrees");
+PLUMBLINE_FLAG_RANGE(structure_sigma_same_wall_angle, 1e-3, 45.0);
+
 DEFINE_double(delta_threshold, 0.3,
               "Break structure whose delta (p-value) is below it");
 PLUMBLINE_FLAG_RANGE(delta_threshold, 0.0, 1.0);
@@ -72,6 +80,9 @@ PLUMBLINE_FLAG_RANGE(link_radius, 0.5, 1000.0);
 DEFINE_int32(association_depth, 3,
              "Links from the robot searched for association");
 PLUMBLINE_FLAG_RANGE(association_depth, 1, 100);
+DEFINE_bool(global_association, true,
+            "Close loops: walls seen on different visits are proposed to be "
+            "one, as structure that is weighed and broken like any other");
 DEFINE_string(refine, "full",
               "What the final trajectory and map are adjusted with: none, map "
               "(every scan found again on the final map), or full (poses, "
@@ -138,15 +149,16 @@ std::vector<FlagGroup> SolveFlagGroups() {
       {"Structure",
        {"structure", "hierarchy", "allowed_angles", "angle_resolution",
         "structure_sigma_segment_orientation",
-        "structure_sigma_orientation_orientation",
+        "structure_sigma_orientation_orientation", "structure_sigma_same_wall",
+        "structure_sigma_same_wall_angle",
         "structure_sigma_point_line_distance",
         "structure_sigma_point_circle_distance",
         "structure_sigma_point_point_coincidence"}},
       {"Expectation maximization",
        {"delta_threshold", "delta_mode", "em_every", "em_max_iterations"}},
       {"Front-end",
-       {"odometry_refinement", "link_radius", "association_depth", "refine",
-        "usable_range"}},
+       {"odometry_refinement", "link_radius", "association_depth",
+        "global_association", "refine", "usable_range"}},
       {"Laser", {"laser_start_angle", "laser_step", "laser_max_range"}},
       {"Running", {"seed", "num_threads", "plugins", "list_plugins"}},
   };
@@ -189,6 +201,9 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.em.max_iterations = FLAGS_em_max_iterations;
   options.em.seed = FLAGS_seed;
   options.em_every = FLAGS_em_every;
+  options.global_association = FLAGS_global_association;
+  set("same_wall", "sigma_offset", FLAGS_structure_sigma_same_wall);
+  set("same_wall", "sigma_angle_deg", FLAGS_structure_sigma_same_wall_angle);
   options.refine = FLAGS_refine == "none"  ? Refinement::kNone
                    : FLAGS_refine == "map" ? Refinement::kMap
                                            : Refinement::kFull;

@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
 #include <plumbline/apps/log_solver.h>
+#include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/detectors/builtins.h>
+#include <plumbline/detectors/same_wall.h>
 #include <plumbline/frontend/carmen_reader.h>
 
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <set>
 #include <sstream>
 #include <string>
@@ -131,6 +134,50 @@ TEST_F(LogSolverTest, SameBytesEveryTime) {
   const LogSolverResult b = second.Run(log);
   EXPECT_EQ(a.trajectory, b.trajectory);
   EXPECT_EQ(Json(first.graph()), Json(second.graph()));
+}
+
+// Closures of a graph by their state.
+std::map<ConstraintState, int> Closures(const Graph& graph) {
+  std::map<ConstraintState, int> count;
+  for (const Constraint* constraint : graph.Constraints()) {
+    if (constraint->type->name == kSameWallRelation) ++count[constraint->state];
+  }
+  return count;
+}
+
+TEST_F(LogSolverTest, WithoutGlobalAssociationTheDetectorChangesNothing) {
+  // A registry that has never heard of the detector gives the same bytes.
+  Registry without;
+  RegisterBuiltinRelations(&without);
+  for (const DetectorType* type : registry_.detectors()) {
+    if (type->name != "same_wall") without.Register(DetectorType(*type));
+  }
+  LogSolverOptions options;
+  options.global_association = false;
+  const Log log = Office(400);
+  LogSolver first(registry_, options);
+  const LogSolverResult a = first.Run(log);
+  LogSolver second(without, options);
+  const LogSolverResult b = second.Run(log);
+  EXPECT_EQ(Json(first.graph()), Json(second.graph()));
+  EXPECT_EQ(a.trajectory, b.trajectory);
+  EXPECT_TRUE(Closures(first.graph()).empty());
+}
+
+TEST_F(LogSolverTest, LoopsAreClosed) {
+  const Log log = Office(100000);
+  LogSolverOptions options;
+  options.refine = Refinement::kMap;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(log);
+  EXPECT_TRUE(result.em.converged);
+  EXPECT_GT(Closures(solver.graph())[ConstraintState::kLive], 5);
+  // The iterations of the trace go on over the start of closing.
+  int last = 0;
+  for (const EmPhase& phase : solver.trace()) {
+    EXPECT_GE(phase.iteration, last);
+    last = phase.iteration;
+  }
 }
 
 TEST_F(LogSolverTest, StoppedOnTheWay) {

@@ -755,7 +755,7 @@ void RunLog(const std::string& log_file, const std::string& relations_file,
     result->skipped = log_path + " is not there";
     return;
   }
-  Log log = ReadCarmenLog(log_path, CarmenOptions());
+  Log log = ReadCarmenLog(log_path, LaserOptions());
   if (max_scans > 0 && log.scans.size() > max_scans) {
     log.scans.resize(max_scans);
   }

@@ -12,8 +12,10 @@
 #include <plumbline/core/plugin.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/default_hierarchy.h>
+#include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/log_reader.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -45,24 +47,12 @@ void LoadPlugins(Registry* registry) {
 }
 
 void ListPlugins(const Registry& registry) {
-  auto line = [](const std::string& name, const std::string& description) {
-    std::printf("  %-34s %s\n", name.c_str(), description.c_str());
-  };
-  std::printf("Feature types\n");
-  for (const FeatureType* type : registry.features()) {
-    line(type->name, type->description);
-  }
-  std::printf("Relations\n");
-  for (const RelationType* type : registry.relations()) {
-    line(type->name, type->description);
-  }
-  std::printf("Losses (--delta_mode)\n");
-  for (const LossType* type : registry.losses()) {
-    line(type->name, type->description);
-  }
-  std::printf("Detectors (--hierarchy)\n");
-  for (const DetectorType* type : registry.detectors()) {
-    line(type->name, type->description);
+  for (const PluginList* list : registry.lists()) {
+    std::printf("%s\n", list->title().c_str());
+    for (const PluginList::Entry& entry : list->entries()) {
+      std::printf("  %-34s %s\n", entry.name.c_str(),
+                  entry.description.c_str());
+    }
   }
 }
 
@@ -76,9 +66,9 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin) {
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   outcome->flags = OwnFlags();
   outcome->delta_threshold = FLAGS_delta_threshold;
-  for (const std::string& line :
-       WriteSolveOutputs(*outcome, SelectOutputs(FLAGS_outputs), folder,
-                         NumThreadsFromFlags())) {
+  for (const std::string& line : WriteSolveOutputs(
+           *outcome, SelectOutputs(FLAGS_outputs, *outcome->registry), folder,
+           NumThreadsFromFlags())) {
     std::fprintf(stderr, "%s\n", line.c_str());
   }
   outcome->summary.write_seconds = Now() - begin;
@@ -99,7 +89,8 @@ void Summarize(const CostReport& initial, const CostReport& last,
   summary->solve_seconds = em.solve_seconds;
 }
 
-int SolveLog(InputStream* input, const Registry& registry, double begin) {
+int SolveLog(InputStream* input, const LogReaderType& reader,
+             const Registry& registry, double begin) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
   summary.input = FLAGS_input;
@@ -108,7 +99,7 @@ int SolveLog(InputStream* input, const Registry& registry, double begin) {
   const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
 
   const double parse_begin = Now();
-  const Log log = ReadCarmenLog(input, CarmenOptionsFromFlags());
+  const Log log = reader.read(input, LaserOptionsFromFlags());
   summary.parse_seconds = Now() - parse_begin;
   for (const SkipReport& skip : log.skipped) {
     std::string lines;
@@ -219,6 +210,8 @@ int Run() {
   const double begin = Now();
   Registry& registry = Registry::Global();
   RegisterBuiltins(&registry);
+  RegisterBuiltinLogReaders(&registry);
+  RegisterBuiltinOutputWriters(&registry);
   LoadPlugins(&registry);
   if (FLAGS_list_plugins) {
     ListPlugins(registry);
@@ -231,10 +224,16 @@ int Run() {
     return kExitUsage;
   }
   // Wrong lists are refused before the work.
-  SelectOutputs(FLAGS_outputs);
+  SelectOutputs(FLAGS_outputs, registry);
   InputStream input(FLAGS_input);
   const std::string_view prefix = input.Peek(1 << 16);
-  const bool is_graph = LooksLikeG2o(prefix) && !LooksLikeCarmenLog(prefix);
+  const LogReaderType* reader =
+      FLAGS_log_reader.empty() ? RecognizeLog(registry, prefix)
+                               : &registry.Get<LogReaderType>(FLAGS_log_reader);
+  const bool is_graph = reader == nullptr && LooksLikeG2o(prefix);
+  // What nobody recognizes is for the reader of the commonest format to refuse:
+  // it says what it found.
+  if (reader == nullptr) reader = &registry.Get<LogReaderType>("carmen");
   std::error_code error;
   std::filesystem::create_directories(FLAGS_output_dir, error);
   if (error || !std::filesystem::is_directory(FLAGS_output_dir)) {
@@ -251,7 +250,7 @@ int Run() {
                 "a folder that can be written to");
   }
   return is_graph ? SolveGraph(&input, registry, begin)
-                  : SolveLog(&input, registry, begin);
+                  : SolveLog(&input, *reader, registry, begin);
 }
 
 }  // namespace

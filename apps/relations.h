@@ -3,6 +3,7 @@
 
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/timed_pose.h>
 
 #include <cstddef>
 #include <ostream>
@@ -10,16 +11,6 @@
 #include <vector>
 
 namespace plumbline {
-
-/// A pose of a trajectory.
-struct TimedPose {
-  /// s
-  double timestamp = 0.0;
-  /// The time stamp as the input wrote it; empty when there is no such text.
-  std::string timestamp_text;
-  /// Pose of the robot in the map frame, m and rad.
-  Pose2 pose = Pose2::Zero();
-};
 
 /// Writes a trajectory in the format of the TUM benchmark,
 /// `timestamp x y z qx qy qz qw`: a line a pose, single blanks, no comments, in

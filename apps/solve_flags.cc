@@ -13,6 +13,8 @@ DEFINE_string(
     "Robot log (CARMEN) or graph (g2o), plain, gzip or bzip2; - reads "
     "standard input");
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
+DEFINE_string(log_reader, "",
+              "Format of the log; empty: recognized by content");
 
 DEFINE_string(outputs, "default",
               "Files to write beside summary.json: all, default (all but "
@@ -104,7 +106,7 @@ DEFINE_int32(num_threads, 0,
 PLUMBLINE_FLAG_RANGE(num_threads, 0, 1024);
 DEFINE_string(plugins, "", "Shared objects to load, separated by commas");
 DEFINE_bool(list_plugins, false,
-            "Print feature types, relations, losses and detectors, and end");
+            "Print what is registered under which name, and end");
 
 namespace plumbline {
 namespace {
@@ -145,7 +147,7 @@ std::vector<double> ParseList(const std::string& flag,
 std::vector<FlagGroup> SolveFlagGroups() {
   return {
       {"Input and output",
-       {"input", "output_dir", "outputs", "grid_resolution"}},
+       {"input", "output_dir", "log_reader", "outputs", "grid_resolution"}},
       {"Structure",
        {"structure", "hierarchy", "allowed_angles", "angle_resolution",
         "structure_sigma_segment_orientation",
@@ -219,8 +221,8 @@ OccupancyOptions OccupancyOptionsFromFlags() {
   return options;
 }
 
-CarmenOptions CarmenOptionsFromFlags() {
-  CarmenOptions options;
+LaserOptions LaserOptionsFromFlags() {
+  LaserOptions options;
   options.laser_start_angle =
       ParseOptional("laser_start_angle", FLAGS_laser_start_angle);
   if (options.laser_start_angle) {

@@ -6,12 +6,13 @@
 #include <plumbline/apps/log_solver.h>
 #include <plumbline/apps/occupancy_grid.h>
 #include <plumbline/core/registry.h>
-#include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/log_reader.h>
 
 #include <vector>
 
 DECLARE_string(input);
 DECLARE_string(output_dir);
+DECLARE_string(log_reader);
 DECLARE_string(outputs);
 DECLARE_bool(structure);
 DECLARE_double(delta_threshold);
@@ -35,7 +36,7 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry);
 OccupancyOptions OccupancyOptionsFromFlags();
 
 /// Laser flags for the log reader.
-CarmenOptions CarmenOptionsFromFlags();
+LaserOptions LaserOptionsFromFlags();
 
 /// Threads to use: --num_threads, or all cores when it is 0.
 int NumThreadsFromFlags();

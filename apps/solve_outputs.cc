@@ -4,6 +4,7 @@
 #include <plumbline/apps/floor_plan_geojson.h>
 #include <plumbline/apps/floor_plan_svg.h>
 #include <plumbline/apps/map_drawing.h>
+#include <plumbline/apps/relations.h>
 #include <plumbline/apps/report.h>
 #include <plumbline/apps/solve_outputs.h>
 #include <plumbline/core/atomic_file.h>
@@ -11,6 +12,7 @@
 #include <plumbline/core/graph_json.h>
 
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <sstream>
@@ -107,11 +109,21 @@ void RunTasks(const std::vector<std::function<void()>>& tasks, int threads) {
   }
 }
 
-std::vector<SolveOutput> MakeSolveOutputs() {
-  std::vector<SolveOutput> outputs;
+}  // namespace
+
+void RegisterBuiltinOutputWriters(Registry* registry) {
   const auto add = [&](const char* name, const char* description,
                        bool by_default, bool of_scans, auto write) {
-    outputs.push_back({name, description, by_default, of_scans, write});
+    if (registry->Find<OutputWriterType>(name) != nullptr) return;
+    OutputWriterType type;
+    type.name = name;
+    type.description = description;
+    type.by_default = by_default;
+    type.of_scans = of_scans;
+    type.write = [write](const SolvedRun& run, const path& folder) {
+      return write(dynamic_cast<const SolveOutcome&>(run), folder);
+    };
+    registry->Register(std::move(type));
   };
   add("map.png", "the map as a picture", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {
@@ -164,22 +176,16 @@ std::vector<SolveOutput> MakeSolveOutputs() {
       }));
   add("occupancy.pgm", "a grid for ROS map_server and Nav2, and its .yaml",
       true, true, WriteOccupancy);
-  return outputs;
 }
 
-}  // namespace
-
-const std::vector<SolveOutput>& SolveOutputs() {
-  static const auto* outputs = new std::vector<SolveOutput>(MakeSolveOutputs());
-  return *outputs;
-}
-
-std::set<std::string> SelectOutputs(const std::string& list) {
+std::set<std::string> SelectOutputs(const std::string& list,
+                                    const Registry& registry) {
+  const auto outputs = registry.All<OutputWriterType>();
   std::set<std::string> all;
   std::set<std::string> by_default;
-  for (const SolveOutput& output : SolveOutputs()) {
-    all.insert(output.name);
-    if (output.by_default) by_default.insert(output.name);
+  for (const OutputWriterType* output : outputs) {
+    all.insert(output->name);
+    if (output->by_default) by_default.insert(output->name);
   }
   std::set<std::string> selected;
   if (!list.empty() && list[0] == '-') selected = by_default;
@@ -197,8 +203,8 @@ std::set<std::string> SelectOutputs(const std::string& list) {
       selected.erase(word.substr(1));
     } else {
       std::string names = "all, default, none";
-      for (const SolveOutput& output : SolveOutputs()) {
-        names += ", " + output.name;
+      for (const OutputWriterType* output : outputs) {
+        names += ", " + output->name;
       }
       throw Error("--outputs", 0, "unknown file '" + word + "'",
                   "names separated by commas, a minus in front of those to "
@@ -212,11 +218,12 @@ std::set<std::string> SelectOutputs(const std::string& list) {
 std::vector<std::string> WriteSolveOutputs(const SolveOutcome& outcome,
                                            const std::set<std::string>& names,
                                            const path& folder, int threads) {
-  std::vector<const SolveOutput*> selected;
-  for (const SolveOutput& output : SolveOutputs()) {
-    if (names.count(output.name) == 0) continue;
-    if (output.of_scans && outcome.trajectory.empty()) continue;
-    selected.push_back(&output);
+  std::vector<const OutputWriterType*> selected;
+  for (const OutputWriterType* output :
+       outcome.registry->All<OutputWriterType>()) {
+    if (names.count(output->name) == 0) continue;
+    if (output->of_scans && outcome.trajectory.empty()) continue;
+    selected.push_back(output);
   }
   std::vector<std::string> reasons(selected.size());
   std::vector<std::function<void()>> tasks;

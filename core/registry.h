@@ -6,6 +6,7 @@
 #include <ceres/manifold.h>
 #include <plumbline/core/constraint.h>
 #include <plumbline/core/feature.h>
+#include <plumbline/core/named_types.h>
 
 #include <Eigen/Core>
 #include <functional>
@@ -62,6 +63,9 @@ struct G2oEdgeFormat {
 
 /// A kind of node.
 struct FeatureType {
+  static constexpr char kKind[] = "feature type";
+  static constexpr char kTitle[] = "Feature types";
+
   /// Name in files and flags: "segment".
   std::string name;
   /// Number of parameters, 1 to kMaxFeatureSize.
@@ -108,6 +112,9 @@ enum class Sighting {
 
 /// A kind of edge.
 struct RelationType {
+  static constexpr char kKind[] = "relation";
+  static constexpr char kTitle[] = "Relations";
+
   /// Name in files and flags: "segment_orientation".
   std::string name;
   /// Tag of the edge in g2o text.
@@ -133,6 +140,9 @@ struct RelationType {
 
 /// A weighting of structure constraints, by the name used in --delta_mode.
 struct LossType {
+  static constexpr char kKind[] = "loss";
+  static constexpr char kTitle[] = "Losses (--delta_mode)";
+
   std::string name;
   std::string description;
   /// Makes the loss of one structure constraint. `delta` points at the
@@ -145,6 +155,9 @@ struct LossType {
 
 /// A kind of structure detector.
 struct DetectorType {
+  static constexpr char kKind[] = "detector";
+  static constexpr char kTitle[] = "Detectors (--hierarchy)";
+
   /// Name in --hierarchy: "orientation_mixture".
   std::string name;
   std::string description;
@@ -158,7 +171,9 @@ struct DetectorType {
       make;
 };
 
-/// The plug-ins by name. One instance per process is the usual thing (Global),
+/// The plug-ins by name: the kinds that core works with, and any other that a
+/// layer above brings (log readers, output writers), of which core knows only
+/// that they have names. One instance per process is the usual thing (Global),
 /// but a test or a program may have its own. Not thread safe while registering.
 class Registry {
  public:
@@ -175,6 +190,12 @@ class Registry {
   const RelationType& Register(RelationType type);
   const LossType& Register(LossType type);
   const DetectorType& Register(DetectorType type);
+  /// The same for a kind of which core knows nothing (see NamedTypes for what
+  /// `Type` has to have).
+  template <typename Type>
+  const Type& Register(Type type) {
+    return MutableList<Type>().Add(std::move(type));
+  }
 
   /// Look-ups. Find* return null when there is none; Get* throw an Error that
   /// lists the known names, nearest first.
@@ -186,6 +207,16 @@ class Registry {
   const RelationType& GetRelation(const std::string& name) const;
   const LossType& GetLoss(const std::string& name) const;
   const DetectorType& GetDetector(const std::string& name) const;
+  /// The same for a kind of which core knows nothing.
+  template <typename Type>
+  const Type* Find(const std::string& name) const {
+    return List<Type>().Find(name);
+  }
+  /// The same for a kind of which core knows nothing.
+  template <typename Type>
+  const Type& Get(const std::string& name) const {
+    return List<Type>().Get(name);
+  }
   /// By g2o tag, that of another format included; null when there is none.
   const FeatureType* FindFeatureByTag(const std::string& tag) const;
   const RelationType* FindRelationByTag(const std::string& tag) const;
@@ -196,14 +227,42 @@ class Registry {
   std::vector<const LossType*> losses() const;
   std::vector<const DetectorType*> detectors() const;
 
+  /// The same for a kind of which core knows nothing.
+  template <typename Type>
+  std::vector<const Type*> All() const {
+    return List<Type>().All();
+  }
+
+  /// Every kind for lists: core's own, then the others in the order of their
+  /// titles.
+  std::vector<const PluginList*> lists() const;
+
  private:
   /// Throws Error when one of them is no word, or is taken.
   void CheckTags(std::vector<std::string> tags) const;
 
-  std::map<std::string, std::unique_ptr<FeatureType>> features_;
-  std::map<std::string, std::unique_ptr<RelationType>> relations_;
-  std::map<std::string, std::unique_ptr<LossType>> losses_;
-  std::map<std::string, std::unique_ptr<DetectorType>> detectors_;
+  // The list of a kind that is not core's, made when it is missing. Two kinds
+  // must not have the same title.
+  template <typename Type>
+  NamedTypes<Type>& MutableList() {
+    std::unique_ptr<PluginList>& list = other_lists_[Type::kTitle];
+    if (list == nullptr) list = std::make_unique<NamedTypes<Type>>();
+    return dynamic_cast<NamedTypes<Type>&>(*list);
+  }
+  template <typename Type>
+  const NamedTypes<Type>& List() const {
+    static const NamedTypes<Type> empty{};
+    const auto it = other_lists_.find(Type::kTitle);
+    return it == other_lists_.end()
+               ? empty
+               : dynamic_cast<const NamedTypes<Type>&>(*it->second);
+  }
+
+  NamedTypes<FeatureType> features_;
+  NamedTypes<RelationType> relations_;
+  NamedTypes<LossType> losses_;
+  NamedTypes<DetectorType> detectors_;
+  std::map<std::string, std::unique_ptr<PluginList>> other_lists_;
 };
 
 }  // namespace plumbline

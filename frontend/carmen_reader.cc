@@ -194,7 +194,7 @@ double SaturatedRange(const std::vector<Scan>& scans, double limit) {
 
 class CarmenReader {
  public:
-  CarmenReader(InputStream* input, const CarmenOptions& options)
+  CarmenReader(InputStream* input, const LaserOptions& options)
       : input_(input), options_(options) {
     const auto refuse = [](const char* name, double value, const char* range) {
       throw PLUMBLINE_ERROR(std::string(name) + " is " + std::to_string(value),
@@ -674,7 +674,7 @@ class CarmenReader {
   }
 
   InputStream* input_;
-  CarmenOptions options_;
+  LaserOptions options_;
   Log log_;
   ScanKind kind_ = kFlaser;
   std::array<std::vector<Scan>, kNumScanKinds> scans_;
@@ -713,12 +713,12 @@ TextFormat RecognizeFormat(std::string_view prefix) {
 
 }  // namespace
 
-Log ReadCarmenLog(const std::string& path, const CarmenOptions& options) {
+Log ReadCarmenLog(const std::string& path, const LaserOptions& options) {
   InputStream input(path);
   return ReadCarmenLog(&input, options);
 }
 
-Log ReadCarmenLog(InputStream* input, const CarmenOptions& options) {
+Log ReadCarmenLog(InputStream* input, const LaserOptions& options) {
   return CarmenReader(input, options).Read();
 }
 

@@ -2,29 +2,13 @@
 #define PLUMBLINE_FRONTEND_CARMEN_READER_H_
 
 #include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/log_reader.h>
 #include <plumbline/frontend/scan.h>
 
-#include <optional>
 #include <string>
 #include <string_view>
 
 namespace plumbline {
-
-/// What a CARMEN log does not say, or says wrongly.
-struct CarmenOptions {
-  /// Direction of the first beam in the laser's frame, rad. Unset: from the
-  /// message; FLASER and RLASER carry none and take the table below.
-  std::optional<double> laser_start_angle;
-  /// Step between beams, rad. Unset: as above.
-  std::optional<double> laser_step;
-  /// Readings at or above it are no return, m. Unset: from the message
-  /// (ROBOTLASER1, RAWLASER1), else PARAM robot_front_laser_max (or
-  /// robot_rear_laser_max), else 80; and lowered to the value at which the
-  /// log's own readings saturate when they pile up below that (81.8 m and 51 m
-  /// in well-known logs). How far a laser is trusted is the front-end's
-  /// business, not the reader's.
-  std::optional<double> laser_max_range;
-};
 
 /// Reads a CARMEN log (plain, gzip, bzip2, "-" for standard input) into scans.
 ///
@@ -57,6 +41,13 @@ struct CarmenOptions {
 /// apart for 180 and 181 beams and half a degree for 360 and 361. Any other
 /// number is spaced by PARAM laser_front_laser_resolution, symmetric to the
 /// front, or spread over 180 degrees (an odd number includes both ends).
+/// Options that are set win over all of this.
+///
+/// Readings at or above the laser's maximum range are no return. It is the
+/// message's (ROBOTLASER1, RAWLASER1), else PARAM robot_front_laser_max (or
+/// robot_rear_laser_max), else 80 m; and lowered to the value at which the
+/// log's own readings saturate when they pile up below that (81.8 m and 51 m in
+/// well-known logs).
 ///
 /// The laser's place on the robot is the median over the log of the first pose
 /// seen from the second. Where that is not fixed (a "corrected" log has other
@@ -72,10 +63,10 @@ struct CarmenOptions {
 /// negative, above 1000 m) are passed over and counted in Log::skipped, as is
 /// damage to compressed data. Throws Error when the input cannot be read or
 /// holds no scan at all; the message says what was found.
-Log ReadCarmenLog(const std::string& path, const CarmenOptions& options);
+Log ReadCarmenLog(const std::string& path, const LaserOptions& options);
 
 /// The same from an input that is open already (a peek does not hurt).
-Log ReadCarmenLog(InputStream* input, const CarmenOptions& options);
+Log ReadCarmenLog(InputStream* input, const LaserOptions& options);
 
 /// Whether text that starts with `prefix` (a few kilobytes are plenty) is a
 /// CARMEN log: the first line with a known tag decides.

@@ -159,7 +159,7 @@ TEST_F(ReportTest, NothingToLeaveOut) {
 TEST_F(ReportTest, ReplayIsARunWithoutStructure) {
   Log log = ReadCarmenLog(
       std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/office.clf.gz",
-      CarmenOptions());
+      LaserOptions());
   log.scans.resize(200);
   LogSolverOptions options;
   options.refine = Refinement::kNone;

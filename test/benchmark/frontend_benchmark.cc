@@ -311,7 +311,7 @@ void ScanCostAgainstMapSize(benchmark::State& state, const Log& log) {
 
 void RegisterLog(const std::string& name, const std::string& path) {
   const auto log =
-      std::make_shared<const Log>(ReadCarmenLog(path, CarmenOptions()));
+      std::make_shared<const Log>(ReadCarmenLog(path, LaserOptions()));
   RegisterParts(name, *log);
   benchmark::RegisterBenchmark(
       ("ScanCostAgainstMapSize/" + name).c_str(),

@@ -157,6 +157,61 @@ TEST(RegistryTest, EverythingComesInTheOrderOfNames) {
                                             "rectangle", "segment"));
 }
 
+// A kind that core has never heard of.
+struct Flavour {
+  static constexpr char kKind[] = "flavour";
+  static constexpr char kTitle[] = "Flavours";
+
+  std::string name;
+  std::string description;
+  int sweetness = 0;
+};
+
+TEST(RegistryTest, KindsThatCoreDoesNotKnow) {
+  Registry registry;
+  EXPECT_EQ(registry.Find<Flavour>("salt"), nullptr);
+  EXPECT_THAT(MessageOf([&] { registry.Get<Flavour>("salt"); }),
+              HasSubstr("unknown flavour 'salt': expected one that is "
+                        "registered, and none is"));
+  EXPECT_TRUE(registry.All<Flavour>().empty());
+  EXPECT_EQ(registry.lists().size(), 4u);
+
+  const Flavour& honey = registry.Register(Flavour{"honey", "of bees", 9});
+  registry.Register(Flavour{"cocoa", "of beans", 2});
+  EXPECT_EQ(registry.Find<Flavour>("honey"), &honey);
+  EXPECT_EQ(registry.Get<Flavour>("cocoa").sweetness, 2);
+  EXPECT_THAT(MessageOf([&] { registry.Get<Flavour>("hony"); }),
+              HasSubstr("unknown flavour 'hony': expected one of honey, "));
+  EXPECT_THAT(MessageOf([&] {
+                registry.Register(Flavour{"honey", "", 0});
+              }),
+              HasSubstr("flavour 'honey' is registered already"));
+  EXPECT_THROW(registry.Register(Flavour{"two words", "", 0}), Error);
+  // Kinds do not share names.
+  EXPECT_EQ(registry.FindFeature("honey"), nullptr);
+
+  ASSERT_EQ(registry.All<Flavour>().size(), 2u);
+  EXPECT_EQ(registry.All<Flavour>()[1], &honey);
+  const PluginList& list = *registry.lists().back();
+  EXPECT_EQ(list.title(), "Flavours");
+  ASSERT_EQ(list.entries().size(), 2u);
+  EXPECT_EQ(list.entries()[0].name, "cocoa");
+  EXPECT_EQ(list.entries()[1].description, "of bees");
+}
+
+TEST(RegistryTest, ListsOfCoresOwnKinds) {
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  std::vector<std::string> titles;
+  for (const PluginList* list : registry.lists()) {
+    titles.push_back(list->title());
+  }
+  EXPECT_THAT(titles, ::testing::ElementsAre("Feature types", "Relations",
+                                             "Losses (--delta_mode)",
+                                             "Detectors (--hierarchy)"));
+  EXPECT_EQ(registry.lists()[0]->entries().front().name, "circle");
+}
+
 TEST(RegistryTest, GlobalIsOneInstance) {
   EXPECT_EQ(&Registry::Global(), &Registry::Global());
 }

@@ -17,14 +17,13 @@ using ::testing::IsEmpty;
 
 constexpr double kTight = 1e-12;
 
-Log Read(const std::string& text, const CarmenOptions& options = {}) {
+Log Read(const std::string& text, const LaserOptions& options = {}) {
   InputStream input("test.log", text);
   return ReadCarmenLog(&input, options);
 }
 
 // The message of the Error that reading throws.
-std::string Refusal(const std::string& text,
-                    const CarmenOptions& options = {}) {
+std::string Refusal(const std::string& text, const LaserOptions& options = {}) {
   try {
     Read(text, options);
   } catch (const Error& error) {
@@ -107,7 +106,7 @@ TEST(CarmenReaderTest, ResolutionParameterSpacesUnusualBeams) {
 }
 
 TEST(CarmenReaderTest, OptionsOverride) {
-  CarmenOptions options;
+  LaserOptions options;
   options.laser_start_angle = -1.0;
   options.laser_step = 0.5;
   options.laser_max_range = 10.0;

@@ -47,7 +47,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
   plumbline::LooksLikeG2o(text);
   try {
     plumbline::InputStream input("fuzz", text);
-    CheckLog(plumbline::ReadCarmenLog(&input, plumbline::CarmenOptions()));
+    CheckLog(plumbline::ReadCarmenLog(&input, plumbline::LaserOptions()));
   } catch (const plumbline::Error&) {
     // A refusal is an answer.
   }

@@ -77,6 +77,8 @@ TEST(EqualRadiusDetectorTest, ProposesWhatIsNotThereYet) {
 struct Solved {
   std::vector<double> radii;
   int relations = 0;
+  // Lines of columns.csv.
+  int lines = 0;
 };
 
 Solved Solve(const std::string& flags) {
@@ -107,6 +109,9 @@ Solved Solve(const std::string& flags) {
       ++solved.relations;
     }
   }
+  std::ifstream columns(folder / "columns.csv");
+  std::string line;
+  while (std::getline(columns, line)) ++solved.lines;
   std::filesystem::remove_all(folder);
   return solved;
 }
@@ -120,6 +125,7 @@ TEST(PluginTest, SolvesByName) {
   ASSERT_EQ(with.radii.size(), 5u);
   EXPECT_EQ(without.relations, 0);
   EXPECT_EQ(with.relations, 3);
+  EXPECT_EQ(with.lines, 6);
   double squares_without = 0.0;
   double squares_with = 0.0;
   for (int i = 0; i < 4; ++i) {
@@ -144,6 +150,7 @@ TEST(PluginTest, IsListed) {
   const std::string text((std::istreambuf_iterator<char>(file)), {});
   EXPECT_NE(text.find("columns cast in one mould"), std::string::npos) << text;
   EXPECT_NE(text.find("R2 - R1 - u; m"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n  columns.csv "), std::string::npos) << text;
   std::filesystem::remove_all(folder);
 }
 

@@ -1,0 +1,51 @@
+#ifndef PLUMBLINE_FRONTEND_LOG_READER_H_
+#define PLUMBLINE_FRONTEND_LOG_READER_H_
+
+#include <plumbline/core/registry.h>
+#include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/scan.h>
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace plumbline {
+
+/// What a log does not say about its laser, or says wrongly.
+struct LaserOptions {
+  /// Direction of the first beam in the laser's frame, rad. Unset: from the
+  /// log, or by its format.
+  std::optional<double> laser_start_angle;
+  /// Step between beams, rad. Unset: as above.
+  std::optional<double> laser_step;
+  /// Readings at or above it are no return, m. Unset: as above. How far a laser
+  /// is trusted is the front-end's business, not the reader's.
+  std::optional<double> laser_max_range;
+};
+
+/// A format of robot logs: a kind of plug-in (Registry::Register, Find, Get,
+/// All).
+struct LogReaderType {
+  static constexpr char kKind[] = "log reader";
+  static constexpr char kTitle[] = "Log readers (--log_reader)";
+
+  /// "carmen"
+  std::string name;
+  std::string description;
+  /// Whether text that starts with so much is such a log. A few kilobytes are
+  /// given, or all there is; unpacked where the input is compressed.
+  std::function<bool(std::string_view prefix)> recognizes;
+  /// Reads a log. Lines that cannot be used are passed over and counted in
+  /// Log::skipped; throws Error when there is no scan at all.
+  std::function<Log(InputStream* input, const LaserOptions& options)> read;
+};
+
+/// The first reader, in the order of names, that recognizes text that starts
+/// with `prefix`; null when none does.
+const LogReaderType* RecognizeLog(const Registry& registry,
+                                  std::string_view prefix);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_LOG_READER_H_

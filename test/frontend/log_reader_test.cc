@@ -1,0 +1,61 @@
+#include <gtest/gtest.h>
+#include <plumbline/frontend/builtins.h>
+#include <plumbline/frontend/log_reader.h>
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+LogReaderType ReaderOf(const std::string& name, char first) {
+  LogReaderType type;
+  type.name = name;
+  type.recognizes = [first](std::string_view prefix) {
+    return !prefix.empty() && prefix[0] == first;
+  };
+  type.read = [](InputStream*, const LaserOptions&) { return Log(); };
+  return type;
+}
+
+TEST(LogReaderTest, TheFirstByNameThatRecognizes) {
+  Registry registry;
+  EXPECT_EQ(RecognizeLog(registry, "a log"), nullptr);
+  registry.Register(ReaderOf("second", 'a'));
+  registry.Register(ReaderOf("first", 'a'));
+  registry.Register(ReaderOf("other", 'b'));
+  // One that recognizes nothing is asked for by name only.
+  LogReaderType by_name = ReaderOf("by_name", 'a');
+  by_name.recognizes = nullptr;
+  registry.Register(std::move(by_name));
+  ASSERT_NE(RecognizeLog(registry, "a log"), nullptr);
+  EXPECT_EQ(RecognizeLog(registry, "a log")->name, "first");
+  EXPECT_EQ(RecognizeLog(registry, "b log")->name, "other");
+  EXPECT_EQ(RecognizeLog(registry, "c log"), nullptr);
+}
+
+TEST(LogReaderTest, BuiltinCarmen) {
+  Registry registry;
+  RegisterBuiltinLogReaders(&registry);
+  const LogReaderType* carmen = registry.Find<LogReaderType>("carmen");
+  ASSERT_NE(carmen, nullptr);
+  RegisterBuiltinLogReaders(&registry);
+  EXPECT_EQ(registry.Find<LogReaderType>("carmen"), carmen);
+
+  const std::string text = "FLASER 2 1 2 0 0 0 0 0 0 17.5 host 0\n";
+  EXPECT_EQ(RecognizeLog(registry, text), carmen);
+  EXPECT_EQ(RecognizeLog(registry, "VERTEX_SE2 0 0 0 0\n"), nullptr);
+  InputStream input("two beams", text);
+  LaserOptions options;
+  options.laser_max_range = 1.5;
+  const Log log = carmen->read(&input, options);
+  ASSERT_EQ(log.scans.size(), 1u);
+  EXPECT_EQ(log.scans[0].timestamp, 17.5);
+  // At or above the maximum range there is no return.
+  EXPECT_EQ(log.scans[0].ranges, (std::vector<float>{1.0f, 0.0f}));
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -47,6 +47,8 @@ class StructureDetector {
   /// stand in a row.
   virtual bool keeps_followers() const { return false; }
 
+  /// What is seen in the scope and is not in the graph yet; empty when there is
+  /// nothing. Ids of new features are provisional.
   virtual Transaction Detect(const Graph& graph, const Registry& registry,
                              const DetectionScope& scope) const = 0;
 };

@@ -12,6 +12,7 @@ namespace plumbline {
 /// set is its smallest number, whatever the order of joins.
 class DisjointSets {
  public:
+  /// Elements 0 to size - 1, each a set of its own.
   explicit DisjointSets(std::size_t size) : parents_(size) {
     std::iota(parents_.begin(), parents_.end(), std::size_t{0});
   }

@@ -28,6 +28,7 @@ Hierarchy MakeHierarchy(
     const std::vector<std::string>& raw_feature_types,
     const std::map<std::string, DetectorParameters>& parameters);
 
+/// When structure is broken, proposed again, and when the loop ends.
 struct EmOptions {
   /// Structure constraints with a smaller delta are broken.
   double delta_threshold = 0.3;
@@ -74,6 +75,7 @@ struct EmPhase {
   double seconds = 0.0;
 };
 
+/// What a run of EM came to.
 struct EmReport {
   int iterations = 0;
   bool converged = false;

@@ -58,6 +58,7 @@ struct Feature {
   /// Who put it there: "frontend", a reader, or a detector's name.
   std::string source;
 
+  /// The parameter block, type->size numbers.
   double* data() { return parameters.data(); }
   const double* data() const { return parameters.data(); }
 };

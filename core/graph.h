@@ -74,6 +74,7 @@ class Graph {
   /// changed once it is in the graph.
   const std::vector<FeatureId>& VirtualFeatures(int level) const;
 
+  /// How many there are now; of constraints, broken ones included.
   std::size_t num_features() const { return num_features_; }
   std::size_t num_constraints() const { return num_constraints_; }
   /// One past the largest id ever handed out.

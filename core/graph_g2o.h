@@ -12,6 +12,7 @@
 
 namespace plumbline {
 
+/// How a g2o file is to be understood where writers differ.
 struct G2oOptions {
   /// Frame in which the information of relative poses (EDGE_SE2, EDGE2) is
   /// given: that of the first pose (false: the error is inverse(p1) (+) p2
@@ -24,6 +25,7 @@ struct G2oOptions {
 
 /// A line of a g2o file.
 struct G2oLine {
+  /// What a line holds.
   enum class Kind {
     /// Comments, blank lines, unknown tags, laser scans: kept verbatim.
     kText,

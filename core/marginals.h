@@ -10,6 +10,7 @@
 
 namespace plumbline {
 
+/// Which part of a graph covariances are taken of, and in which frame.
 struct MarginalsOptions {
   /// A connected part of the graph that nothing ties to the plane (no fixed
   /// feature, no relation of a single feature) has no covariance in the map

@@ -10,6 +10,7 @@
 
 namespace plumbline {
 
+/// Weighting of structure, and when a solve ends.
 struct SessionOptions {
   /// Weighting of structure constraints: a LossType's name.
   std::string delta_mode = "frozen";
@@ -119,6 +120,7 @@ class SolverSession : public GraphListener {
   /// on `features`.
   CostReport Cost(const std::vector<FeatureId>* features = nullptr) const;
 
+  /// As they were given.
   const SessionOptions& options() const;
   /// Sums over all solves so far.
   const SolveReport& totals() const;

@@ -36,6 +36,7 @@ class Transaction {
   /// Takes a constraint out of every solve but keeps it on record.
   void BreakConstraint(ConstraintId id) { broken_constraints_.push_back(id); }
 
+  /// True when it would change nothing.
   bool empty() const {
     return added_features_.empty() && added_constraints_.empty() &&
            removed_features_.empty() && removed_constraints_.empty() &&
@@ -53,6 +54,7 @@ class Transaction {
     return static_cast<std::size_t>(-2 - id);
   }
 
+  /// What is to be done, in the order in which it was asked for.
   const std::vector<Feature>& added_features() const { return added_features_; }
   std::vector<Feature>& added_features() { return added_features_; }
   const std::vector<Constraint>& added_constraints() const {

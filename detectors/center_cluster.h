@@ -8,6 +8,7 @@
 
 namespace plumbline {
 
+/// What counts as a common centre of circles.
 struct CenterClusterOptions {
   /// A circle whose centre is so near to a common centre has it, m.
   double gate = 0.4;

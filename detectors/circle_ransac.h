@@ -15,6 +15,7 @@ namespace plumbline {
 /// for how they are found and DetectCurves for how they are extended.
 class CircleRansac : public StructureDetector {
  public:
+  /// Options as those of the search for curves.
   explicit CircleRansac(const CurveSearchOptions& options);
 
   const std::string& name() const override;

@@ -17,6 +17,7 @@ namespace plumbline {
 /// PointGraph says.
 class LineRansac : public StructureDetector {
  public:
+  /// Options as those of the search for curves.
   explicit LineRansac(const CurveSearchOptions& options);
 
   const std::string& name() const override;

@@ -9,6 +9,7 @@
 
 namespace plumbline {
 
+/// Which walls share a direction, and how tightly they are tied to it.
 struct OrientationMixtureOptions {
   /// Tolerance of a wall against its orientation, rad.
   double sigma = DegToRad(0.1);
@@ -40,6 +41,7 @@ struct OrientationMixtureOptions {
 /// is missed and none made twice.
 class OrientationMixture : public StructureDetector {
  public:
+  /// Options that make no sense are refused by the type's factory.
   explicit OrientationMixture(const OrientationMixtureOptions& options);
 
   const std::string& name() const override;

@@ -10,6 +10,7 @@
 
 namespace plumbline {
 
+/// Which angles between orientations are looked for, and how tightly they hold.
 struct OrientationRelationOptions {
   /// Angles between orientations that are expected in a building, rad. The sign
   /// does not matter, nor do multiples of pi: 0 is "these are the same".
@@ -33,6 +34,7 @@ struct OrientationRelationOptions {
 /// scope lists features: an orientation belongs to the whole building.
 class OrientationRelation : public StructureDetector {
  public:
+  /// Angles are completed by their negatives.
   explicit OrientationRelation(OrientationRelationOptions options);
 
   const std::string& name() const override;

@@ -27,6 +27,7 @@ class ParameterReader {
   /// Get, rounded to a whole number; throws Error when it is not one.
   int GetInt(const std::string& name, int minimum) const;
 
+  /// All parameters, what was given over the defaults.
   const DetectorParameters& values() const { return values_; }
 
  private:

@@ -21,6 +21,7 @@ struct PlaceWall {
   double end = 0.0;
 };
 
+/// Gates of matching the walls of two places.
 struct PlaceMatchOptions {
   /// Displacements up to so many standard deviations are looked at.
   double gate = 3.0;

@@ -22,6 +22,7 @@ class PointGraph {
   /// however far they are: the spacing of columns is not known beforehand.
   PointGraph(const Graph& graph, const DetectionScope& scope, int reach);
 
+  /// Number of points; ids and positions (m, map frame) by index.
   int size() const { return static_cast<int>(ids_.size()); }
   FeatureId id(int i) const { return ids_[static_cast<std::size_t>(i)]; }
   const Eigen::Vector2d& position(int i) const {

@@ -9,6 +9,7 @@
 
 namespace plumbline {
 
+/// Which walls are taken for one, and how tightly they are tied.
 struct SameWallOptions {
   /// Tolerance of a wall seen twice: across (m) and direction (rad).
   double sigma_offset = 0.02;
@@ -61,6 +62,7 @@ struct SameWallOptions {
 /// a list of features gives no proposal: loops are a matter of the whole map.
 class SameWall : public StructureDetector {
  public:
+  /// Options that make no sense are refused by the type's factory.
   explicit SameWall(const SameWallOptions& options);
 
   const std::string& name() const override;

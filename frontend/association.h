@@ -10,6 +10,7 @@
 
 namespace plumbline {
 
+/// Gates of the association of observed segments with the walls of the map.
 struct AssociationOptions {
   /// Mahalanobis gate on offset and direction together (chi^2, 2 degrees of
   /// freedom).

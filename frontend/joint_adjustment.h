@@ -17,6 +17,7 @@
 
 namespace plumbline {
 
+/// What is adjusted together, and how far it is trusted.
 struct JointAdjustmentOptions {
   ScanPointsOptions points;
   /// Every so many key scans one is a place whose pose is adjusted; what was
@@ -70,6 +71,7 @@ class JointAdjustment {
   /// odometry, what is missing at the next place spread over the way.
   std::vector<Pose2> KeyPoses() const;
 
+  /// Matches of scans and votes for walls that are live.
   std::int64_t num_relations() const {
     return static_cast<std::int64_t>(relations_.size());
   }

@@ -13,6 +13,7 @@
 
 namespace plumbline {
 
+/// How the map grows as the robot goes.
 struct MapBuilderOptions {
   /// Links from the robot to features farther away are cut, m.
   double link_radius = 10.0;
@@ -86,6 +87,8 @@ class MapBuilder {
     return robot_.Neighborhood(depth);
   }
 
+  /// The robot's pose (map frame) and its feature, and what was kept of key
+  /// scans.
   const Pose2& robot() const { return robot_.pose(); }
   FeatureId robot_id() const { return robot_.id(); }
   const std::vector<KeyScanRecord>& records() const { return records_; }

@@ -42,6 +42,8 @@ struct MatchDrift {
   double rotation_per_root_radian = DegToRad(0.7);
 };
 
+/// How scans are matched with what was seen last, and how far odometry is
+/// trusted.
 struct OdometryRefinementOptions {
   /// False: scans are taken as keys by the same rule, but poses are the raw
   /// odometry's (the paper's method).
@@ -89,6 +91,7 @@ struct RefinedScan {
 /// section 7, step 0).
 class OdometryRefiner {
  public:
+  /// Starts with nothing seen.
   explicit OdometryRefiner(const OdometryRefinementOptions& options);
 
   /// Scans in the order of the log.

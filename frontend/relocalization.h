@@ -10,6 +10,7 @@
 
 namespace plumbline {
 
+/// How scans are found again on the final map.
 struct RelocalizationOptions {
   /// How well the map's walls are in place: offset (m) and direction (rad),
   /// added to each observation's own covariance.

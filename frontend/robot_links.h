@@ -26,6 +26,7 @@ class RobotLinks {
   /// The graph must outlive this.
   explicit RobotLinks(Graph* graph) : graph_(graph) {}
 
+  /// Where the robot is, map frame.
   const Pose2& pose() const { return pose_; }
   void set_pose(const Pose2& pose) { pose_ = pose; }
   /// The robot's feature in the graph; kNoId before the first Write.

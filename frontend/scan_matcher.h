@@ -10,6 +10,7 @@
 
 namespace plumbline {
 
+/// Resolution, gates and noise of point-to-line matching.
 struct ScanMatcherOptions {
   /// Standard deviation of a return across its surface, m: noise of the
   /// laser and roughness of the wall together.
@@ -38,6 +39,7 @@ struct MatchPrior {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
 };
 
+/// What came of matching a scan.
 struct MatchResult {
   Pose2 pose = Pose2::Zero();
   /// Covariance from the returns and the prior together: large along a
@@ -59,6 +61,7 @@ struct MatchResult {
 /// robust point to line least squares. Not thread safe.
 class ScanMatcher {
  public:
+  /// Starts with no reference to match with.
   explicit ScanMatcher(const ScanMatcherOptions& options);
 
   /// Sets the reference: points and normals in the frame in which poses are

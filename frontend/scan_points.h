@@ -8,6 +8,7 @@
 
 namespace plumbline {
 
+/// Which returns of a scan are used.
 struct ScanPointsOptions {
   /// Returns farther away are left out, m: far beams graze the walls.
   double usable_range = 50.0;

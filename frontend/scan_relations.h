@@ -12,6 +12,7 @@
 
 namespace plumbline {
 
+/// Which scans are matched with each other, and which matches are kept.
 struct ScanRelationOptions {
   ScanMatcherOptions matcher;
   /// Consecutive places that make one submap.

@@ -9,6 +9,7 @@
 
 namespace plumbline {
 
+/// What counts as a straight piece of wall in a scan.
 struct SegmentExtractionOptions {
   /// A segment has at least so many returns and is at least so long, m.
   int min_points = 6;

@@ -12,6 +12,7 @@
 
 namespace plumbline {
 
+/// What counts as a wall among returns that no wall explains.
 struct WallCompletionOptions {
   ScanPointsOptions points;
   /// Returns so near to a wall of the map (across, and beyond its ends, m) are

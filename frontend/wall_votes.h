@@ -11,6 +11,7 @@
 
 namespace plumbline {
 
+/// Which returns vote for a wall, and how far one is trusted.
 struct WallVoteOptions {
   /// A return votes for the wall that it lies nearest to: so near across, so
   /// far past its ends at most (m), with a surface turned by no more (rad) and

@@ -5,7 +5,7 @@ set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-apps/install_packages.sh clang-format libdxflib-dev
+apps/install_packages.sh clang-format doxygen dpkg-dev libdxflib-dev
 cmake --preset ci >/dev/null
 cmake --build --preset ci
 ctest --preset ci --parallel "$(nproc)" "$@"

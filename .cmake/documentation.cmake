@@ -1,0 +1,17 @@
+# Reference of the public headers, where Doxygen is installed.
+find_package(Doxygen QUIET)
+if(DOXYGEN_FOUND)
+  set(DOXYGEN_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/documentation)
+  set(DOXYGEN_USE_MDFILE_AS_MAINPAGE README.md)
+  set(DOXYGEN_FILE_PATTERNS *.h *.md)
+  set(DOXYGEN_EXCLUDE_SYMBOLS *::internal::* plumbline::internal)
+  set(DOXYGEN_IMAGE_PATH ${PROJECT_SOURCE_DIR})
+  set(DOXYGEN_MACRO_EXPANSION YES)
+  set(DOXYGEN_HAVE_DOT NO)
+  set(DOXYGEN_GENERATE_LATEX NO)
+  set(DOXYGEN_QUIET YES)
+  set(DOXYGEN_WARN_LOGFILE ${PROJECT_BINARY_DIR}/documentation/warnings.txt)
+  doxygen_add_docs(documentation README.md factors core detectors frontend
+    WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  set(PLUMBLINE_DOXYFILE ${PROJECT_BINARY_DIR}/Doxyfile.documentation)
+endif()

@@ -348,6 +348,65 @@ struct Marginals::Impl {
     }
   }
 
+  // The inverse times `right` (columns x any), which is zero but in the rows of
+  // `sources`; right in the rows of `sources` and `wanted` only. What is zero,
+  // and what nobody wants, is not computed: substitution goes up the
+  // elimination tree from the sources and comes down to what is wanted, which
+  // in a thin graph is a small part of the factor.
+  Eigen::MatrixXd SolveAt(const Eigen::MatrixXd& right,
+                          const std::vector<const Entry*>& sources,
+                          const std::vector<const Entry*>& wanted) const {
+    using RowMajor =
+        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const auto& factor = ldlt.matrixL().nestedExpression();
+    const Eigen::VectorXd& pivots = ldlt.vectorD();
+    const auto& position = ldlt.permutationP().indices();
+    const int* starts = factor.outerIndexPtr();
+    const int* rows = factor.innerIndexPtr();
+    const double* values = factor.valuePtr();
+    RowMajor x = RowMajor::Zero(columns, right.cols());
+    std::vector<bool> is_on_way(static_cast<std::size_t>(columns), false);
+    std::vector<int> way;
+    const auto climb = [&](const Entry& entry) {
+      for (int r = 0; entry.column >= 0 && r < entry.tangent_size; ++r) {
+        for (int j = position[entry.column + r]; j >= 0 && !is_on_way[j];
+             j = starts[j] < starts[j + 1] ? rows[starts[j]] : -1) {
+          is_on_way[j] = true;
+          way.push_back(j);
+        }
+      }
+    };
+    for (const Entry* entry : sources) {
+      for (int r = 0; entry->column >= 0 && r < entry->tangent_size; ++r) {
+        x.row(position[entry->column + r]) = right.row(entry->column + r);
+      }
+      climb(*entry);
+    }
+    std::sort(way.begin(), way.end());
+    for (const int j : way) {
+      for (int p = starts[j]; p < starts[j + 1]; ++p) {
+        x.row(rows[p]) -= values[p] * x.row(j);
+      }
+    }
+    for (const int j : way) x.row(j) /= pivots[j];
+    for (const Entry* entry : wanted) climb(*entry);
+    std::sort(way.begin(), way.end(), std::greater<int>());
+    for (const int j : way) {
+      for (int p = starts[j]; p < starts[j + 1]; ++p) {
+        x.row(j) -= values[p] * x.row(rows[p]);
+      }
+    }
+    Eigen::MatrixXd solved = Eigen::MatrixXd::Zero(columns, right.cols());
+    for (const auto* list : {&sources, &wanted}) {
+      for (const Entry* entry : *list) {
+        for (int r = 0; entry->column >= 0 && r < entry->tangent_size; ++r) {
+          solved.row(entry->column + r) = x.row(position[entry->column + r]);
+        }
+      }
+    }
+    return solved;
+  }
+
   // sum of B_i Cov(i, j) B_j' over features and their Jacobians (rows x
   // parameters).
   Eigen::MatrixXd Propagate(
@@ -361,7 +420,9 @@ struct Marginals::Impl {
           (jacobian * entry->lift).transpose();
     }
     if (columns == 0) return Eigen::MatrixXd::Zero(rows, rows);
-    const Eigen::MatrixXd solved = ldlt.solve(right);
+    std::vector<const Entry*> at;
+    for (const auto& term : terms) at.push_back(term.first);
+    const Eigen::MatrixXd solved = SolveAt(right, at, at);
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(rows, rows);
     for (const auto& [entry, jacobian] : terms) {
       if (entry->column < 0) continue;
@@ -537,7 +598,9 @@ std::vector<Eigen::Matrix3d> Marginals::RelativeCovariances(
   if (a.column >= 0) {
     Eigen::MatrixXd right = Eigen::MatrixXd::Zero(impl_->columns, 3);
     right.middleRows(a.column, a.tangent_size) = a.lift.transpose();
-    columns = impl_->ldlt.solve(right);
+    std::vector<const Impl::Entry*> wanted = {&a};
+    for (const FeatureId id : to) wanted.push_back(&impl_->Get(id));
+    columns = impl_->SolveAt(right, {&a}, wanted);
     own = a.lift * columns.middleRows(a.column, a.tangent_size);
   }
   std::vector<Eigen::Matrix3d> covariances;

@@ -1,6 +1,7 @@
 #include <gflags/gflags.h>
 #include <glog/logging.h>
 #include <plumbline/apps/app.h>
+#include <plumbline/apps/help.h>
 #include <plumbline/core/error.h>
 
 #include <algorithm>
@@ -22,13 +23,16 @@ DECLARE_bool(helpshort);
 DECLARE_bool(helpfull);
 DECLARE_bool(version);
 
+DEFINE_string(help_format, "text",
+              "What --help prints: text, man (a manual page) or bash (a "
+              "completion script)");
+PLUMBLINE_FLAG_CHOICES(help_format, "text", "man", "bash");
+
 namespace plumbline {
 
 const char* const kVersion = PLUMBLINE_VERSION;
 
 namespace {
-
-constexpr std::size_t kColumns = 80;
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -109,47 +113,6 @@ FlagValue ToFlagValue(const gflags::CommandLineFlagInfo& info) {
   return {info.name, info.current_value, info.default_value, info.type};
 }
 
-/// `text` in lines of at most kColumns, each behind `indent` blanks.
-std::string Wrap(const std::string& text, std::size_t indent) {
-  std::istringstream words(text);
-  std::string result;
-  std::string line;
-  std::string word;
-  const std::string margin(indent, ' ');
-  while (words >> word) {
-    if (!line.empty() && indent + line.size() + 1 + word.size() > kColumns) {
-      result += margin + line + "\n";
-      line.clear();
-    }
-    if (!line.empty()) line += ' ';
-    line += word;
-  }
-  if (!line.empty()) result += margin + line + "\n";
-  return result;
-}
-
-std::string HelpOfFlag(const gflags::CommandLineFlagInfo& info) {
-  std::string facts;
-  const auto condition = Conditions().find(info.name);
-  if (condition != Conditions().end()) {
-    facts = Describe(condition->second) + "; ";
-  }
-  facts += "default ";
-  if (info.type == "string") {
-    facts += info.default_value.empty() ? "none" : info.default_value;
-  } else if (info.type == "double") {
-    facts += FormatNumber(std::strtod(info.default_value.c_str(), nullptr));
-  } else {
-    facts += info.default_value;
-  }
-  const std::string kind =
-      info.type == "bool"
-          ? ""
-          : "=" + std::string(info.type == "string" ? "TEXT" : "NUMBER");
-  return "  --" + info.name + kind + "\n" +
-         Wrap(info.description + " (" + facts + ")", 6);
-}
-
 [[noreturn]] void ExitWithUsageError(const AppInfo& info,
                                      const std::string& message) {
   std::fprintf(stderr, "%s%s: --help lists the flags\n", message.c_str(),
@@ -176,49 +139,6 @@ FlagCondition::FlagCondition(const char* name,
 }
 
 }  // namespace internal
-
-std::string HelpText(const AppInfo& info) {
-  std::string text = info.name + ": " + info.summary;
-  text = Wrap(text, 0) + "\n";
-  for (const std::string& usage : info.usage) {
-    text += "  " + info.name + " " + usage + "\n";
-  }
-  if (!info.example.empty()) text += "\nExample:\n  " + info.example + "\n";
-
-  std::map<std::string, gflags::CommandLineFlagInfo> left;
-  for (const gflags::CommandLineFlagInfo& flag : OwnFlagInfos()) {
-    left[flag.name] = flag;
-  }
-  const auto print_group = [&text](const std::string& title,
-                                   const std::vector<std::string>& flags) {
-    text += "\n" + title + ":\n";
-    for (const std::string& flag : flags) text += flag;
-  };
-  for (const FlagGroup& group : info.groups) {
-    std::vector<std::string> flags;
-    for (const std::string& name : group.flags) {
-      const auto found = left.find(name);
-      if (found == left.end()) continue;
-      flags.push_back(HelpOfFlag(found->second));
-      left.erase(found);
-    }
-    if (!flags.empty()) print_group(group.title, flags);
-  }
-  if (!left.empty()) {
-    std::vector<std::string> flags;
-    for (const auto& entry : left) flags.push_back(HelpOfFlag(entry.second));
-    print_group(info.groups.empty() ? "Flags" : "Other flags", flags);
-  }
-  text +=
-      "\nCommon flags:\n"
-      "  --flagfile=FILE\n"
-      "      Reads flags from a file, one --name=value a line.\n"
-      "  --fromenv=NAMES\n"
-      "      Takes the flags listed from environment variables FLAGS_name.\n"
-      "  --help, --version\n"
-      "      --helpfull shows the flags of the libraries, too.\n";
-  return text;
-}
 
 std::vector<std::string> CheckFlagValues() {
   std::vector<std::string> problems;
@@ -247,7 +167,17 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
   gflags::ParseCommandLineNonHelpFlags(&argc, &argv, /*remove_flags=*/true);
 
   if (FLAGS_help || FLAGS_helpshort) {
-    std::fputs(HelpText(info).c_str(), stdout);
+    for (const std::string& problem : CheckFlagValues()) {
+      if (problem.find("--help_format") == 0) {
+        ExitWithUsageError(info, problem + "\n");
+      }
+    }
+    const std::vector<FlagDescription> flags = DescribeFlags();
+    const std::string text = FLAGS_help_format == "man" ? ManPage(info, flags)
+                             : FLAGS_help_format == "bash"
+                                 ? BashCompletion(info, flags)
+                                 : HelpText(info, flags);
+    std::fputs(text.c_str(), stdout);
     std::exit(kExitSuccess);
   }
   if (FLAGS_helpfull) {
@@ -315,6 +245,27 @@ std::vector<FlagValue> OwnFlags() {
   std::vector<FlagValue> flags;
   for (const gflags::CommandLineFlagInfo& info : OwnFlagInfos()) {
     flags.push_back(ToFlagValue(info));
+  }
+  return flags;
+}
+
+std::vector<FlagDescription> DescribeFlags() {
+  std::vector<FlagDescription> flags;
+  for (const gflags::CommandLineFlagInfo& info : OwnFlagInfos()) {
+    FlagDescription flag;
+    flag.name = info.name;
+    flag.type = info.type;
+    flag.description = info.description;
+    flag.default_value =
+        info.type == "double"
+            ? FormatNumber(std::strtod(info.default_value.c_str(), nullptr))
+            : info.default_value;
+    const auto condition = Conditions().find(info.name);
+    if (condition != Conditions().end()) {
+      flag.choices = condition->second.choices;
+      if (flag.choices.empty()) flag.range = Describe(condition->second);
+    }
+    flags.push_back(std::move(flag));
   }
   return flags;
 }

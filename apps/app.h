@@ -67,10 +67,6 @@ struct FlagValue {
 /// and arguments where none are taken.
 std::vector<std::string> ParseFlags(const AppInfo& info, int argc, char** argv);
 
-/// What --help prints: our own flags in groups with their defaults, in 80
-/// columns.
-std::string HelpText(const AppInfo& info);
-
 /// Runs a binary's work and returns the process's exit status: what `run`
 /// returns; kExitInput when it throws an Error (its message goes to stderr);
 /// kExitInternal for any other exception; kExitInterrupted when it succeeded
@@ -81,6 +77,23 @@ int RunMain(const std::function<int()>& run);
 /// asks between steps, writes what it has and returns. A second Ctrl-C ends
 /// the process at once.
 bool InterruptRequested();
+
+/// What --help says of a flag of this project.
+struct FlagDescription {
+  std::string name;
+  /// "bool", "int32", "double", "string", ...
+  std::string type;
+  std::string description;
+  /// As it is shown; may be empty.
+  std::string default_value;
+  /// The words that are understood, if these are all.
+  std::vector<std::string> choices;
+  /// "0 to 1"; empty without a range.
+  std::string range;
+};
+
+/// All of them, by name.
+std::vector<FlagDescription> DescribeFlags();
 
 /// Flags of this project that are linked into the binary, by name.
 std::vector<FlagValue> OwnFlags();

@@ -142,6 +142,7 @@ LogSolverResult LogSolver::Run(
   }
   builder.ReadRobot();
   result.final_cost = session_->Cost();
+  if (stop && stop()) result.interrupted = true;
 
   std::vector<Pose2> keys;
   auto trajectory = [&] {
@@ -178,6 +179,7 @@ LogSolverResult LogSolver::Run(
       builder.ReadRobot();
       result.final_cost = session_->Cost();
       result.trajectory = trajectory();
+      if (stop && stop()) result.interrupted = true;
     }
   }
 

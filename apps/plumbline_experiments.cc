@@ -91,6 +91,7 @@ int Run() {
     const ExperimentResult result = RunExperiment(id, options, &registry);
     progress.reset();
     WriteExperiment(result, FLAGS_output_dir);
+    Detail("%s: written to %s", id.c_str(), FLAGS_output_dir.c_str());
     std::cout << id << ": " << result.title << '\n';
     if (!result.skipped.empty()) {
       std::cout << "  skipped: " << result.skipped << '\n';
@@ -124,7 +125,7 @@ int main(int argc, char** argv) {
   info.groups = {
       {"Experiment", {"experiment", "trials", "seed", "num_threads"}},
       {"Method", {"delta_mode", "delta_threshold", "hierarchy"}},
-      {"Output", {"output_dir", "quiet"}}};
+      {"Output", {"output_dir", "quiet", "verbose"}}};
   plumbline::ParseFlags(info, argc, argv);
   return plumbline::RunMain(plumbline::Run);
 }

@@ -161,7 +161,8 @@ std::string Provenance() {
                      FLAGS_world.substr(FLAGS_world.rfind('/') + 1) +
                      " --seed=" + std::to_string(FLAGS_seed);
   for (const FlagValue& flag : ChangedFlags()) {
-    if (flag.type != "string" && flag.name != "seed" && flag.name != "quiet") {
+    if (flag.type != "string" && flag.name != "seed" && flag.name != "quiet" &&
+        flag.name != "verbose") {
       text += " --" + flag.name + "=" + flag.value;
     }
   }
@@ -230,6 +231,8 @@ int Run() {
   };
   const Simulation simulation = Simulate(world, options, FLAGS_seed);
   progress.Finish();
+  Detail("%zu steps driven, writing %s", simulation.states.size(),
+         FLAGS_output.c_str());
 
   WriteFileAtomically(FLAGS_output, [&](std::ostream& output) {
     if (!EndsWith(FLAGS_output, ".gz")) {
@@ -285,7 +288,8 @@ int main(int argc, char** argv) {
   info.groups = {
       {"World", {"world", "seed", "size", "rotation"}},
       {"Graphs", {"position_noise", "distance_noise", "outliers"}},
-      {"Output", {"output", "truth", "relations", "save_world", "quiet"}},
+      {"Output",
+       {"output", "truth", "relations", "save_world", "quiet", "verbose"}},
       {"Laser",
        {"beams", "maximum_range", "range_noise", "range_noise_per_metre",
         "missing", "laser_offset"}},

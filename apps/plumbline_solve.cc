@@ -23,6 +23,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <sstream>
 #include <string>
@@ -66,12 +67,22 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin) {
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   outcome->flags = OwnFlags();
   outcome->delta_threshold = FLAGS_delta_threshold;
-  for (const std::string& line : WriteSolveOutputs(
-           *outcome, SelectOutputs(FLAGS_outputs, *outcome->registry), folder,
-           NumThreadsFromFlags())) {
-    std::fprintf(stderr, "%s\n", line.c_str());
+  std::vector<std::string> reasons;
+  {
+    std::unique_ptr<Progress> progress;
+    reasons = WriteSolveOutputs(
+        *outcome, SelectOutputs(FLAGS_outputs, *outcome->registry), folder,
+        NumThreadsFromFlags(), [&](int done, int total) {
+          if (progress == nullptr) {
+            progress = std::make_unique<Progress>("writing", "files", total);
+          }
+          progress->Update(done);
+        });
   }
+  for (const std::string& reason : reasons) Remark("%s", reason.c_str());
   outcome->summary.write_seconds = Now() - begin;
+  Detail("written to %s in %.1f s", FLAGS_output_dir.c_str(),
+         outcome->summary.write_seconds);
   outcome->summary.total_seconds = Now() - total_begin;
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   WriteSummary(outcome->summary, folder / "summary.json");
@@ -89,6 +100,34 @@ void Summarize(const CostReport& initial, const CostReport& last,
   summary->solve_seconds = em.solve_seconds;
 }
 
+// A line on a phase of EM.
+void TellPhase(const EmPhase& phase) {
+  Detail("EM %d %s: cost %.6g + %.6g, %d structure constraints, %d broken",
+         phase.iteration, phase.phase.c_str(), phase.cost.measurement,
+         phase.cost.structure, phase.structure_constraints,
+         phase.broken_constraints);
+}
+
+// A bar while an input is read.
+class ReadingProgress {
+ public:
+  explicit ReadingProgress(InputStream* input) : input_(input) {
+    input_->SetProgress([this](std::int64_t done, std::int64_t size) {
+      if (progress_ == nullptr) {
+        progress_ = std::make_unique<Progress>("reading", "kB", size / 1000);
+      }
+      progress_->Update(done / 1000);
+    });
+  }
+  ~ReadingProgress() { input_->SetProgress(nullptr); }
+  ReadingProgress(const ReadingProgress&) = delete;
+  ReadingProgress& operator=(const ReadingProgress&) = delete;
+
+ private:
+  InputStream* input_;
+  std::unique_ptr<Progress> progress_;
+};
+
 int SolveLog(InputStream* input, const LogReaderType& reader,
              const Registry& registry, double begin) {
   SolveOutcome outcome;
@@ -99,28 +138,48 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
 
   const double parse_begin = Now();
-  const Log log = reader.read(input, LaserOptionsFromFlags());
+  const Log log = [&] {
+    const ReadingProgress progress(input);
+    return reader.read(input, LaserOptionsFromFlags());
+  }();
   summary.parse_seconds = Now() - parse_begin;
   for (const SkipReport& skip : log.skipped) {
     std::string lines;
     for (int line : skip.first_lines) lines += " " + std::to_string(line);
-    std::fprintf(stderr, "%s: %lld skipped: %s; first at line%s\n",
-                 input->name().c_str(), static_cast<long long>(skip.count),
-                 skip.reason.c_str(), lines.c_str());
+    Remark("%s: %lld skipped: %s; first at line%s", input->name().c_str(),
+           static_cast<long long>(skip.count), skip.reason.c_str(),
+           lines.c_str());
   }
+  Detail("read %zu scans in %.1f s", log.scans.size(), summary.parse_seconds);
 
   LogSolver solver(registry, options);
   LogSolverResult result;
   {
+    const double begin_solving = Now();
     Progress progress("solving", "scans",
                       static_cast<std::int64_t>(log.scans.size()));
+    // What comes after the last scan: its steps are not known beforehand.
+    std::unique_ptr<Progress> finishing;
+    std::int64_t steps = 0;
     result = solver.Run(
         log,
-        [&](std::size_t done, std::size_t) {
+        [&](std::size_t done, std::size_t total) {
           progress.Update(static_cast<std::int64_t>(done));
+          if (done % 500 == 0 || done == total) {
+            Detail("%zu of %zu scans in %.1f s", done, total,
+                   Now() - begin_solving);
+          }
+          if (done == total) {
+            progress.Finish();
+            finishing = std::make_unique<Progress>("adjusting", "steps", 0);
+          }
         },
-        InterruptRequested);
+        [&] {
+          if (finishing != nullptr) finishing->Update(++steps);
+          return InterruptRequested();
+        });
   }
+  for (const EmPhase& phase : solver.trace()) TellPhase(phase);
   summary.scans = static_cast<std::int64_t>(result.trajectory.size());
   summary.skipped = log.skipped;
   summary.frontend_seconds =
@@ -165,6 +224,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   Graph graph;
   G2oFile g2o;
   {
+    const ReadingProgress progress(input);
     std::istringstream text(input->ReadRest());
     if (!input->damage().empty()) {
       throw Error(input->name(), 0, input->damage(), "a whole graph");
@@ -173,9 +233,8 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   }
   summary.parse_seconds = Now() - parse_begin;
   for (const auto& tag : g2o.unknown_tags) {
-    std::fprintf(stderr,
-                 "%s: %d lines with the unknown tag %s kept as they are\n",
-                 input->name().c_str(), tag.second, tag.first.c_str());
+    Remark("%s: %d lines with the unknown tag %s kept as they are",
+           input->name().c_str(), tag.second, tag.first.c_str());
   }
 
   Hierarchy hierarchy;
@@ -192,8 +251,19 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   const CostReport initial_cost = session.Cost();
   EmOrchestrator em(&graph, &session, registry, std::move(hierarchy),
                     options.em);
-  em.SetTrace([&](const EmPhase& phase) { outcome.trace.push_back(phase); });
-  const EmReport report = em.Run(InterruptRequested);
+  em.SetTrace([&](const EmPhase& phase) {
+    outcome.trace.push_back(phase);
+    TellPhase(phase);
+  });
+  EmReport report;
+  {
+    Progress progress("solving", "steps", 0);
+    std::int64_t steps = 0;
+    report = em.Run([&] {
+      progress.Update(++steps);
+      return InterruptRequested();
+    });
+  }
   Summarize(initial_cost, session.Cost(), report, &summary);
   outcome.graph = &graph;
   outcome.registry = &registry;

@@ -5,16 +5,33 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdarg>
 #include <cstdio>
 #include <utility>
 
-DEFINE_bool(quiet, false, "No progress bar.");
+DEFINE_bool(quiet, false, "Print errors only: no progress bars and no remarks");
+DEFINE_bool(verbose, false, "Print what is being done, a line a step");
 
 namespace plumbline {
 namespace {
 
 constexpr std::chrono::milliseconds kPatience(1000);
 constexpr std::chrono::milliseconds kInterval(200);
+
+// There is a bar on the terminal.
+bool bar_is_shown = false;
+
+void WipeBar() {
+  if (!bar_is_shown) return;
+  std::fputs("\r\033[K", stderr);
+  bar_is_shown = false;
+}
+
+void PrintLine(const char* format, va_list arguments) {
+  WipeBar();
+  std::vfprintf(stderr, format, arguments);
+  std::fputc('\n', stderr);
+}
 
 int TerminalColumns() {
   winsize size = {};
@@ -84,6 +101,22 @@ std::string ProgressLine(const std::string& title, const std::string& unit,
   return line;
 }
 
+void Remark(const char* format, ...) {
+  if (FLAGS_quiet) return;
+  va_list arguments;
+  va_start(arguments, format);
+  PrintLine(format, arguments);
+  va_end(arguments);
+}
+
+void Detail(const char* format, ...) {
+  if (FLAGS_quiet || !FLAGS_verbose) return;
+  va_list arguments;
+  va_start(arguments, format);
+  PrintLine(format, arguments);
+  va_end(arguments);
+}
+
 Progress::Progress(std::string title, std::string unit, std::int64_t total)
     : title_(std::move(title)),
       unit_(std::move(unit)),
@@ -106,12 +139,13 @@ void Progress::Update(std::int64_t done) {
   std::fprintf(stderr, "\r\033[K%s", line.c_str());
   std::fflush(stderr);
   visible_ = true;
+  bar_is_shown = true;
   last_shown_ = now;
 }
 
 void Progress::Finish() {
   if (!visible_) return;
-  std::fputs("\r\033[K", stderr);
+  WipeBar();
   std::fflush(stderr);
   visible_ = false;
 }

@@ -14,9 +14,16 @@ std::string ProgressLine(const std::string& title, const std::string& unit,
                          std::int64_t done, std::int64_t total, double seconds,
                          int columns);
 
+/// Prints a line on stderr, as with printf, unless --quiet says otherwise: what
+/// a person may want to know and did not ask for. A progress bar gives way.
+void Remark(const char* format, ...) __attribute__((format(printf, 1, 2)));
+
+/// The same, only with --verbose (and without --quiet): what is being done.
+void Detail(const char* format, ...) __attribute__((format(printf, 1, 2)));
+
 /// A progress bar on stderr for work that takes more than a second. Nothing is
 /// shown while stderr is no terminal or with --quiet; the line is wiped in the
-/// end. Not thread safe.
+/// end. One at a time. Not thread safe.
 class Progress {
  public:
   /// `total` of 0: how much there is to do is not known.

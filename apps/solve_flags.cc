@@ -162,7 +162,8 @@ std::vector<FlagGroup> SolveFlagGroups() {
        {"odometry_refinement", "link_radius", "association_depth",
         "global_association", "refine", "usable_range"}},
       {"Laser", {"laser_start_angle", "laser_step", "laser_max_range"}},
-      {"Running", {"seed", "num_threads", "plugins", "list_plugins"}},
+      {"Running",
+       {"seed", "num_threads", "plugins", "list_plugins", "quiet", "verbose"}},
   };
 }
 

@@ -78,11 +78,14 @@ auto Always(Write write) {
 }
 
 // Runs the tasks on so many threads; the first exception, in the order of
-// tasks, is thrown again when all have ended.
-void RunTasks(const std::vector<std::function<void()>>& tasks, int threads) {
+// tasks, is thrown again when all have ended. `progress` is told how many are
+// done.
+void RunTasks(const std::vector<std::function<void()>>& tasks, int threads,
+              const std::function<void(int, int)>& progress) {
   std::vector<std::exception_ptr> failures(tasks.size());
   std::mutex mutex;
   std::size_t next = 0;
+  int done = 0;
   auto work = [&] {
     for (;;) {
       std::size_t index;
@@ -96,6 +99,9 @@ void RunTasks(const std::vector<std::function<void()>>& tasks, int threads) {
       } catch (...) {
         failures[index] = std::current_exception();
       }
+      std::lock_guard<std::mutex> lock(mutex);
+      ++done;
+      if (progress) progress(done, static_cast<int>(tasks.size()));
     }
   };
   std::vector<std::thread> pool;
@@ -215,9 +221,10 @@ std::set<std::string> SelectOutputs(const std::string& list,
   return selected;
 }
 
-std::vector<std::string> WriteSolveOutputs(const SolveOutcome& outcome,
-                                           const std::set<std::string>& names,
-                                           const path& folder, int threads) {
+std::vector<std::string> WriteSolveOutputs(
+    const SolveOutcome& outcome, const std::set<std::string>& names,
+    const path& folder, int threads,
+    const std::function<void(int, int)>& progress) {
   std::vector<const OutputWriterType*> selected;
   for (const OutputWriterType* output :
        outcome.registry->All<OutputWriterType>()) {
@@ -232,7 +239,7 @@ std::vector<std::string> WriteSolveOutputs(const SolveOutcome& outcome,
       reasons[i] = selected[i]->write(outcome, folder);
     });
   }
-  RunTasks(tasks, threads);
+  RunTasks(tasks, threads, progress);
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < selected.size(); ++i) {
     if (reasons[i].empty()) continue;

@@ -40,10 +40,12 @@ std::set<std::string> SelectOutputs(const std::string& list,
 
 /// Writes the files selected on so many threads. Returns a line for each that
 /// made no sense, with why; throws Error when a file cannot be written.
-std::vector<std::string> WriteSolveOutputs(const SolveOutcome& outcome,
-                                           const std::set<std::string>& names,
-                                           const std::filesystem::path& folder,
-                                           int threads);
+/// `progress` (may be null) is told how many are done and how many there are,
+/// by one thread at a time.
+std::vector<std::string> WriteSolveOutputs(
+    const SolveOutcome& outcome, const std::set<std::string>& names,
+    const std::filesystem::path& folder, int threads,
+    const std::function<void(int, int)>& progress = nullptr);
 
 }  // namespace plumbline
 

@@ -36,6 +36,7 @@ class StoredBytes {
   const char* data() const { return buffer_.data() + begin_; }
   std::size_t size() const { return end_ - begin_; }
   void Consume(std::size_t count) { begin_ += count; }
+  std::int64_t bytes_read() const { return bytes_read_; }
 
   // Reads on until at least `count` bytes are there; false when the end comes
   // first.
@@ -55,6 +56,7 @@ class StoredBytes {
       }
       if (got == 0) return false;
       end_ += static_cast<std::size_t>(got);
+      bytes_read_ += got;
     }
     return true;
   }
@@ -66,6 +68,7 @@ class StoredBytes {
   std::vector<char> buffer_;
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
+  std::int64_t bytes_read_ = 0;
 };
 
 bool StartsWithGzip(const StoredBytes& bytes) {
@@ -96,6 +99,7 @@ class InputStream::Unpacker {
   }
 
   const std::string& damage() const { return damage_; }
+  std::int64_t bytes_read() const { return bytes_->bytes_read(); }
 
   static std::unique_ptr<Unpacker> Create(std::unique_ptr<StoredBytes> bytes);
 
@@ -245,9 +249,10 @@ InputStream::InputStream(const std::string& path) : name_(path) {
     name_ = "standard input";
   }
   auto bytes = std::make_unique<StoredBytes>(name_, descriptor, owned);
-  struct stat status;
+  struct stat status = {};
   if (fstat(descriptor, &status) == 0 && S_ISDIR(status.st_mode))
     throw Error(name_, 0, "is a directory", "a file");
+  if (S_ISREG(status.st_mode)) size_ = status.st_size;
   unpacker_ = Unpacker::Create(std::move(bytes));
 }
 
@@ -269,7 +274,13 @@ bool InputStream::Fill() {
   const std::size_t count =
       unpacker_->Unpack(buffer_.data() + end_, buffer_.size() - end_);
   end_ += count;
+  if (progress_) progress_(unpacker_->bytes_read(), size_);
   return count > 0;
+}
+
+void InputStream::SetProgress(
+    std::function<void(std::int64_t done, std::int64_t size)> progress) {
+  progress_ = std::move(progress);
 }
 
 bool InputStream::ReadLine(std::string_view* line) {

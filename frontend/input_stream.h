@@ -2,6 +2,8 @@
 #define PLUMBLINE_FRONTEND_INPUT_STREAM_H_
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -49,6 +51,12 @@ class InputStream {
   /// std::istream. Throws Error on a read error.
   std::string ReadRest();
 
+  /// `progress` is called whenever more was unpacked, with the bytes taken from
+  /// the file so far, as they are stored, and the file's size (0 when it is not
+  /// known: standard input from a pipe).
+  void SetProgress(
+      std::function<void(std::int64_t done, std::int64_t size)> progress);
+
   /// Number of the line that ReadLine returned last, from 1; 0 before.
   int line_number() const { return line_number_; }
 
@@ -67,6 +75,8 @@ class InputStream {
 
   std::string name_;
   std::unique_ptr<Unpacker> unpacker_;
+  std::function<void(std::int64_t, std::int64_t)> progress_;
+  std::int64_t size_ = 0;
   std::vector<char> buffer_;
   // Unconsumed bytes are buffer_[begin_, end_).
   std::size_t begin_ = 0;

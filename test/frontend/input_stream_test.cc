@@ -5,6 +5,8 @@
 #include <plumbline/frontend/input_stream.h>
 #include <zlib.h>
 
+#include <cstdint>
+#include <cstdio>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -221,6 +223,29 @@ TEST(InputStreamTest, MissingFilesAndDirectoriesAreRefused) {
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("is a directory: expected a file"));
   }
+}
+
+TEST(InputStreamTest, TellsHowFarItIs) {
+  // Several chunks of the buffer, packed by about five.
+  std::string text;
+  for (int i = 0; i < 200000; ++i) text += std::to_string(i * 7919) + "\n";
+  const std::string packed = Gzip(text);
+  const std::string path = ::testing::TempDir() + "/input_stream_progress.gz";
+  std::ofstream(path, std::ios::binary) << packed;
+  InputStream input(path);
+  std::int64_t last = 0;
+  int calls = 0;
+  input.SetProgress([&](std::int64_t done, std::int64_t size) {
+    EXPECT_EQ(size, static_cast<std::int64_t>(packed.size()));
+    EXPECT_GE(done, last);
+    last = done;
+    ++calls;
+  });
+  // Not EXPECT_EQ: what differs would be looked for line by line.
+  EXPECT_TRUE(input.ReadRest() == text);
+  EXPECT_EQ(last, static_cast<std::int64_t>(packed.size()));
+  EXPECT_GT(calls, 3);
+  std::remove(path.c_str());
 }
 
 }  // namespace

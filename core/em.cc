@@ -487,6 +487,14 @@ struct EmOrchestrator::Impl final : public GraphListener {
     return structure;
   }
 
+  // Live structure pulls with its full weight again.
+  void RestoreWeights(const Scope& scope) {
+    for (Constraint* constraint : StructureOf(scope)) {
+      if (1.0 - constraint->delta > kDeltaChange) is_dirty = true;
+      constraint->delta = 1.0;
+    }
+  }
+
   // E-step and breaking; true when something was broken or dropped.
   bool Break(const Scope& scope) {
     bool has_broken = false;
@@ -783,6 +791,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
     ++totals.iterations;
     auto start = std::chrono::steady_clock::now();
     Scope scope = MakeScope(features);
+    if (options.full_weight_test) RestoreWeights(scope);
     Optimize(scope);
     if (!EndPhase("optimize", scope, start)) return false;
 

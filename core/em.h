@@ -38,6 +38,16 @@ struct EmOptions {
   /// largest, then solve and look again, so that what a wrong hypothesis bends
   /// is not broken with it. 0: break all at once (the paper).
   double break_share = 0.0;
+  /// What the E-step judges structure by. False: the solve under the weights of
+  /// the E-step before. A low weight lets the residual grow, and that lowers
+  /// the weight again, until what lies some 1.5 standard deviations of its
+  /// measurements off is broken, however tight the tolerance: right where a
+  /// wrong constraint does more harm than a missing one. True: a solve in which
+  /// all live structure has its full weight, so that delta is the p-value of
+  /// the hypothesis itself; with a tolerance t and measurements that place the
+  /// feature to within m, what is off by more than about t + m^2 / t is broken.
+  /// The M-steps in between weigh by delta either way.
+  bool full_weight_test = false;
   /// The loop ends at the latest after so many iterations.
   int max_iterations = 50;
   /// Converged: nothing added, nothing removed, and the relative change of the
@@ -89,7 +99,7 @@ struct EmReport {
 /// Weights: a constraint enters with delta = 1 and so pulls with its full
 /// weight in the solve that follows; every E-step after a solve gives it the
 /// p-value of its unweighted residual (at least kDeltaFloor), and below the
-/// threshold it is broken.
+/// threshold it is broken (EmOptions::full_weight_test).
 ///
 /// Support: a virtual feature is dropped, with its constraints, when it has
 /// fewer live structure constraints from features of lower levels than its

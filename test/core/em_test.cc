@@ -513,6 +513,38 @@ TEST_F(EmTest, WorstFirstSparesWhatAWrongOneBends) {
   }
 }
 
+TEST_F(EmTest, FullWeightTestHasNoFeedback) {
+  // Seen at 2 degrees to 1 degree, held to 0 with a third of a degree: with the
+  // weight w it is off by 6 / (1 + 9 w) tolerances. With w = 1 these are 0.6,
+  // with the p-value of that, 0.5485, they are 1.0107 (0.3369 degrees). Under
+  // that weight the p-value is 0.312, and under that one 0.115.
+  for (const bool is_full : {false, true}) {
+    SCOPED_TRACE(is_full);
+    const FeatureId wall = AddSegment(2.0);
+    Transaction transaction;
+    Feature orientation = Orientation(registry_, 0.0);
+    orientation.fixed = true;
+    transaction.AddConstraint(Structure(registry_, "segment_orientation", wall,
+                                        transaction.AddFeature(orientation),
+                                        0.0, 1.0 / 3.0));
+    const ConstraintId id =
+        graph_.Apply(std::move(transaction)).constraints.front();
+    EmOptions options;
+    options.full_weight_test = is_full;
+    const EmReport report = Make(options).Run();
+    EXPECT_TRUE(report.converged);
+    const Constraint& constraint = graph_.GetConstraint(id);
+    if (is_full) {
+      EXPECT_EQ(constraint.state, ConstraintState::kLive);
+      EXPECT_NEAR(constraint.delta, 0.5485, 1e-4);
+      EXPECT_NEAR(Direction(wall), 0.3369, 1e-4);
+    } else {
+      EXPECT_EQ(constraint.state, ConstraintState::kBroken);
+      EXPECT_NEAR(Direction(wall), 2.0, 1e-6);
+    }
+  }
+}
+
 TEST_F(EmTest, AHypothesisIsBrokenOnlySoOften) {
   for (int i = 0; i < 5; ++i) AddSegment(0.0);
   const FeatureId wall = AddSegment(5.9);

@@ -21,8 +21,9 @@ struct EmTraceRow {
 /// Writes the rows with a header line: iteration, phase, cost_measurement,
 /// cost_structure, features_<type> for every type that occurs in any row (by
 /// name; 0 where a row has none), structure_constraints, broken_constraints,
-/// seconds, mean_position_error (empty when not known). Numbers read back as
-/// the same doubles.
+/// structure_<relation> and broken_<relation> likewise, seconds,
+/// mean_position_error (empty when not known). Numbers read back as the same
+/// doubles.
 void WriteEmTrace(const std::vector<EmTraceRow>& rows, std::ostream& output);
 
 /// The same into a file, whole or not at all. Throws Error when it cannot be

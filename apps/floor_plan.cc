@@ -160,7 +160,7 @@ std::vector<Face> Faces(const Graph& graph, const MapDrawing& drawing,
     face.begin = -face.end;
     face.weight = face.length();
     face.knows_side = graph.GetFeature(wall.id).type->name == "segment";
-    face.features = {wall.id};
+    face.features = wall.members;
     faces.push_back(std::move(face));
   }
   return faces;

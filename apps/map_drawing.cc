@@ -1,10 +1,12 @@
 #include <cairo-svg.h>
 #include <cairo.h>
 #include <plumbline/apps/map_drawing.h>
+#include <plumbline/apps/merged_walls.h>
 #include <plumbline/apps/xml_text.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/detectors/same_wall.h>
 
 #include <algorithm>
 #include <cmath>
@@ -143,7 +145,7 @@ Bounds BoundsOf(const MapDrawing& drawing) {
   return bounds;
 }
 
-enum class Swatch { kWall, kCircle, kCenter, kPath, kPoint };
+enum class Swatch { kWall, kClosure, kCircle, kCenter, kPath, kPoint };
 
 struct LegendEntry {
   Swatch swatch;
@@ -192,6 +194,9 @@ std::vector<LegendEntry> Legend(const MapDrawing& drawing) {
   if (has_none) {
     legend.push_back({Swatch::kWall, kNoClusterColor,
                       num_clusters > 0 ? "no common direction" : "walls"});
+  }
+  if (!drawing.closures.empty()) {
+    legend.push_back({Swatch::kClosure, kInkColor, "seen again"});
   }
   if (!drawing.circles.empty()) {
     legend.push_back({Swatch::kCircle, kCircleColor, "circles"});
@@ -246,6 +251,8 @@ constexpr double kRowHeight = 22.0;     // units
 constexpr double kSwatchWidth = 26.0;   // units
 constexpr double kWallWidth = 2.0;      // units
 constexpr double kPathWidth = 1.1;      // units
+constexpr double kClosureWidth = 0.5;   // units
+constexpr double kClosureLength = 7.0;  // units
 constexpr double kPointRadius = 1.6;    // units
 constexpr double kCrossReach = 4.0;     // units, of a common centre
 constexpr double kLeastWidth = 420.0;   // units, so that a legend fits
@@ -437,6 +444,26 @@ void DrawWalls(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   }
 }
 
+// A short line across each wall that was seen again.
+void DrawClosures(cairo_t* cr, const MapDrawing& drawing,
+                  const Layout& layout) {
+  if (drawing.closures.empty()) return;
+  SetColor(cr, kInkColor);
+  cairo_set_line_width(cr, kClosureWidth * layout.unit);
+  for (const Pose2& closure : drawing.closures) {
+    if (!IsDrawable(closure[0], closure[1])) continue;
+    const double x = layout.X(closure[0]);
+    const double y = layout.Y(closure[1]);
+    // Across on the page, where y points down.
+    const double half = 0.5 * kClosureLength * layout.unit;
+    const double dx = -std::sin(closure[2]) * half;
+    const double dy = -std::cos(closure[2]) * half;
+    cairo_move_to(cr, x - dx, y - dy);
+    cairo_line_to(cr, x + dx, y + dy);
+  }
+  cairo_stroke(cr);
+}
+
 void DrawCircles(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   SetColor(cr, kCircleColor);
   cairo_set_line_width(cr, kWallWidth * layout.unit);
@@ -513,6 +540,12 @@ void DrawFrame(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
       cairo_new_sub_path(cr);
       cairo_arc(cr, end - 7.0 * unit, baseline - middle, 5.0 * unit, 0.0,
                 2.0 * kPi);
+    } else if (entry.swatch == Swatch::kClosure) {
+      cairo_set_line_width(cr, kClosureWidth * unit);
+      cairo_move_to(cr, end - 7.0 * unit,
+                    baseline - middle - 0.5 * kClosureLength * unit);
+      cairo_line_to(cr, end - 7.0 * unit,
+                    baseline - middle + 0.5 * kClosureLength * unit);
     } else if (entry.swatch == Swatch::kCenter) {
       cairo_set_line_width(cr, 0.75 * kWallWidth * unit);
       AddCross(cr, end - 7.0 * unit, baseline - middle, kCrossReach * unit);
@@ -544,6 +577,7 @@ void Draw(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   DrawPoints(cr, drawing, layout);
   DrawPath(cr, drawing, layout);
   DrawWalls(cr, drawing, layout);
+  DrawClosures(cr, drawing, layout);
   DrawCircles(cr, drawing, layout);
   DrawCenters(cr, drawing, layout);
   DrawFrame(cr, drawing, layout);
@@ -636,6 +670,43 @@ bool WallEnds(const Feature& feature, DrawnWall* wall) {
   return true;
 }
 
+namespace {
+
+// The orientation feature that live structure ties a wall to, or kNoId.
+FeatureId OrientationOf(const Graph& graph, FeatureId wall) {
+  for (const ConstraintId id : graph.ConstraintsOf(wall)) {
+    const Constraint& constraint = graph.GetConstraint(id);
+    if (constraint.state != ConstraintState::kLive ||
+        constraint.kind != ConstraintClass::kStructure) {
+      continue;
+    }
+    for (const FeatureId other : constraint.features) {
+      if (graph.GetFeature(other).type->name == "orientation") return other;
+    }
+  }
+  return kNoId;
+}
+
+// On the first segment, with its direction: the middle of the part where the
+// second lies beside it, or of the gap between them.
+Pose2 MiddleOfCommonPart(const Feature& first, const Feature& second) {
+  const Eigen::Vector2d along(std::cos(first.parameters[2]),
+                              std::sin(first.parameters[2]));
+  const Eigen::Vector2d own(std::cos(second.parameters[2]),
+                            std::sin(second.parameters[2]));
+  const Eigen::Vector2d position(first.parameters[0], first.parameters[1]);
+  const Eigen::Vector2d relative =
+      Eigen::Vector2d(second.parameters[0], second.parameters[1]) - position;
+  const double a = along.dot(relative + second.extent_begin * own);
+  const double b = along.dot(relative + second.extent_end * own);
+  const double middle = 0.5 * (std::max(first.extent_begin, std::min(a, b)) +
+                               std::min(first.extent_end, std::max(a, b)));
+  const Eigen::Vector2d point = position + middle * along;
+  return Pose2(point.x(), point.y(), first.parameters[2]);
+}
+
+}  // namespace
+
 MapDrawing DrawingFromGraph(const Graph& graph,
                             const std::vector<Pose2>& path) {
   MapDrawing drawing;
@@ -643,30 +714,31 @@ MapDrawing DrawingFromGraph(const Graph& graph,
   // Orientation of each wall, and length of wall of each orientation.
   std::vector<FeatureId> orientations;
   std::map<FeatureId, double> lengths;
+  for (const MergedWall& merged : MergeWalls(graph)) {
+    DrawnWall wall;
+    if (!WallEnds(merged.wall, &wall)) continue;
+    wall.members = merged.members;
+    FeatureId orientation = kNoId;
+    for (const FeatureId member : merged.members) {
+      if (orientation == kNoId) orientation = OrientationOf(graph, member);
+    }
+    if (orientation != kNoId) {
+      lengths[orientation] += merged.wall.extent_end - merged.wall.extent_begin;
+    }
+    orientations.push_back(orientation);
+    drawing.walls.push_back(std::move(wall));
+  }
+  for (const Constraint* constraint : graph.Constraints()) {
+    if (constraint->state == ConstraintState::kLive &&
+        constraint->type->name == kSameWallRelation) {
+      drawing.closures.push_back(
+          MiddleOfCommonPart(graph.GetFeature(constraint->features[0]),
+                             graph.GetFeature(constraint->features[1])));
+    }
+  }
   for (const Feature* feature : graph.Features()) {
     const std::string& type = feature->type->name;
-    DrawnWall wall;
-    if (WallEnds(*feature, &wall)) {
-      FeatureId orientation = kNoId;
-      for (const ConstraintId id : graph.ConstraintsOf(feature->id)) {
-        const Constraint& constraint = graph.GetConstraint(id);
-        if (constraint.state != ConstraintState::kLive ||
-            constraint.kind != ConstraintClass::kStructure) {
-          continue;
-        }
-        for (const FeatureId other : constraint.features) {
-          if (orientation == kNoId &&
-              graph.GetFeature(other).type->name == "orientation") {
-            orientation = other;
-          }
-        }
-      }
-      if (orientation != kNoId) {
-        lengths[orientation] += feature->extent_end - feature->extent_begin;
-      }
-      orientations.push_back(orientation);
-      drawing.walls.push_back(wall);
-    } else if (type == "circle") {
+    if (type == "circle") {
       drawing.circles.push_back({feature->parameters[0], feature->parameters[1],
                                  feature->parameters[2], feature->id});
     } else if (type == "point") {

@@ -19,6 +19,8 @@ struct DrawnWall {
   /// Index into MapDrawing::cluster_directions, or -1 for none.
   int cluster = -1;
   FeatureId id = kNoId;
+  /// What was merged into it, ascending (MergeWalls); empty stands for the id.
+  std::vector<FeatureId> members;
 };
 
 /// A round thing, m, map frame.
@@ -34,6 +36,9 @@ struct DrawnCircle {
 struct MapDrawing {
   std::vector<DrawnWall> walls;
   std::vector<DrawnCircle> circles;
+  /// Where walls of different visits were found to be one: x, y (m, map frame),
+  /// direction of the wall (rad). A thin mark across the wall.
+  std::vector<Pose2> closures;
   /// Drawn thin and light under the walls.
   std::vector<Pose2> path;
   /// Scan points or landmarks, m, map frame: faint, under everything.

@@ -1,9 +1,13 @@
 #include <plumbline/apps/map_truth.h>
+#include <plumbline/apps/merged_walls.h>
+#include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
+#include <plumbline/detectors/same_wall.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -97,6 +101,31 @@ class Entry {
   std::string path_;
 };
 
+// Closures of a map.json; one that names no segment of the map is refused.
+void ReadClosures(const Entry& root, StraightMap* map) {
+  if (!root.Has("constraints")) return;
+  std::set<std::int64_t> segments;
+  for (const MapSegment& segment : map->segments) segments.insert(segment.id);
+  for (const Entry& entry : root["constraints"].Elements()) {
+    if (entry["type"].Text() != kSameWallRelation) continue;
+    const std::vector<Entry> features = entry["features"].Elements();
+    if (features.size() != 2) {
+      entry["features"].Refuse("does not have 2 elements", "two segments");
+    }
+    MapClosure closure;
+    closure.first = features[0].Integer();
+    closure.second = features[1].Integer();
+    closure.is_live = entry["state"].Text() == "live";
+    for (const std::int64_t id : {closure.first, closure.second}) {
+      if (segments.count(id) == 0) {
+        entry["features"].Refuse("names " + std::to_string(id),
+                                 "segments of the map");
+      }
+    }
+    map->closures.push_back(closure);
+  }
+}
+
 Json ParseJson(InputStream* input, const std::string& expected) {
   const std::string text = input->ReadRest();
   if (!input->damage().empty())
@@ -174,6 +203,31 @@ struct Wall {
   double direction_sum = 0.0;
   double offset_sum = 0.0;
 };
+
+// Segments that live closures join as one, under the lowest id.
+std::vector<MapSegment> Merged(const StraightMap& map) {
+  std::map<std::int64_t, std::size_t> index;
+  for (std::size_t i = 0; i < map.segments.size(); ++i) {
+    index[map.segments[i].id] = i;
+  }
+  DisjointSets sets(map.segments.size());
+  for (const MapClosure& closure : map.closures) {
+    if (!closure.is_live) continue;
+    sets.Join(index.at(closure.first), index.at(closure.second));
+  }
+  std::map<std::size_t, std::vector<WallPiece>> classes;
+  for (std::size_t i = 0; i < map.segments.size(); ++i) {
+    const MapSegment& segment = map.segments[i];
+    classes[sets.Find(i)].push_back({segment.pose, segment.begin, segment.end});
+  }
+  std::vector<MapSegment> merged;
+  for (const auto& [root, pieces] : classes) {
+    const WallPiece united = UnitePieces(pieces);
+    merged.push_back(
+        {map.segments[root].id, united.pose, united.begin, united.end});
+  }
+  return merged;
+}
 
 }  // namespace
 
@@ -269,6 +323,7 @@ StraightMap ReadStraightMap(InputStream* input) {
       entry.Refuse("is absurd", "metres");
     map.segments.push_back(segment);
   }
+  ReadClosures(root, &map);
   return map;
 }
 
@@ -350,8 +405,9 @@ MapTruthEvaluation EvaluateMap(const StraightMap& map, const MapTruth& truth,
 
   double map_length = 0.0;
   double right_length = 0.0;
+  const std::vector<MapSegment> merged = Merged(map);
   std::vector<std::size_t> candidates;
-  for (const MapSegment& segment : map.segments) {
+  for (const MapSegment& segment : merged) {
     const Pose2 pose = Compose(alignment, segment.pose);
     const Eigen::Vector2d direction(std::cos(pose[2]), std::sin(pose[2]));
     const double length = segment.end - segment.begin;

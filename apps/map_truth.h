@@ -58,10 +58,20 @@ struct MapOrientation {
   double angle = 0.0;
 };
 
+/// Two segments of a map that a closure says are one wall.
+struct MapClosure {
+  std::int64_t first = 0;
+  std::int64_t second = 0;
+  /// False: it was broken.
+  bool is_live = true;
+};
+
 /// What of a map can be compared with the truth.
 struct StraightMap {
-  /// Features of type segment and line.
+  /// Features of type segment and line, each as it stands in the graph.
   std::vector<MapSegment> segments;
+  /// In the order of the file.
+  std::vector<MapClosure> closures;
   /// Features of type orientation.
   std::vector<MapOrientation> orientations;
 };
@@ -131,8 +141,8 @@ struct MapTruthEvaluation {
   std::vector<int> missed_walls;
   /// Ids of map features that match no wall.
   std::vector<std::int64_t> false_walls;
-  /// Length of map segments beyond the first on the same part of a wall, m:
-  /// walls that the map has twice.
+  /// Length of walls of the map beyond the first on the same part of a wall, m:
+  /// walls that the map has twice. Segments that live closures join are one.
   double doubled_length = 0.0;
   /// Parts of the length that were found (of what was seen) and that are right
   /// (of the map's segments of at least the minimum length), 0 to 1; 1 when
@@ -148,9 +158,10 @@ struct MapTruthEvaluation {
   int duplicate_orientations = 0;
 };
 
-/// Compares a map, moved by `alignment`, with the truth. Every few centimetres
-/// of a map segment count for the nearest wall that is parallel to it, so that
-/// the two faces of a thin wall are told apart.
+/// Compares a map, moved by `alignment`, with the truth. Segments that live
+/// closures join count as one wall (UnitePieces). Every few centimetres of a
+/// wall of the map count for the nearest true wall that is parallel to it, so
+/// that the two faces of a thin wall are told apart.
 MapTruthEvaluation EvaluateMap(
     const StraightMap& map, const MapTruth& truth, const Pose2& alignment,
     const MapTruthOptions& options = MapTruthOptions());

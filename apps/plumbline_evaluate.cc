@@ -3,6 +3,7 @@
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/app.h>
+#include <plumbline/apps/closure_truth.h>
 #include <plumbline/apps/map_truth.h>
 #include <plumbline/apps/relations.h>
 #include <plumbline/core/atomic_file.h>
@@ -144,6 +145,13 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
   PrintAngles("false orientations", evaluation.false_orientations_deg);
   std::printf("duplicate orientations: %d\n",
               evaluation.duplicate_orientations);
+  const ClosureEvaluation closures =
+      EvaluateClosures(map, truth, alignment, options);
+  std::printf(
+      "closures: %d right, %d wrong; broken: %d right, %d wrong; revisits "
+      "closed: %d of %d\n",
+      closures.right, closures.wrong, closures.broken_right,
+      closures.broken_wrong, closures.closed_revisits, closures.revisits);
 
   Json walls = Json::array();
   for (const WallResult& wall : evaluation.walls) {
@@ -174,6 +182,14 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
               {"missed_orientations_deg", evaluation.missed_orientations_deg},
               {"false_orientations_deg", evaluation.false_orientations_deg},
               {"duplicate_orientations", evaluation.duplicate_orientations},
+              {"closures",
+               {{"right", closures.right},
+                {"wrong", closures.wrong},
+                {"broken_right", closures.broken_right},
+                {"broken_wrong", closures.broken_wrong},
+                {"wrong_pairs", closures.wrong_pairs},
+                {"revisits", closures.revisits},
+                {"closed_revisits", closures.closed_revisits}}},
               {"walls", walls}};
 }
 

@@ -52,7 +52,7 @@ DEFINE_double(structure_sigma_point_point_coincidence, 0.05,
               "Tolerance of the centre of a circle against a common centre, m");
 PLUMBLINE_FLAG_RANGE(structure_sigma_point_point_coincidence, 1e-5, 10.0);
 
-DEFINE_double(structure_sigma_same_wall, 0.02,
+DEFINE_double(structure_sigma_same_wall, 0.05,
               "Tolerance of a wall seen on two visits against itself, across, "
               "m");
 PLUMBLINE_FLAG_RANGE(structure_sigma_same_wall, 1e-4, 1.0);

@@ -1,7 +1,9 @@
 #include <plumbline/apps/map_drawing.h>
+#include <plumbline/apps/merged_walls.h>
 #include <plumbline/apps/summary.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/detectors/same_wall.h>
 #include <plumbline/factors/angle.h>
 #include <sys/resource.h>
 
@@ -110,12 +112,13 @@ std::optional<double> OrthogonalityDeg(
 
 std::optional<double> OrthogonalityDeg(const Graph& graph) {
   std::vector<WallDirection> walls;
-  for (const Feature* feature : graph.Features()) {
+  for (const MergedWall& merged : MergeWalls(graph)) {
+    const Feature& wall = merged.wall;
     DrawnWall ends;
-    if (!WallEnds(*feature, &ends)) continue;
-    const int angle = feature->type->name == "line" ? 1 : 2;
-    walls.push_back({feature->parameters[angle],
-                     feature->extent_end - feature->extent_begin});
+    if (!WallEnds(wall, &ends)) continue;
+    const int angle = wall.type->name == "line" ? 1 : 2;
+    walls.push_back(
+        {wall.parameters[angle], wall.extent_end - wall.extent_begin});
   }
   return OrthogonalityDeg(walls);
 }
@@ -152,6 +155,14 @@ void CountGraph(const Graph& graph, Summary* summary) {
     } else {
       ++counts.measurement;
     }
+  }
+  summary->closures = {};
+  const auto closures = summary->constraints.find(kSameWallRelation);
+  if (closures != summary->constraints.end()) {
+    summary->closures.live = closures->second.structure;
+    summary->closures.broken = closures->second.broken;
+    summary->closures.proposed =
+        summary->closures.live + summary->closures.broken;
   }
   summary->orthogonality_deg = OrthogonalityDeg(graph);
 }
@@ -196,6 +207,9 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
                     {"write", summary.write_seconds}};
   json["peak_memory_bytes"] = summary.peak_memory_bytes;
   json["orthogonality_deg"] = OptionalToJson(summary.orthogonality_deg);
+  json["closures"] = {{"proposed", summary.closures.proposed},
+                      {"live", summary.closures.live},
+                      {"broken", summary.closures.broken}};
   json["version"] = kVersion;
   if (summary.scans > 0) {
     Json skipped = Json::array();

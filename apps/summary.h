@@ -30,7 +30,7 @@ struct WallDirection {
 /// with the most wall around it. None without any wall of at least 1 m.
 std::optional<double> OrthogonalityDeg(const std::vector<WallDirection>& walls);
 
-/// The same over the segments and lines of a graph.
+/// The same over the walls of a graph (MergeWalls).
 std::optional<double> OrthogonalityDeg(const Graph& graph);
 
 /// Most memory that the process has held so far, bytes.
@@ -60,6 +60,15 @@ struct Summary {
   /// By relation name.
   std::map<std::string, ConstraintCounts> constraints;
 
+  /// Closures: hypotheses that walls of different visits are one, all that
+  /// were taken up, those that still hold, and those that were broken.
+  struct Closures {
+    std::int64_t proposed = 0;
+    std::int64_t live = 0;
+    std::int64_t broken = 0;
+  };
+  Closures closures;
+
   /// Sums of squared whitened residuals (CostReport): before anything was
   /// optimized, and at the end.
   double initial_cost = 0.0;
@@ -86,7 +95,7 @@ struct Summary {
   std::vector<double> scan_seconds;
 };
 
-/// Fills in features, constraints and orthogonality_deg.
+/// Fills in features, constraints, closures and orthogonality_deg.
 void CountGraph(const Graph& graph, Summary* summary);
 
 /// Writes the keys of the product's contract, in its order: input, seed, flags,
@@ -94,9 +103,10 @@ void CountGraph(const Graph& graph, Summary* summary);
 /// structure, broken}}}, cost {initial, measurement, structure, total}, em
 /// {iterations, converged}, time_s {total, parse, frontend, detect, solve,
 /// write}, peak_memory_bytes, orthogonality_deg (null when there is no wall),
-/// version; for a log also frontend {skipped [{reason, count, first_lines}],
-/// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
-/// (their quotient)}. Numbers that are not finite become null.
+/// closures {proposed, live, broken}, version; for a log also frontend {skipped
+/// [{reason, count, first_lines}], scan_seconds_second_tenth,
+/// scan_seconds_last_tenth, scan_seconds_growth (their quotient)}. Numbers that
+/// are not finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// The same into a file, whole or not at all. Throws Error when it cannot be

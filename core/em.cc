@@ -178,23 +178,34 @@ struct EmOrchestrator::Impl final : public GraphListener {
     if (constraint.state == ConstraintState::kBroken) {
       broken_on_record.insert(constraint.id);
       if (constraint.kind == ConstraintClass::kStructure) {
+        ++broken_by_relation[constraint.type->name];
         RememberBroken(constraint);
       }
     } else if (constraint.kind == ConstraintClass::kStructure) {
       ++structure_count;
+      ++structure_by_relation[constraint.type->name];
     }
   }
 
   void OnConstraintChanged(const Constraint&) override { is_dirty = true; }
 
   void OnConstraintRetired(const Constraint& constraint) override {
-    if (broken_on_record.erase(constraint.id) > 0) return;  // broken before
-    is_dirty = true;
     const bool is_structure = constraint.kind == ConstraintClass::kStructure;
-    if (is_structure) --structure_count;
+    if (broken_on_record.erase(constraint.id) > 0) {  // broken before
+      if (is_structure) --broken_by_relation[constraint.type->name];
+      return;
+    }
+    is_dirty = true;
+    if (is_structure) {
+      --structure_count;
+      --structure_by_relation[constraint.type->name];
+    }
     if (graph->FindConstraint(constraint.id) != nullptr) {
       broken_on_record.insert(constraint.id);
-      if (is_structure) RememberBroken(constraint);
+      if (is_structure) {
+        ++broken_by_relation[constraint.type->name];
+        RememberBroken(constraint);
+      }
     }
     for (const FeatureId id : constraint.features) {
       const Feature* feature = graph->FindFeature(id);
@@ -781,6 +792,8 @@ struct EmOrchestrator::Impl final : public GraphListener {
       phase.features = feature_counts;
       phase.structure_constraints = structure_count;
       phase.broken_constraints = static_cast<int>(broken_on_record.size());
+      phase.structure_by_relation = structure_by_relation;
+      phase.broken_by_relation = broken_by_relation;
       trace(phase);
     }
     if (stop && stop()) is_stopped = true;
@@ -836,6 +849,8 @@ struct EmOrchestrator::Impl final : public GraphListener {
   std::map<std::string, int> feature_counts;
   std::set<ConstraintId> broken_on_record;
   int structure_count = 0;
+  std::map<std::string, int> structure_by_relation;
+  std::map<std::string, int> broken_by_relation;
   int highest_level = 0;
   // The graph or a weight changed since the last global solve.
   bool is_dirty = true;

@@ -81,6 +81,9 @@ struct EmPhase {
   /// is dropped).
   int structure_constraints = 0;
   int broken_constraints = 0;
+  /// The same by relation name; of structure only.
+  std::map<std::string, int> structure_by_relation;
+  std::map<std::string, int> broken_by_relation;
   /// Time of this phase.
   double seconds = 0.0;
 };

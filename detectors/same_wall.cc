@@ -67,7 +67,8 @@ class Search {
       walls_.push_back(wall);
     }
     classes_ = std::make_unique<DisjointSets>(walls_.size());
-    parts_ = std::make_unique<DisjointSets>(walls_.size());
+    parts_ = std::make_unique<DisjointSets>(
+        static_cast<std::size_t>(graph.feature_id_end()));
     ReadConstraints();
     MakePlaces();
   }
@@ -84,6 +85,12 @@ class Search {
   void ReadConstraints() {
     links_.resize(walls_.size());
     for (const Constraint* constraint : graph_.Constraints()) {
+      if (constraint->state == ConstraintState::kLive) {
+        for (const FeatureId id : constraint->features) {
+          parts_->Join(static_cast<std::size_t>(constraint->features[0]),
+                       static_cast<std::size_t>(id));
+        }
+      }
       if (constraint->features.size() != 2) continue;
       const auto first = index_.find(constraint->features[0]);
       const auto second = index_.find(constraint->features[1]);
@@ -95,11 +102,9 @@ class Search {
         const double way = (walls_[i].position - walls_[j].position).norm();
         links_[i].push_back({j, way});
         links_[j].push_back({i, way});
-        parts_->Join(i, j);
       } else if (constraint->type->name == kSameWallRelation) {
         if (constraint->state == ConstraintState::kLive) {
           classes_->Join(i, j);
-          parts_->Join(i, j);
         } else {
           broken_.insert(Ordered(i, j));
         }
@@ -351,7 +356,8 @@ class Search {
         WallMatch match;
         if (!LieOnEachOther(walls_[i], walls_[j], &match)) continue;
         if (classes_->Find(i) == classes_->Find(j) ||
-            parts_->Find(i) != parts_->Find(j)) {
+            parts_->Find(static_cast<std::size_t>(walls_[i].id)) !=
+                parts_->Find(static_cast<std::size_t>(walls_[j].id))) {
           continue;
         }
         others.push_back(walls_[j].id);
@@ -439,7 +445,7 @@ class Search {
   // Of each wall the walls that measurements tie it to and how far they are.
   std::vector<std::vector<std::pair<int, double>>> links_;
   std::set<Pair> broken_;
-  // Walls that closures make one, and that anything connects.
+  // Walls that closures make one, and features that anything connects, by id.
   std::unique_ptr<DisjointSets> classes_;
   std::unique_ptr<DisjointSets> parts_;
   std::vector<Place> places_;

@@ -12,7 +12,7 @@ namespace plumbline {
 /// Which walls are taken for one, and how tightly they are tied.
 struct SameWallOptions {
   /// Tolerance of a wall seen twice: across (m) and direction (rad).
-  double sigma_offset = 0.02;
+  double sigma_offset = 0.05;
   double sigma_angle = DegToRad(0.3);
   /// Segments with a shorter visible part are left out, m.
   double min_length = 0.4;

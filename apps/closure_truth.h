@@ -1,0 +1,43 @@
+#ifndef PLUMBLINE_APPS_CLOSURE_TRUTH_H_
+#define PLUMBLINE_APPS_CLOSURE_TRUTH_H_
+
+#include <plumbline/apps/map_truth.h>
+#include <plumbline/factors/pose2.h>
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+
+/// Closures of a map against the truth.
+struct ClosureEvaluation {
+  /// Live closures that join two segments of one face of a true wall, and those
+  /// that do not.
+  int right = 0;
+  int wrong = 0;
+  /// Broken ones, likewise.
+  int broken_right = 0;
+  int broken_wrong = 0;
+  /// Ids of the segments that the wrong live ones join.
+  std::vector<std::pair<std::int64_t, std::int64_t>> wrong_pairs;
+  /// Where n segments of at least the minimum length lie side by side on one
+  /// face, it was visited again n - 1 times.
+  int revisits = 0;
+  /// How many of these ended as one wall, also by way of other segments.
+  int closed_revisits = 0;
+};
+
+/// Compares the closures of a map, moved by `alignment`, with the truth. A
+/// segment belongs to the face that most of it lies on, within the options'
+/// offset and direction: of the faces that look its way (the room is on the
+/// left of a segment, and on the right of a true wall) the nearest, of others
+/// only where there is none. Faces in line are one face: doors cut walls into
+/// pieces. A segment that lies on nothing makes its closures wrong.
+ClosureEvaluation EvaluateClosures(
+    const StraightMap& map, const MapTruth& truth, const Pose2& alignment,
+    const MapTruthOptions& options = MapTruthOptions());
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_APPS_CLOSURE_TRUTH_H_

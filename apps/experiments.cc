@@ -39,11 +39,6 @@ constexpr int kDrawnIterations = 6;
 // their weights fall; and a tight one, to which the noise is much.
 constexpr double kConcentricSigma = 0.1;
 constexpr double kTightSigma = 0.02;
-// S5: tolerance of points on a line, m. The experiment is about structure that
-// is clearly wrong, by 0.1 m, but near enough to be taken for right: how far
-// from its line a true point may be is then known to be much less. To the
-// default of 0.05 m, 0.1 m are nothing unusual.
-constexpr double kStreetSigma = 0.02;
 // R2: the first part of the log, scans.
 constexpr std::size_t kFirstPart = 4500;
 
@@ -177,6 +172,7 @@ SyntheticRunOptions RunOptions(const ExperimentOptions& options,
   SyntheticRunOptions run;
   run.delta_mode = options.delta_mode;
   run.delta_threshold = options.delta_threshold;
+  run.full_weight_test = options.full_weight_test;
   run.hierarchy = options.hierarchy;
   run.detector_parameters = options.detector_parameters;
   run.seed = seed;
@@ -318,9 +314,6 @@ struct Case {
   std::string delta_mode;
   bool break_constraints = true;
   bool with_outliers = true;
-  // Tolerance of points on lines, m, where the options do not set it; 0: the
-  // detector's.
-  double line_sigma = 0.0;
   StructureMatchOptions match;
   // Draws maps of the first trial, with this before their names; null: none.
   const char* maps = nullptr;
@@ -335,10 +328,6 @@ void RunCase(const Case& the_case, const ExperimentOptions& options,
   run_options.break_constraints = the_case.break_constraints;
   run_options.with_outliers = the_case.with_outliers;
   run_options.match = the_case.match;
-  if (the_case.line_sigma > 0.0) {
-    run_options.detector_parameters["line_ransac"].emplace("sigma",
-                                                           the_case.line_sigma);
-  }
   const auto make = [&] {
     return MakeSyntheticWorld(the_case.world, the_case.world_options, job->seed,
                               registry);
@@ -597,7 +586,6 @@ void RunS5(const ExperimentOptions& options, const Registry& registry,
   for (Case& the_case : cases) {
     the_case.world = "S5";
     the_case.world_options = DefaultSyntheticOptions("S5");
-    the_case.line_sigma = kStreetSigma;
   }
   const std::vector<Job> jobs = RunCases(cases, options, registry, result);
 
@@ -611,8 +599,6 @@ void RunS5(const ExperimentOptions& options, const Registry& registry,
   result->notes.push_back(
       "'kept' lets every constraint pull with its full weight to the end; "
       "'weighted' keeps all of them but lets delta weigh them.");
-  result->notes.push_back("Tolerance of points on lines: " +
-                          Format("%g m.", kStreetSigma));
   LinePlot plot = EvolutionPlot(
       jobs, {cases[0].condition, cases[1].condition, cases[2].condition},
       "S5: error with wrong structure kept and removed", kPointError);
@@ -650,6 +636,7 @@ void RunConcentricity(Concentricity method, double sigma,
   AddConcentricity(method, sigma, registry, world.graph.get());
   EmOptions em_options;
   em_options.delta_threshold = options.delta_threshold;
+  em_options.full_weight_test = options.full_weight_test;
   em_options.seed = job->seed;
   EmOrchestrator em(world.graph.get(), session.get(), registry, Hierarchy(),
                     em_options);
@@ -913,6 +900,7 @@ SyntheticRun RunOnWorld(const Registry& registry,
   EmOptions em_options;
   em_options.delta_threshold = options.delta_threshold;
   em_options.break_constraints = options.break_constraints;
+  em_options.full_weight_test = options.full_weight_test;
   em_options.seed = options.seed;
   EmOrchestrator em(world->graph.get(), session.get(), registry,
                     MakeHierarchy(options.hierarchy, registry, {"point"},
@@ -956,6 +944,7 @@ OracleErrors RunOracle(const Registry& registry,
       MeanPositionError(*world->graph, world->truth, options.with_outliers);
   EmOptions em_options;
   em_options.break_constraints = false;
+  em_options.full_weight_test = options.full_weight_test;
   EmOrchestrator em(world->graph.get(), session.get(), registry, Hierarchy(),
                     em_options);
   em.Run(options.stop);

@@ -37,6 +37,8 @@ struct ExperimentOptions {
   /// Weighting of structure constraints and where they are broken.
   std::string delta_mode = "frozen";
   double delta_threshold = 0.3;
+  /// EmOptions::full_weight_test of the synthetic experiments.
+  bool full_weight_test = true;
   std::string hierarchy = kSyntheticHierarchy;
   std::map<std::string, DetectorParameters> detector_parameters;
   /// Folder with the public logs (R1, R2); empty: they are skipped.
@@ -135,6 +137,7 @@ struct SyntheticRun {
 struct SyntheticRunOptions {
   std::string delta_mode = "frozen";
   double delta_threshold = 0.3;
+  bool full_weight_test = true;
   bool break_constraints = true;
   std::string hierarchy = kSyntheticHierarchy;
   std::map<std::string, DetectorParameters> detector_parameters;

@@ -9,9 +9,11 @@
 #include <plumbline/detectors/builtins.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <string>
 #include <system_error>
@@ -34,8 +36,14 @@ PLUMBLINE_FLAG_CHOICES(delta_mode, "frozen", "continuous", "huber", "cauchy",
 DEFINE_double(delta_threshold, 0.3,
               "Structure constraints with a smaller delta are broken.");
 PLUMBLINE_FLAG_RANGE(delta_threshold, 0, 1);
+DEFINE_bool(full_weight_test, true,
+            "S1 to S6: judge structure by a solve in which all of it has its "
+            "full weight.");
 DEFINE_string(hierarchy, plumbline::kSyntheticHierarchy,
               "Detectors by level in the synthetic experiments.");
+DEFINE_string(detector_parameters, "",
+              "Parameters of detectors other than their defaults, as "
+              "detector.name=value, separated by commas.");
 
 namespace plumbline {
 namespace {
@@ -51,6 +59,35 @@ std::vector<std::string> SelectedExperiments() {
                 "S1, S2, S3, S4, S5, S6, R1, R2 or all");
   }
   return {FLAGS_experiment};
+}
+
+// "detector.name=value,..." by detector.
+std::map<std::string, DetectorParameters> ParseDetectorParameters(
+    const std::string& text) {
+  std::map<std::string, DetectorParameters> parameters;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string entry = text.substr(begin, end - begin);
+    const std::size_t dot = entry.find('.');
+    const std::size_t equals = entry.find('=');
+    double value = 0.0;
+    const char* const last = entry.data() + entry.size();
+    if (dot != std::string::npos && equals != std::string::npos &&
+        dot < equals) {
+      const auto parsed =
+          std::from_chars(entry.data() + equals + 1, last, value);
+      if (parsed.ec == std::errc() && parsed.ptr == last) {
+        parameters[entry.substr(0, dot)]
+                  [entry.substr(dot + 1, equals - dot - 1)] = value;
+        begin = end + 1;
+        continue;
+      }
+    }
+    throw Error("--detector_parameters", 0, "cannot read '" + entry + "'",
+                "detector.name=value, as in line_ransac.sigma=0.02");
+  }
+  return parameters;
 }
 
 int Run() {
@@ -75,7 +112,10 @@ int Run() {
           : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   options.delta_mode = FLAGS_delta_mode;
   options.delta_threshold = FLAGS_delta_threshold;
+  options.full_weight_test = FLAGS_full_weight_test;
   options.hierarchy = FLAGS_hierarchy;
+  options.detector_parameters =
+      ParseDetectorParameters(FLAGS_detector_parameters);
   if (const char* datasets = std::getenv("PLUMBLINE_DATASETS")) {
     options.datasets = datasets;
   }
@@ -124,7 +164,9 @@ int main(int argc, char** argv) {
       "plumbline_experiments --experiment=S1 --trials=20 --output_dir=results";
   info.groups = {
       {"Experiment", {"experiment", "trials", "seed", "num_threads"}},
-      {"Method", {"delta_mode", "delta_threshold", "hierarchy"}},
+      {"Method",
+       {"delta_mode", "delta_threshold", "full_weight_test", "hierarchy",
+        "detector_parameters"}},
       {"Output", {"output_dir", "quiet", "verbose"}}};
   plumbline::ParseFlags(info, argc, argv);
   return plumbline::RunMain(plumbline::Run);

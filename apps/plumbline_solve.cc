@@ -218,7 +218,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   summary.input = FLAGS_input;
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
-  const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
+  LogSolverOptions options = LogSolverOptionsFromFlags(registry);
 
   const double parse_begin = Now();
   Graph graph;
@@ -243,6 +243,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
     for (const Feature* feature : graph.Features()) {
       if (feature->level == 0) raw.insert(feature->type->name);
     }
+    options.em.full_weight_test = FullWeightTestFromFlags(raw);
     hierarchy = MakeHierarchy(
         options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
         registry, {raw.begin(), raw.end()}, options.detector_parameters);

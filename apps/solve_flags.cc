@@ -42,10 +42,10 @@ PLUMBLINE_FLAG_RANGE(structure_sigma_segment_orientation, 1e-3, 45.0);
 DEFINE_double(structure_sigma_orientation_orientation, 0.02,
               "Tolerance of the angle between two orientations, degrees");
 PLUMBLINE_FLAG_RANGE(structure_sigma_orientation_orientation, 1e-3, 45.0);
-DEFINE_double(structure_sigma_point_line_distance, 0.05,
+DEFINE_double(structure_sigma_point_line_distance, 0.02,
               "Tolerance of a point against its line, m");
 PLUMBLINE_FLAG_RANGE(structure_sigma_point_line_distance, 1e-5, 10.0);
-DEFINE_double(structure_sigma_point_circle_distance, 0.05,
+DEFINE_double(structure_sigma_point_circle_distance, 0.02,
               "Tolerance of a point against its circle, m");
 PLUMBLINE_FLAG_RANGE(structure_sigma_point_circle_distance, 1e-5, 10.0);
 DEFINE_double(structure_sigma_point_point_coincidence, 0.05,
@@ -63,6 +63,11 @@ PLUMBLINE_FLAG_RANGE(structure_sigma_same_wall_angle, 1e-3, 45.0);
 DEFINE_double(delta_threshold, 0.3,
               "Break structure whose delta (p-value) is below it");
 PLUMBLINE_FLAG_RANGE(delta_threshold, 0.0, 1.0);
+DEFINE_string(full_weight_test, "auto",
+              "Judge structure by a solve in which all of it has its full "
+              "weight, in place of the weights of the last test: true, false, "
+              "auto (true for graphs of points)");
+PLUMBLINE_FLAG_CHOICES(full_weight_test, "auto", "true", "false");
 DEFINE_string(delta_mode, "frozen",
               "Weighting of structure: frozen, continuous, huber, cauchy, "
               "tukey, geman_mcclure, dcs");
@@ -157,7 +162,8 @@ std::vector<FlagGroup> SolveFlagGroups() {
         "structure_sigma_point_circle_distance",
         "structure_sigma_point_point_coincidence"}},
       {"Expectation maximization",
-       {"delta_threshold", "delta_mode", "em_every", "em_max_iterations"}},
+       {"delta_threshold", "delta_mode", "full_weight_test", "em_every",
+        "em_max_iterations"}},
       {"Front-end",
        {"odometry_refinement", "link_radius", "association_depth",
         "global_association", "refine", "usable_range"}},
@@ -201,6 +207,7 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.builder.association_depth = FLAGS_association_depth;
   options.session.delta_mode = FLAGS_delta_mode;
   options.em.delta_threshold = FLAGS_delta_threshold;
+  options.em.full_weight_test = FLAGS_full_weight_test == "true";
   options.em.max_iterations = FLAGS_em_max_iterations;
   options.em.seed = FLAGS_seed;
   options.em_every = FLAGS_em_every;
@@ -213,6 +220,11 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.adjustment.points = options.odometry.points;
   options.adjustment.num_threads = NumThreadsFromFlags();
   return options;
+}
+
+bool FullWeightTestFromFlags(const std::set<std::string>& raw_feature_types) {
+  if (FLAGS_full_weight_test != "auto") return FLAGS_full_weight_test == "true";
+  return raw_feature_types.count("point") > 0;
 }
 
 OccupancyOptions OccupancyOptionsFromFlags() {

@@ -8,6 +8,8 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/log_reader.h>
 
+#include <set>
+#include <string>
 #include <vector>
 
 DECLARE_string(input);
@@ -31,6 +33,9 @@ std::vector<FlagGroup> SolveFlagGroups();
 /// that structure tolerances are handed to. Throws Error for values that do
 /// not fit together or do not parse.
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry);
+
+/// EmOptions::full_weight_test for a graph with these types of raw features.
+bool FullWeightTestFromFlags(const std::set<std::string>& raw_feature_types);
 
 /// Resolution and range of occupancy.pgm.
 OccupancyOptions OccupancyOptionsFromFlags();

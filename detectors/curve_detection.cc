@@ -35,14 +35,16 @@ class CurveDetection {
       : points_(graph, scope, kReach),
         options_(options),
         kind_(kind),
-        curves_of_(static_cast<std::size_t>(points_.size()), 0),
-        support_stamp_(curves_of_.size(), 0) {
+        entries_of_(static_cast<std::size_t>(points_.size())),
+        support_stamp_(entries_of_.size(), 0) {
     Load(graph);
     // Until a further call would find nothing.
     for (int round = 0; round < kMaxRounds; ++round) {
+      IndexEntries();
       bool has_changed = Merge();
-      for (Entry& entry : entries_) {
-        if (entry.found.curve.kind == kind_ && Extend(&entry)) {
+      if (has_changed) IndexEntries();
+      for (std::size_t e = 0; e < entries_.size(); ++e) {
+        if (entries_[e].found.curve.kind == kind_ && Extend(e)) {
           has_changed = true;
         }
       }
@@ -132,7 +134,6 @@ class CurveDetection {
           continue;
         }
         entry.found.support.push_back(i);
-        ++curves_of_[static_cast<std::size_t>(i)];
       }
     }
     for (auto& [id, entry] : entries) {
@@ -157,6 +158,15 @@ class CurveDetection {
     return from_below == entry.found.support.size();
   }
 
+  void IndexEntries() {
+    for (std::vector<std::size_t>& entries : entries_of_) entries.clear();
+    for (std::size_t e = 0; e < entries_.size(); ++e) {
+      for (const int i : entries_[e].found.support) {
+        entries_of_[static_cast<std::size_t>(i)].push_back(e);
+      }
+    }
+  }
+
   double GapLimit(const FoundCurve& found) const {
     std::vector<double> along;
     for (const int i : found.support) {
@@ -177,13 +187,6 @@ class CurveDetection {
   // Takes out curves that have become the same as another one with more
   // support. True when there were any.
   bool Merge() {
-    std::vector<std::vector<std::size_t>> entries_of(curves_of_.size());
-    for (std::size_t e = 0; e < entries_.size(); ++e) {
-      if (entries_[e].found.curve.kind != kind_) continue;
-      for (const int i : entries_[e].found.support) {
-        entries_of[static_cast<std::size_t>(i)].push_back(e);
-      }
-    }
     std::vector<bool> is_merged(entries_.size(), false);
     for (std::size_t e = 0; e < entries_.size(); ++e) {
       const Entry& entry = entries_[e];
@@ -191,10 +194,10 @@ class CurveDetection {
       // Curves that touch this one.
       std::set<std::size_t> others;
       for (const int i : entry.found.support) {
-        const auto& own = entries_of[static_cast<std::size_t>(i)];
+        const auto& own = entries_of_[static_cast<std::size_t>(i)];
         others.insert(own.begin(), own.end());
         for (const int j : points_.neighbors(i)) {
-          const auto& next = entries_of[static_cast<std::size_t>(j)];
+          const auto& next = entries_of_[static_cast<std::size_t>(j)];
           others.insert(next.begin(), next.end());
         }
       }
@@ -203,8 +206,9 @@ class CurveDetection {
         const Entry& other = entries_[o];
         const std::size_t size = entry.found.support.size();
         const std::size_t other_size = other.found.support.size();
-        if (is_merged[o] || size > other_size ||
-            (size == other_size && e < o) || !IsSame(entry, other)) {
+        if (other.found.curve.kind != kind_ || is_merged[o] ||
+            size > other_size || (size == other_size && e < o) ||
+            !IsSame(entry, other)) {
           continue;
         }
         is_merged[e] = true;
@@ -215,9 +219,6 @@ class CurveDetection {
     for (std::size_t e = entries_.size(); e-- > 0;) {
       if (!is_merged[e]) continue;
       has_merged = true;
-      for (const int i : entries_[e].found.support) {
-        --curves_of_[static_cast<std::size_t>(i)];
-      }
       if (entries_[e].id != kNoId) removed_.push_back(entries_[e].id);
       entries_.erase(entries_.begin() + static_cast<std::ptrdiff_t>(e));
     }
@@ -231,17 +232,43 @@ class CurveDetection {
     for (const int i : entry.found.support) {
       const double distance =
           std::abs(other.found.curve.SignedDistance(points_.position(i)));
-      if (distance > 2.0 * options_.sigma) return false;
+      if (distance > options_.gate) return false;
       sum += distance * distance;
     }
     const auto count = static_cast<double>(entry.found.support.size());
-    return sum <= count * options_.sigma * options_.sigma;
+    return sum <= count * 0.5 * options_.gate * 0.5 * options_.gate;
+  }
+
+  // How near to a curve a point must be to join it. Where curves cross, some
+  // point of one lies near the other by chance, and tying it there would hold
+  // the one by the other along its own direction, in which nothing else may.
+  double JoinGate(const PlanarCurve& curve, int i) const {
+    double gate = options_.gate;
+    for (const std::size_t e : entries_of_[static_cast<std::size_t>(i)]) {
+      const Eigen::Vector2d& position = points_.position(i);
+      const double angle =
+          NormalizeAxial(Direction(curve, position) -
+                         Direction(entries_[e].found.curve, position));
+      gate = std::min(gate, std::abs(angle) > options_.min_corner
+                                ? options_.sigma
+                                : 0.5 * options_.gate);
+    }
+    return gate;
+  }
+
+  // Of the tangent at the foot of a point, rad.
+  static double Direction(const PlanarCurve& curve,
+                          const Eigen::Vector2d& point) {
+    if (curve.kind == CurveKind::kLine) return curve.direction;
+    const Eigen::Vector2d arm = point - curve.position;
+    return std::atan2(arm.x(), -arm.y());
   }
 
   // Adds connected points near the curve to its support; false when there are
   // none.
-  bool Extend(Entry* entry) {
-    FoundCurve& found = entry->found;
+  bool Extend(std::size_t index) {
+    Entry& entry = entries_[index];
+    FoundCurve& found = entry.found;
     const std::size_t before = found.support.size();
     const double limit = GapLimit(found);
     ++stamp_;
@@ -265,15 +292,13 @@ class CurveDetection {
         if (support_stamp_[k] == stamp_) continue;
         const double distance =
             std::abs(found.curve.SignedDistance(points_.position(i)));
-        const double gate =
-            curves_of_[k] > 0 ? options_.sigma : 2.0 * options_.sigma;
-        if (distance <= gate &&
+        if (distance <= JoinGate(found.curve, i) &&
             (points_.position(i) - points_.position(step.from)).norm() <=
                 limit) {
           support_stamp_[k] = stamp_;
-          ++curves_of_[k];
+          entries_of_[k].push_back(index);
           found.support.push_back(i);
-          entry->joining.push_back(i);
+          entry.joining.push_back(i);
           queue.push_front({i, i, 0});
           continue;
         }
@@ -293,7 +318,7 @@ class CurveDetection {
 
   // Points that support a curve or are left over of one.
   std::vector<bool> Claimed() const {
-    std::vector<bool> is_claimed(curves_of_.size(), false);
+    std::vector<bool> is_claimed(entries_of_.size(), false);
     for (const int i : outliers_) {
       is_claimed[static_cast<std::size_t>(i)] = true;
     }
@@ -305,7 +330,7 @@ class CurveDetection {
         sum += distance * distance;
       }
       const double near = std::max(
-          2.0 * options_.sigma,
+          options_.gate,
           3.0 * std::sqrt(sum / static_cast<double>(found.support.size())));
       std::map<int, int> steps;
       std::vector<int> queue;
@@ -341,9 +366,6 @@ class CurveDetection {
       Entry entry;
       entry.found = std::move(found);
       entry.joining = entry.found.support;
-      for (const int i : entry.joining) {
-        ++curves_of_[static_cast<std::size_t>(i)];
-      }
       entries_.push_back(std::move(entry));
       has_found = true;
     }
@@ -381,8 +403,8 @@ class CurveDetection {
   std::vector<FeatureId> removed_;
   // Points with a broken constraint to a curve that is still there.
   std::vector<int> outliers_;
-  // How many of them each point supports.
-  std::vector<int> curves_of_;
+  // Indices of those that each point supports.
+  std::vector<std::vector<std::size_t>> entries_of_;
   // Scratch of Extend: equal to stamp_ for the support of the curve.
   std::vector<int> support_stamp_;
   int stamp_ = 0;
@@ -403,6 +425,7 @@ DetectorParameters CurveSearchDefaults() {
   return {
       {"tolerance", defaults.tolerance},
       {"sigma", defaults.sigma},
+      {"gate", defaults.gate},
       {"max_log_false_alarms", defaults.max_log_false_alarms},
       {"max_gap_points", static_cast<double>(defaults.max_gap_points)},
       {"max_gap", defaults.max_gap},
@@ -418,6 +441,7 @@ CurveSearchOptions ReadCurveSearchOptions(const ParameterReader& reader) {
   CurveSearchOptions options;
   options.tolerance = reader.Get("tolerance", 1e-6);
   options.sigma = reader.Get("sigma", 1e-6);
+  options.gate = reader.Get("gate", 1e-6);
   options.max_log_false_alarms = reader.Get("max_log_false_alarms");
   options.max_gap_points = reader.GetInt("max_gap_points", 0);
   options.max_gap = reader.Get("max_gap", 0.0);

@@ -701,10 +701,7 @@ class CurveSearcher {
       std::vector<int> rivals;
       for (const int i : points) {
         for (const int rival : hypotheses_of[static_cast<std::size_t>(i)]) {
-          if (hypotheses_[static_cast<std::size_t>(rival)].curve.kind !=
-              hypotheses_[static_cast<std::size_t>(index)].curve.kind) {
-            rivals.push_back(rival);
-          }
+          if (rival != index) rivals.push_back(rival);
         }
       }
       std::sort(rivals.begin(), rivals.end());
@@ -918,9 +915,8 @@ class CurveSearcher {
 
   // A precise curve next to another one is one, a vague one is not.
   bool IsLeftOver(const FoundCurve& found, const FoundCurve& other) const {
-    double near =
-        std::max({2.0 * options_.sigma, kLeftOverSpreads * Spread(other),
-                  2.0 * kLeftOverSpreads * Spread(found)});
+    double near = std::max({options_.gate, kLeftOverSpreads * Spread(other),
+                            2.0 * kLeftOverSpreads * Spread(found)});
     // A known curve has been solved for: its support looks precise by now, and
     // so do the pieces that drift kept apart.
     if (IsKnown(other) && found.support.size() < other.support.size()) {
@@ -981,7 +977,7 @@ class CurveSearcher {
          DistanceOfNearEnd(b, a) > options_.tolerance)) {
       return false;
     }
-    if (together > std::max(options_.sigma, kJoinRatio * apart)) {
+    if (together > std::max(0.5 * options_.gate, kJoinRatio * apart)) {
       return false;
     }
     both.tolerance = 0.0;

@@ -16,8 +16,13 @@ struct CurveSearchOptions {
   /// distances are tried as well, down to a fortieth, and the one that makes
   /// the curve most significant is taken.
   double tolerance = 0.3;
-  /// Bends of less than this are none: tolerance of the building.
-  double sigma = 0.05;
+  /// Tolerance of the building, of a point against its curve: what the
+  /// constraints hold it with.
+  double sigma = 0.02;
+  /// How near to a curve a connected point joins it, and to another curve a
+  /// curve is the same. Wider than sigma: points are off by their measurements
+  /// too. Bends of less than half of it are none.
+  double gate = 0.1;
   /// Log10 of the expected number of curves of the kind that the whole graph
   /// would show by chance, at which one is accepted.
   double max_log_false_alarms = 0.0;
@@ -68,7 +73,8 @@ struct FoundCurve {
 /// 3. Selection between lines and circles. The most significant curve takes its
 ///    points, the others are judged by what is left. A curve gives way to
 ///    others on its points when they are more significant together: four walls
-///    are not a circle, and a circle is not many short walls. Pieces of one
+///    are not a circle, a circle is not many short walls, and two walls a
+///    little out of line are not one. Pieces of one
 ///    curve that touch are put together where one curve fits them about as well
 ///    as each has its own.
 ///

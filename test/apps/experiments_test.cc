@@ -142,6 +142,17 @@ TEST_F(ExperimentsTest, StructureAndTheOracleBeatDistances) {
   EXPECT_EQ(run.phases.back().error, run.final_error);
 }
 
+// Walls of two corridors in a row, 0.5 m out of line, that the distances of
+// these worlds bring near to one line.
+TEST_F(ExperimentsTest, WallsALittleOutOfLineAreTwo) {
+  for (const std::uint64_t seed : {216, 292}) {
+    SCOPED_TRACE(seed);
+    SyntheticWorld world = MakeSyntheticWorld(
+        "S1", DefaultSyntheticOptions("S1"), seed, registry_);
+    EXPECT_TRUE(RunOnWorld(registry_, {}, &world).match.is_exact());
+  }
+}
+
 TEST_F(ExperimentsTest, WithoutDetectorsNothingIsFound) {
   SyntheticRunOptions options;
   options.hierarchy = "";

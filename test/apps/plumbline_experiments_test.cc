@@ -118,6 +118,16 @@ TEST_F(ExperimentsBinaryTest, RefusesWrongFlags) {
   EXPECT_EQ(Run("plumbline_experiments --experiment=S6 --delta_mode=x" + good,
                 &output),
             1);
+  for (const std::string bad :
+       {"line_ransac.sigma", "line_ransac=1", "line_ransac.sigma=0.1x",
+        "sigma=1.2", "line_ransac.sigma=0.1,,"}) {
+    EXPECT_NE(Run("plumbline_experiments --experiment=S1 --trials=1 "
+                  "--detector_parameters=" +
+                      bad + good,
+                  &output),
+              0);
+    EXPECT_THAT(output, HasSubstr("as in line_ransac.sigma=0.02"));
+  }
   EXPECT_EQ(
       Run("plumbline_experiments --experiment=S6 --output_dir=/dev/null/x",
           &output),

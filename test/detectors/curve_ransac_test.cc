@@ -133,8 +133,8 @@ TEST_F(CurveRansacTest, MakesALineOneLevelUp) {
     EXPECT_EQ(constraint.kind, ConstraintClass::kStructure);
     EXPECT_EQ(constraint.features[0], ids[i]);
     EXPECT_EQ(constraint.expected[0], 0.0);
-    // 1 / (0.05 m)^2.
-    EXPECT_NEAR(constraint.information(0, 0), 400.0, 1e-9);
+    // 1 / (0.02 m)^2.
+    EXPECT_NEAR(constraint.information(0, 0), 2500.0, 1e-6);
   }
   EXPECT_TRUE(Detect("circle_ransac").empty());
   graph_.Apply(transaction);
@@ -259,6 +259,25 @@ TEST_F(CurveRansacTest, PointsSupportSeveralCurves) {
   EXPECT_EQ(corner, 2);
   EXPECT_EQ(transaction.added_constraints().size(), ids.size() + 1);
   EXPECT_TRUE(Detect("circle_ransac").empty());
+}
+
+// The end of one wall, so far off the line of another that it crosses, is tied
+// to that one within its tolerance of 0.02 m, not within the gate.
+TEST_F(CurveRansacTest, CrossingCurvesShareOnlyWhatIsOnBoth) {
+  for (const double off : {0.015, 0.04}) {
+    SCOPED_TRACE(off);
+    Graph graph;
+    PointWorld world(2);
+    world.AddWall(off, 0.0, 4.0 + off, 0.0, 0.25);
+    world.AddWall(0.0, 0.25, 0.0, 4.0, 0.25);
+    const auto ids = world.Build(registry_, 0.0, 0.0, 4, &graph);
+    const Transaction transaction = registry_.GetDetector("line_ransac")
+                                        .make({})
+                                        ->Detect(graph, registry_, {});
+    EXPECT_EQ(Score(world, ids, transaction, false), 2);
+    EXPECT_EQ(transaction.added_constraints().size(),
+              ids.size() + (off < 0.02 ? 1 : 0));
+  }
 }
 
 TEST_F(CurveRansacTest, ExactBuilding) {

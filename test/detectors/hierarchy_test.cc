@@ -4,6 +4,7 @@
 #include <plumbline/core/session.h>
 #include <plumbline/detectors/builtins.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -42,9 +43,14 @@ TEST_P(HierarchyTest, FindsAllAndNothingElse) {
     Graph graph;
     world.Build(&graph);
     SolverSession session(&graph, registry_, {});
+    EmOptions options;
+    // As plumbline_solve has it.
+    options.full_weight_test =
+        std::count(the_case.raw.begin(), the_case.raw.end(), "point") > 0;
     EmOrchestrator em(
         &graph, &session, registry_,
-        MakeHierarchy(the_case.hierarchy, registry_, the_case.raw, {}), {});
+        MakeHierarchy(the_case.hierarchy, registry_, the_case.raw, {}),
+        options);
     const EmReport report = em.Run();
     EXPECT_TRUE(report.converged);
     EXPECT_THAT(CompareWithTruth(graph, world.truth()), IsEmpty());

@@ -4,6 +4,7 @@
 #include <plumbline/apps/app.h>
 #include <plumbline/apps/experiments.h>
 #include <plumbline/apps/progress.h>
+#include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/detectors/builtins.h>
@@ -15,6 +16,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -90,6 +92,27 @@ std::map<std::string, DetectorParameters> ParseDetectorParameters(
   return parameters;
 }
 
+using Json = nlohmann::ordered_json;
+
+// The claims and the means of an experiment, for programs.
+Json ToJson(const ExperimentResult& result) {
+  if (!result.skipped.empty()) return {{"skipped", result.skipped}};
+  Json claims = Json::object();
+  for (const Claim& claim : result.claims) {
+    claims[claim.text] = {{"value", claim.measured.value},
+                          {"low", claim.measured.low},
+                          {"high", claim.measured.high},
+                          {"holds", claim.holds}};
+  }
+  Json means = Json::object();
+  for (const SummaryRow& row : Summarize(result)) {
+    means[row.condition][row.quantity] = row.mean.value;
+  }
+  return {{"interrupted", result.interrupted},
+          {"claims", std::move(claims)},
+          {"means", std::move(means)}};
+}
+
 int Run() {
   const std::vector<std::string> selected = SelectedExperiments();
   if (FLAGS_output_dir.empty()) {
@@ -120,6 +143,7 @@ int Run() {
     options.datasets = datasets;
   }
   options.stop = [] { return InterruptRequested(); };
+  Json summary = {{"version", kVersion}, {"seed", FLAGS_seed}};
   for (const std::string& id : selected) {
     std::unique_ptr<Progress> progress;
     options.progress = [&](int done, int total) {
@@ -131,6 +155,12 @@ int Run() {
     const ExperimentResult result = RunExperiment(id, options, &registry);
     progress.reset();
     WriteExperiment(result, FLAGS_output_dir);
+    summary[id] = ToJson(result);
+    WriteFileAtomically(
+        FLAGS_output_dir + "/summary.json", [&](std::ostream& output) {
+          output << summary.dump(2, ' ', false, Json::error_handler_t::replace)
+                 << '\n';
+        });
     Detail("%s: written to %s", id.c_str(), FLAGS_output_dir.c_str());
     std::cout << id << ": " << result.title << '\n';
     if (!result.skipped.empty()) {
@@ -157,7 +187,8 @@ int main(int argc, char** argv) {
   info.summary =
       "Runs the experiments of the paper and writes, for each, a CSV of every "
       "trial, a summary against the paper's claim with confidence intervals, "
-      "and the figures as SVG. R1 and R2 need the public logs: the environment "
+      "and the figures as SVG, and summary.json with the claims and means of "
+      "all. R1 and R2 need the public logs: the environment "
       "variable PLUMBLINE_DATASETS names their folder.";
   info.usage = {"--experiment=S1|...|S6|R1|R2|all --output_dir=DIR [flags]"};
   info.example =

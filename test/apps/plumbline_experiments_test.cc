@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 
@@ -72,6 +73,16 @@ TEST_F(ExperimentsBinaryTest, WritesTablesAndFigures) {
   EXPECT_THAT(Read("new/results/S6.csv"), HasSubstr("S6,\"4: common centre"));
   EXPECT_THAT(Read("new/results/S6_summary.txt"), HasSubstr("Paper:"));
   EXPECT_THAT(Read("new/results/S6.svg"), HasSubstr("</svg>"));
+  const nlohmann::json summary =
+      nlohmann::json::parse(Read("new/results/summary.json"));
+  EXPECT_EQ(summary["seed"], 1);
+  EXPECT_EQ(summary["S6"]["interrupted"], false);
+  EXPECT_FALSE(summary["S6"]["claims"].empty());
+  for (const auto& claim : summary["S6"]["claims"]) {
+    EXPECT_TRUE(claim["holds"].is_boolean());
+    EXPECT_LE(claim["low"], claim["value"]);
+  }
+  EXPECT_FALSE(summary["S6"]["means"].empty());
 }
 
 TEST_F(ExperimentsBinaryTest, SameFilesWithOneAndTwoThreads) {
@@ -91,8 +102,8 @@ TEST_F(ExperimentsBinaryTest, SameFilesWithOneAndTwoThreads) {
     EXPECT_EQ(Read("1/" + name), Read("2/" + name)) << name;
     ++files;
   }
-  // Trials, two summaries, the plot and three maps.
-  EXPECT_EQ(files, 7);
+  // Trials, two summaries, the plot, three maps, and summary.json.
+  EXPECT_EQ(files, 8);
 }
 
 TEST_F(ExperimentsBinaryTest, SaysWhatItSkips) {

@@ -9,6 +9,7 @@
 #include <plumbline/apps/summary.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/initial_guess.h>
 #include <plumbline/core/plugin.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/default_hierarchy.h>
@@ -229,12 +230,27 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
     if (!input->damage().empty()) {
       throw Error(input->name(), 0, input->damage(), "a whole graph");
     }
-    g2o = ReadG2o(text, input->name(), registry, &graph);
+    g2o = ReadG2o(text, input->name(), registry, &graph, G2oOptionsFromFlags());
   }
   summary.parse_seconds = Now() - parse_begin;
   for (const auto& tag : g2o.unknown_tags) {
     Remark("%s: %d lines with the unknown tag %s kept as they are",
            input->name().c_str(), tag.second, tag.first.c_str());
+  }
+
+  Summary::Solver figures;
+  const InitialGuessOptions start = InitialGuessOptionsFromFlags();
+  if (start.method != InitialGuessMethod::kFile) {
+    const double start_begin = Now();
+    const InitialGuessReport made = MakeInitialGuess(start, &graph);
+    figures.start_poses = made.poses;
+    figures.start_landmarks = made.landmarks;
+    figures.start_kept = made.kept;
+    figures.start_seconds = Now() - start_begin;
+    Detail("start: %lld poses in %d parts and %lld landmarks placed, %lld kept",
+           static_cast<long long>(made.poses), made.parts,
+           static_cast<long long>(made.landmarks),
+           static_cast<long long>(made.kept));
   }
 
   Hierarchy hierarchy;
@@ -248,6 +264,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
         options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
         registry, {raw.begin(), raw.end()}, options.detector_parameters);
   }
+  options.session.max_iterations = FLAGS_max_solver_iterations;
   SolverSession session(&graph, registry, options.session);
   const CostReport initial_cost = session.Cost();
   EmOrchestrator em(&graph, &session, registry, std::move(hierarchy),
@@ -266,6 +283,21 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
     });
   }
   Summarize(initial_cost, session.Cost(), report, &summary);
+  const SolveReport& totals = session.totals();
+  figures.solves = session.num_solves();
+  figures.converged = totals.converged;
+  figures.iterations = totals.iterations;
+  figures.evaluation_seconds = totals.evaluation_seconds;
+  figures.linear_solver_seconds = totals.linear_solver_seconds;
+  figures.setup_seconds = totals.setup_seconds;
+  summary.solver = figures;
+  if (!totals.converged) {
+    Remark(
+        "%s: the solver did not converge%s; --max_solver_iterations and "
+        "--initial_guess may help",
+        input->name().c_str(),
+        totals.message.empty() ? "" : (" (" + totals.message + ")").c_str());
+  }
   outcome.graph = &graph;
   outcome.registry = &registry;
   outcome.g2o = &g2o;

@@ -16,6 +16,27 @@ DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 DEFINE_string(log_reader, "",
               "Format of the log; empty: recognized by content");
 
+DEFINE_string(
+    initial_guess, "file",
+    "Where the solve of a graph starts: file, odometry (each pose "
+    "from the one before), spanning_tree (along the ways of the least "
+    "uncertain heading), chordal (linear: headings, then positions)");
+PLUMBLINE_FLAG_CHOICES(initial_guess, "file", "odometry", "spanning_tree",
+                       "chordal");
+DEFINE_int32(
+    max_solver_iterations, 500,
+    "Most steps of one solve of a graph; those of a log have their own "
+    "bound");
+PLUMBLINE_FLAG_RANGE(max_solver_iterations, 1, 1e9);
+DEFINE_string(
+    information_frame, "first",
+    "Frame of the information of relative poses in a graph's file: "
+    "first (that of the first pose: error is inverse(p1) (+) p2 minus "
+    "what was measured), second (that of the second pose as measured: "
+    "error is inverse(measured) (+) inverse(p1) (+) p2, as g2o has "
+    "it). They agree where x and y are equally well known");
+PLUMBLINE_FLAG_CHOICES(information_frame, "first", "second");
+
 DEFINE_string(outputs, "default",
               "Files to write beside summary.json: all, default (all but "
               "floorplan.geojson), none, or names separated by commas; a minus "
@@ -153,6 +174,8 @@ std::vector<FlagGroup> SolveFlagGroups() {
   return {
       {"Input and output",
        {"input", "output_dir", "log_reader", "outputs", "grid_resolution"}},
+      {"Graphs",
+       {"initial_guess", "max_solver_iterations", "information_frame"}},
       {"Structure",
        {"structure", "hierarchy", "allowed_angles", "angle_resolution",
         "structure_sigma_segment_orientation",
@@ -225,6 +248,23 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
 bool FullWeightTestFromFlags(const std::set<std::string>& raw_feature_types) {
   if (FLAGS_full_weight_test != "auto") return FLAGS_full_weight_test == "true";
   return raw_feature_types.count("point") > 0;
+}
+
+InitialGuessOptions InitialGuessOptionsFromFlags() {
+  InitialGuessOptions options;
+  options.method =
+      FLAGS_initial_guess == "odometry" ? InitialGuessMethod::kOdometry
+      : FLAGS_initial_guess == "spanning_tree"
+          ? InitialGuessMethod::kSpanningTree
+      : FLAGS_initial_guess == "chordal" ? InitialGuessMethod::kChordal
+                                         : InitialGuessMethod::kFile;
+  return options;
+}
+
+G2oOptions G2oOptionsFromFlags() {
+  G2oOptions options;
+  options.information_at_second = FLAGS_information_frame == "second";
+  return options;
 }
 
 OccupancyOptions OccupancyOptionsFromFlags() {

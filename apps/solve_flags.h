@@ -5,6 +5,8 @@
 #include <plumbline/apps/app.h>
 #include <plumbline/apps/log_solver.h>
 #include <plumbline/apps/occupancy_grid.h>
+#include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/initial_guess.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/log_reader.h>
 
@@ -19,6 +21,7 @@ DECLARE_string(outputs);
 DECLARE_bool(structure);
 DECLARE_double(delta_threshold);
 DECLARE_string(hierarchy);
+DECLARE_int32(max_solver_iterations);
 DECLARE_uint64(seed);
 DECLARE_int32(num_threads);
 DECLARE_string(plugins);
@@ -36,6 +39,12 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry);
 
 /// EmOptions::full_weight_test for a graph with these types of raw features.
 bool FullWeightTestFromFlags(const std::set<std::string>& raw_feature_types);
+
+/// Where a graph starts: --initial_guess.
+InitialGuessOptions InitialGuessOptionsFromFlags();
+
+/// How a graph's file is understood: --information_frame.
+G2oOptions G2oOptionsFromFlags();
 
 /// Resolution and range of occupancy.pgm.
 OccupancyOptions OccupancyOptionsFromFlags();

@@ -211,6 +211,22 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
                       {"live", summary.closures.live},
                       {"broken", summary.closures.broken}};
   json["version"] = kVersion;
+  if (summary.solver) {
+    const Summary::Solver& solver = *summary.solver;
+    json["solver"] = {
+        {"objective", summary.measurement_cost + summary.structure_cost},
+        {"iterations", solver.iterations},
+        {"solves", solver.solves},
+        {"converged", solver.converged},
+        {"evaluation_s", solver.evaluation_seconds},
+        {"linear_solver_s", solver.linear_solver_seconds},
+        {"setup_s", solver.setup_seconds},
+        {"start",
+         {{"poses", solver.start_poses},
+          {"landmarks", solver.start_landmarks},
+          {"kept", solver.start_kept},
+          {"seconds", solver.start_seconds}}}};
+  }
   if (summary.scans > 0) {
     Json skipped = Json::array();
     for (const SkipReport& skip : summary.skipped) {

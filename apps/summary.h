@@ -89,6 +89,25 @@ struct Summary {
   std::int64_t peak_memory_bytes = 0;
   std::optional<double> orthogonality_deg;
 
+  /// Of a graph only: what the start placed (InitialGuessReport) and all solves
+  /// together did.
+  struct Solver {
+    std::int64_t start_poses = 0;
+    std::int64_t start_landmarks = 0;
+    std::int64_t start_kept = 0;
+    double start_seconds = 0.0;
+    int solves = 0;
+    /// Every solve reached its tolerance.
+    bool converged = true;
+    /// Steps computed, each a factorization.
+    int iterations = 0;
+    double evaluation_seconds = 0.0;
+    double linear_solver_seconds = 0.0;
+    /// Building, ordering, copying.
+    double setup_seconds = 0.0;
+  };
+  std::optional<Solver> solver;
+
   /// Of a log only (scans > 0): what was passed over, and the time that each
   /// scan took, s, in the order of scans; may be empty.
   std::vector<SkipReport> skipped;
@@ -103,10 +122,12 @@ void CountGraph(const Graph& graph, Summary* summary);
 /// structure, broken}}}, cost {initial, measurement, structure, total}, em
 /// {iterations, converged}, time_s {total, parse, frontend, detect, solve,
 /// write}, peak_memory_bytes, orthogonality_deg (null when there is no wall),
-/// closures {proposed, live, broken}, version; for a log also frontend {skipped
-/// [{reason, count, first_lines}], scan_seconds_second_tenth,
-/// scan_seconds_last_tenth, scan_seconds_growth (their quotient)}. Numbers that
-/// are not finite become null.
+/// closures {proposed, live, broken}, version; for a graph also solver
+/// {objective (cost.total), iterations, solves, converged, evaluation_s,
+/// linear_solver_s, setup_s, start {poses, landmarks, kept, seconds}}; for a
+/// log also frontend {skipped [{reason, count, first_lines}],
+/// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
+/// (their quotient)}. Numbers that are not finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// The same into a file, whole or not at all. Throws Error when it cannot be

@@ -430,7 +430,8 @@ void RegisterRelations(Registry* registry) {
       "inverse(u) (+) p; m, m, rad (EDGE_PRIOR_SE2 of g2o)",
       [](const RelationArguments& a) {
         return CostPointer(PosePrior::Create(a.expected, a.sqrt_information));
-      });
+      },
+      {{}, Sighting::kPose, nullptr});
   // One tag a type in g2o, so two relations.
   AddRelation(registry, "pose_position_prior", "EDGE_PRIOR_SE2_XY", {{"pose"}},
               2,

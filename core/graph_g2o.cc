@@ -128,6 +128,7 @@ void TurnInformation(double angle, Eigen::MatrixXd* information) {
 bool IsTurned(const G2oOptions& options, const Constraint& constraint) {
   return options.information_at_second &&
          constraint.type->sighting == Sighting::kPose &&
+         constraint.type->feature_types.size() == 2 &&
          constraint.information.rows() == 3;
 }
 

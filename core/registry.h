@@ -100,8 +100,8 @@ struct RelationArguments {
 };
 
 /// What a relation's expected value says about its second feature, seen from
-/// the first, a pose: enough for a start of the whole graph
-/// (core/initial_guess.h).
+/// the first, a pose, or about its only feature, in the map: enough for a start
+/// of the whole graph (core/initial_guess.h).
 enum class Sighting {
   kNone,
   /// Position and heading: x, y, theta.

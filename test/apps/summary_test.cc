@@ -216,7 +216,32 @@ TEST(SummaryTest, AGraphHasNoFrontend) {
   WriteSummary(Summary(), output);
   const auto json = nlohmann::json::parse(output.str());
   EXPECT_FALSE(json.contains("frontend"));
+  EXPECT_FALSE(json.contains("solver"));
   EXPECT_EQ(json["flags"].dump(), "{}");
+}
+
+TEST(SummaryTest, FiguresOfTheSolver) {
+  Summary summary;
+  summary.measurement_cost = 3.0;
+  summary.structure_cost = 0.5;
+  Summary::Solver solver;
+  solver.start_poses = 5;
+  solver.start_landmarks = 2;
+  solver.start_kept = 1;
+  solver.start_seconds = 0.25;
+  solver.solves = 2;
+  solver.converged = false;
+  solver.iterations = 9;
+  solver.evaluation_seconds = 0.5;
+  solver.linear_solver_seconds = 0.75;
+  solver.setup_seconds = 0.125;
+  summary.solver = solver;
+  std::ostringstream output;
+  WriteSummary(summary, output);
+  EXPECT_EQ(nlohmann::ordered_json::parse(output.str())["solver"].dump(),
+            R"({"objective":3.5,"iterations":9,"solves":2,"converged":false,)"
+            R"("evaluation_s":0.5,"linear_solver_s":0.75,"setup_s":0.125,)"
+            R"("start":{"poses":5,"landmarks":2,"kept":1,"seconds":0.25}})");
 }
 
 TEST(SummaryTest, PeakMemoryIsPlausible) {

@@ -1,0 +1,239 @@
+// Public graphs: what the orchestrator takes to converge beside a program that
+// gives the same factors to Ceres and nothing else.
+
+#include <benchmark/benchmark.h>
+#include <ceres/ceres.h>
+#include <dlfcn.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/em.h>
+#include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/initial_guess.h>
+#include <plumbline/core/session.h>
+#include <plumbline/factors/information.h>
+#include <plumbline/factors/pose_point.h>
+#include <plumbline/factors/pose_pose.h>
+#include <plumbline/frontend/input_stream.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "benchmark/benchmark_util.h"
+
+namespace plumbline {
+namespace {
+
+constexpr int kMaxIterations = 500;
+
+const Registry& Builtins() {
+  static const Registry* const registry = [] {
+    auto* made = new Registry;
+    RegisterBuiltinRelations(made);
+    return made;
+  }();
+  return *registry;
+}
+
+// The same as the session does around its solves: some builds of CHOLMOD start
+// a hard-coded number of threads.
+void MakeOpenMpSerial() {
+  const auto set = reinterpret_cast<void (*)(int)>(
+      dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
+  if (set != nullptr) set(0);
+}
+
+// What a file says, without this project's graph.
+struct PlainGraph {
+  struct Edge {
+    bool is_pose;
+    int first;
+    int second;
+    Eigen::Vector3d expected;
+    Eigen::Matrix3d information;
+  };
+  std::vector<std::array<double, 3>> blocks;
+  std::vector<Edge> edges;
+};
+
+PlainGraph MakePlain(const Graph& graph) {
+  PlainGraph plain;
+  for (const Feature* feature : graph.Features()) {
+    plain.blocks.push_back({feature->parameters[0], feature->parameters[1],
+                            feature->parameters[2]});
+  }
+  for (const Constraint* constraint : graph.Constraints()) {
+    PlainGraph::Edge edge;
+    const std::string& type = constraint->type->name;
+    if (type != "pose_pose" && type != "pose_point") {
+      throw Error("graphs_benchmark", 0, "a " + type,
+                  "graphs of poses and points");
+    }
+    edge.is_pose = type == "pose_pose";
+    edge.first = static_cast<int>(constraint->features[0]);
+    edge.second = static_cast<int>(constraint->features[1]);
+    const int size = edge.is_pose ? 3 : 2;
+    edge.expected.head(size) = constraint->expected;
+    edge.information.topLeftCorner(size, size) = constraint->information;
+    plain.edges.push_back(edge);
+  }
+  return plain;
+}
+
+// A bare program: one problem, one solve, the settings that the session has.
+ceres::Solver::Summary SolveBare(PlainGraph* graph) {
+  ceres::Problem problem;
+  for (const PlainGraph::Edge& edge : graph->edges) {
+    ceres::CostFunction* cost =
+        edge.is_pose
+            ? PosePose::Create(edge.expected, SqrtInformation(edge.information))
+            : PosePoint::Create(
+                  edge.expected.head<2>(),
+                  SqrtInformation(edge.information.topLeftCorner<2, 2>()));
+    problem.AddResidualBlock(
+        cost, nullptr,
+        graph->blocks[static_cast<std::size_t>(edge.first)].data(),
+        graph->blocks[static_cast<std::size_t>(edge.second)].data());
+  }
+  problem.SetParameterBlockConstant(graph->blocks[0].data());
+  const SessionOptions session;
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  options.max_num_iterations = kMaxIterations;
+  options.function_tolerance = session.function_tolerance;
+  options.parameter_tolerance = 1e-12;
+  options.initial_trust_region_radius = session.initial_trust_region_radius;
+  options.max_num_consecutive_invalid_steps = 20;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return summary;
+}
+
+void Converge(benchmark::State& state, const std::string& path,
+              InitialGuessMethod method) {
+  MakeOpenMpSerial();
+  Graph graph;
+  InputStream input(path);
+  std::istringstream text(input.ReadRest());
+  ReadG2o(text, path, Builtins(), &graph);
+  InitialGuessOptions guess;
+  guess.method = method;
+  const double start_seconds =
+      CpuSecondsOf([&] { MakeInitialGuess(guess, &graph); });
+  const PlainGraph plain = MakePlain(graph);
+  std::vector<std::array<double, kMaxFeatureSize>> start;
+  for (const Feature* feature : std::as_const(graph).Features()) {
+    start.push_back(feature->parameters);
+  }
+
+  std::vector<double> own;
+  std::vector<double> bare;
+  std::vector<double> ratios;
+  SolveReport report;
+  ceres::Solver::Summary summary;
+  double objective = 0.0;
+  const auto run_own = [&] {
+    std::size_t next = 0;
+    for (Feature* feature : graph.MutableFeatures()) {
+      feature->parameters = start[next++];
+    }
+    own.push_back(CpuSecondsOf([&] {
+      SessionOptions options;
+      options.max_iterations = kMaxIterations;
+      SolverSession session(&graph, Builtins(), options);
+      EmOrchestrator em(&graph, &session, Builtins(), {}, {});
+      em.Run();
+      report = session.totals();
+      objective = session.Cost().total();
+    }));
+  };
+  const auto run_bare = [&] {
+    PlainGraph copy = plain;
+    bare.push_back(CpuSecondsOf([&] { summary = SolveBare(&copy); }));
+  };
+  bool own_first = true;
+  for (auto _ : state) {
+    // Whoever comes second finds warm caches.
+    if (own_first) run_own();
+    run_bare();
+    if (!own_first) run_own();
+    own_first = !own_first;
+    state.SetIterationTime(own.back());
+    ratios.push_back(own.back() / bare.back());
+  }
+  if (!report.converged || summary.termination_type != ceres::CONVERGENCE) {
+    state.SkipWithError("not converged");
+  }
+  const double bare_objective = 2.0 * summary.final_cost;
+  state.counters["over_bare"] = Median(own) / Median(bare);
+  state.counters["bare_ms"] = 1e3 * Median(bare);
+  state.counters["iterations"] = report.iterations;
+  state.counters["bare_iterations"] = summary.num_linear_solves;
+  state.counters["objective"] = objective;
+  state.counters["objective_off"] =
+      std::abs(objective - bare_objective) / bare_objective;
+  state.counters["start_ms"] = 1e3 * start_seconds;
+  state.counters["evaluation_share"] =
+      report.evaluation_seconds / report.total_seconds;
+  state.counters["linear_share"] =
+      report.linear_solver_seconds / report.total_seconds;
+  state.counters["setup_share"] = report.setup_seconds / report.total_seconds;
+}
+
+void RegisterGraphs(const std::filesystem::path& folder) {
+  const std::vector<std::pair<const char*, InitialGuessMethod>> cases = {
+      {"manhattanOlson3500", InitialGuessMethod::kFile},
+      {"manhattanOlson3500", InitialGuessMethod::kChordal},
+      {"city10000", InitialGuessMethod::kFile},
+      {"city10000", InitialGuessMethod::kChordal},
+      {"victoriaPark", InitialGuessMethod::kChordal},
+      {"dlr", InitialGuessMethod::kFile},
+      {"dlr", InitialGuessMethod::kChordal}};
+  for (const auto& entry : cases) {
+    const std::string name = entry.first;
+    const InitialGuessMethod method = entry.second;
+    const std::string path = (folder / (name + ".g2o.bz2")).string();
+    benchmark::RegisterBenchmark(
+        (name + (method == InitialGuessMethod::kFile ? "/file" : "/chordal"))
+            .c_str(),
+        [path, method](benchmark::State& state) {
+          Converge(state, path, method);
+        })
+        ->Iterations(11)
+        ->UseManualTime()
+        ->Unit(benchmark::kMillisecond);
+  }
+}
+
+}  // namespace
+}  // namespace plumbline
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  const char* const folder = std::getenv("PLUMBLINE_DATASETS");
+  if (folder == nullptr) {
+    std::fprintf(stderr,
+                 "graphs_benchmark: set PLUMBLINE_DATASETS to a folder "
+                 "that holds graphs/city10000.g2o.bz2 and others\n");
+    return 1;
+  }
+  try {
+    plumbline::RegisterGraphs(std::filesystem::path(folder) / "graphs");
+    benchmark::RunSpecifiedBenchmarks();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "graphs_benchmark: %s\n", error.what());
+    return 1;
+  }
+  benchmark::Shutdown();
+  return 0;
+}

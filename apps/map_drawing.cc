@@ -9,6 +9,7 @@
 #include <plumbline/detectors/same_wall.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -42,6 +43,8 @@ constexpr int kNumClusterColors =
 constexpr Color kMoreClustersColor = Rgb(0x8C6D5A);
 constexpr Color kNoClusterColor = Rgb(0x4D4D4D);
 constexpr Color kCircleColor = Rgb(0xE69F00);
+constexpr Color kRectangleColor = Rgb(0xFBF4DC);
+constexpr Color kRectangleEdgeColor = Rgb(0xDCCB98);
 constexpr Color kPathColor = Rgb(0xA9BDCE);
 constexpr Color kPointColor = Rgb(0xC4C4C4);
 constexpr Color kInkColor = Rgb(0x222222);
@@ -106,6 +109,26 @@ bool IsDrawable(const DrawnCircle& circle) {
          circle.radius > 0.0;
 }
 
+// Counterclockwise from behind on the right.
+std::array<Eigen::Vector2d, 4> CornersOf(const DrawnRectangle& rectangle) {
+  const Eigen::Vector2d center(rectangle.x, rectangle.y);
+  const Eigen::Vector2d along =
+      rectangle.half_length * Eigen::Vector2d(std::cos(rectangle.direction),
+                                              std::sin(rectangle.direction));
+  const Eigen::Vector2d across =
+      rectangle.half_width * Eigen::Vector2d(-std::sin(rectangle.direction),
+                                             std::cos(rectangle.direction));
+  return {center - along - across, center + along - across,
+          center + along + across, center - along + across};
+}
+
+bool IsDrawable(const DrawnRectangle& rectangle) {
+  for (const Eigen::Vector2d& corner : CornersOf(rectangle)) {
+    if (!IsDrawable(corner.x(), corner.y())) return false;
+  }
+  return true;
+}
+
 Bounds BoundsOf(const MapDrawing& drawing) {
   Bounds bounds;
   for (const DrawnWall& wall : drawing.walls) {
@@ -117,6 +140,12 @@ Bounds BoundsOf(const MapDrawing& drawing) {
     if (!IsDrawable(circle)) continue;
     bounds.Add(circle.x - circle.radius, circle.y - circle.radius);
     bounds.Add(circle.x + circle.radius, circle.y + circle.radius);
+  }
+  for (const DrawnRectangle& rectangle : drawing.rectangles) {
+    if (!IsDrawable(rectangle)) continue;
+    for (const Eigen::Vector2d& corner : CornersOf(rectangle)) {
+      bounds.Add(corner.x(), corner.y());
+    }
   }
   for (const Pose2& pose : drawing.path) {
     if (IsDrawable(pose[0], pose[1])) bounds.Add(pose[0], pose[1]);
@@ -145,7 +174,15 @@ Bounds BoundsOf(const MapDrawing& drawing) {
   return bounds;
 }
 
-enum class Swatch { kWall, kClosure, kCircle, kCenter, kPath, kPoint };
+enum class Swatch {
+  kWall,
+  kClosure,
+  kCircle,
+  kCenter,
+  kRectangle,
+  kPath,
+  kPoint
+};
 
 struct LegendEntry {
   Swatch swatch;
@@ -204,6 +241,9 @@ std::vector<LegendEntry> Legend(const MapDrawing& drawing) {
   if (!drawing.centers.empty()) {
     legend.push_back({Swatch::kCenter, kCircleColor, "common centres"});
   }
+  if (!drawing.rectangles.empty()) {
+    legend.push_back({Swatch::kRectangle, kRectangleColor, "rectangles"});
+  }
   if (!drawing.points.empty()) {
     legend.push_back({Swatch::kPoint, kPointColor, "points"});
   }
@@ -244,19 +284,20 @@ struct Layout {
   double Y(double y) const { return bottom - scale * (y - bounds.min_y); }
 };
 
-constexpr double kMargin = 28.0;        // units
-constexpr double kTitleSize = 20.0;     // units, letters
-constexpr double kTextSize = 14.0;      // units, letters
-constexpr double kRowHeight = 22.0;     // units
-constexpr double kSwatchWidth = 26.0;   // units
-constexpr double kWallWidth = 2.0;      // units
-constexpr double kPathWidth = 1.1;      // units
-constexpr double kClosureWidth = 0.5;   // units
-constexpr double kClosureLength = 7.0;  // units
-constexpr double kPointRadius = 1.6;    // units
-constexpr double kCrossReach = 4.0;     // units, of a common centre
-constexpr double kLeastWidth = 420.0;   // units, so that a legend fits
-constexpr double kLeastHeight = 120.0;  // units, of the map itself
+constexpr double kMargin = 28.0;             // units
+constexpr double kTitleSize = 20.0;          // units, letters
+constexpr double kTextSize = 14.0;           // units, letters
+constexpr double kRowHeight = 22.0;          // units
+constexpr double kSwatchWidth = 26.0;        // units
+constexpr double kWallWidth = 2.0;           // units
+constexpr double kPathWidth = 1.1;           // units
+constexpr double kClosureWidth = 0.5;        // units
+constexpr double kClosureLength = 7.0;       // units
+constexpr double kRectangleEdgeWidth = 0.5;  // units
+constexpr double kPointRadius = 1.6;         // units
+constexpr double kCrossReach = 4.0;          // units, of a common centre
+constexpr double kLeastWidth = 420.0;        // units, so that a legend fits
+constexpr double kLeastHeight = 120.0;       // units, of the map itself
 
 double TextWidth(cairo_t* cr, const std::string& text, double size) {
   cairo_text_extents_t extents;
@@ -347,6 +388,36 @@ Layout MakeLayout(const MapDrawing& drawing, const MapDrawingOptions& options) {
 
 void SetColor(cairo_t* cr, const Color& color) {
   cairo_set_source_rgb(cr, color.r, color.g, color.b);
+}
+
+// The current path as an area with a thin edge.
+void FillRectangle(cairo_t* cr, double unit) {
+  SetColor(cr, kRectangleColor);
+  cairo_fill_preserve(cr);
+  SetColor(cr, kRectangleEdgeColor);
+  cairo_set_line_width(cr, kRectangleEdgeWidth * unit);
+  cairo_stroke(cr);
+}
+
+void DrawRectangles(cairo_t* cr, const MapDrawing& drawing,
+                    const Layout& layout) {
+  std::vector<const DrawnRectangle*> rectangles;
+  for (const DrawnRectangle& rectangle : drawing.rectangles) {
+    if (IsDrawable(rectangle)) rectangles.push_back(&rectangle);
+  }
+  // What lies in another is seen.
+  std::stable_sort(rectangles.begin(), rectangles.end(),
+                   [](const DrawnRectangle* a, const DrawnRectangle* b) {
+                     return std::abs(a->half_length * a->half_width) >
+                            std::abs(b->half_length * b->half_width);
+                   });
+  for (const DrawnRectangle* rectangle : rectangles) {
+    for (const Eigen::Vector2d& corner : CornersOf(*rectangle)) {
+      cairo_line_to(cr, layout.X(corner.x()), layout.Y(corner.y()));
+    }
+    cairo_close_path(cr);
+    FillRectangle(cr, layout.unit);
+  }
 }
 
 void DrawPoints(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
@@ -549,6 +620,10 @@ void DrawFrame(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
     } else if (entry.swatch == Swatch::kCenter) {
       cairo_set_line_width(cr, 0.75 * kWallWidth * unit);
       AddCross(cr, end - 7.0 * unit, baseline - middle, kCrossReach * unit);
+    } else if (entry.swatch == Swatch::kRectangle) {
+      cairo_rectangle(cr, end - 14.0 * unit, baseline - middle - 5.0 * unit,
+                      14.0 * unit, 10.0 * unit);
+      FillRectangle(cr, unit);
     } else if (entry.swatch == Swatch::kPoint) {
       cairo_new_sub_path(cr);
       cairo_arc(cr, end - 7.0 * unit, baseline - middle, kPointRadius * unit,
@@ -574,6 +649,7 @@ void Draw(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   SelectFont(cr);
   cairo_set_line_join(cr, CAIRO_LINE_JOIN_ROUND);
   cairo_set_line_cap(cr, CAIRO_LINE_CAP_ROUND);
+  DrawRectangles(cr, drawing, layout);
   DrawPoints(cr, drawing, layout);
   DrawPath(cr, drawing, layout);
   DrawWalls(cr, drawing, layout);
@@ -672,19 +748,41 @@ bool WallEnds(const Feature& feature, DrawnWall* wall) {
 
 namespace {
 
-// The orientation feature that live structure ties a wall to, or kNoId.
-FeatureId OrientationOf(const Graph& graph, FeatureId wall) {
-  for (const ConstraintId id : graph.ConstraintsOf(wall)) {
+bool IsLiveStructure(const Constraint& constraint) {
+  return constraint.state == ConstraintState::kLive &&
+         constraint.kind == ConstraintClass::kStructure;
+}
+
+// The orientation of a rectangle's sides in the direction phi, or kNoId.
+FeatureId OrientationOfSide(const Graph& graph, FeatureId rectangle,
+                            double phi) {
+  for (const ConstraintId id : graph.ConstraintsOf(rectangle)) {
     const Constraint& constraint = graph.GetConstraint(id);
-    if (constraint.state != ConstraintState::kLive ||
-        constraint.kind != ConstraintClass::kStructure) {
-      continue;
-    }
-    for (const FeatureId other : constraint.features) {
-      if (graph.GetFeature(other).type->name == "orientation") return other;
+    if (IsLiveStructure(constraint) &&
+        constraint.type->name == "rectangle_orientation" &&
+        std::abs(NormalizeAxial(constraint.expected[0] - phi)) < 0.25 * kPi) {
+      return constraint.features[1];
     }
   }
   return kNoId;
+}
+
+// The orientation feature that live structure ties a wall to, itself or as a
+// side of a rectangle, or kNoId.
+FeatureId OrientationOf(const Graph& graph, FeatureId wall) {
+  FeatureId by_rectangle = kNoId;
+  for (const ConstraintId id : graph.ConstraintsOf(wall)) {
+    const Constraint& constraint = graph.GetConstraint(id);
+    if (!IsLiveStructure(constraint)) continue;
+    for (const FeatureId other : constraint.features) {
+      const std::string& type = graph.GetFeature(other).type->name;
+      if (type == "orientation") return other;
+      if (type == "rectangle" && by_rectangle == kNoId) {
+        by_rectangle = OrientationOfSide(graph, other, constraint.expected[1]);
+      }
+    }
+  }
+  return by_rectangle;
 }
 
 // On the first segment, with its direction: the middle of the part where the
@@ -741,6 +839,9 @@ MapDrawing DrawingFromGraph(const Graph& graph,
     if (type == "circle") {
       drawing.circles.push_back({feature->parameters[0], feature->parameters[1],
                                  feature->parameters[2], feature->id});
+    } else if (type == "rectangle") {
+      const auto& p = feature->parameters;
+      drawing.rectangles.push_back({p[0], p[1], p[2], p[3], p[4], feature->id});
     } else if (type == "point") {
       (feature->is_virtual ? drawing.centers : drawing.points)
           .emplace_back(feature->parameters[0], feature->parameters[1]);

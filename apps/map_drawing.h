@@ -31,11 +31,24 @@ struct DrawnCircle {
   FeatureId id = kNoId;
 };
 
+/// A rectangle of walls, m, rad, map frame: half its sides along its direction
+/// and across.
+struct DrawnRectangle {
+  double x = 0.0;
+  double y = 0.0;
+  double direction = 0.0;
+  double half_length = 0.0;
+  double half_width = 0.0;
+  FeatureId id = kNoId;
+};
+
 /// A map as a person wants to see it. Whatever has a number that is not finite,
 /// or lies more than 10,000 km from the origin, is passed over.
 struct MapDrawing {
   std::vector<DrawnWall> walls;
   std::vector<DrawnCircle> circles;
+  /// Tinted areas under everything, the large ones first.
+  std::vector<DrawnRectangle> rectangles;
   /// Where walls of different visits were found to be one: x, y (m, map frame),
   /// direction of the wall (rad). A thin mark across the wall.
   std::vector<Pose2> closures;
@@ -59,11 +72,12 @@ struct MapDrawingOptions {
   int long_side = 2400;
 };
 
-/// Draws the walls (segments and lines with an extent), circles and points of a
-/// graph; virtual points are common centres. A wall's cluster is the
-/// orientation feature to which a live structure constraint ties it; clusters
-/// are numbered by the length of wall that they hold, longest first. An empty
-/// `path` is replaced by the graph's poses in the order of ids.
+/// Draws the walls (segments and lines with an extent), circles, rectangles and
+/// points of a graph; virtual points are common centres. A wall's cluster is
+/// the orientation feature to which live structure ties it or the rectangle
+/// that it is a side of; clusters are numbered by the length of wall that they
+/// hold, longest first. An empty `path` is replaced by the graph's poses in the
+/// order of ids.
 MapDrawing DrawingFromGraph(const Graph& graph, const std::vector<Pose2>& path);
 
 /// Ends of a wall feature (segment or line) in the map frame, m: x1, y1, x2,

@@ -20,6 +20,9 @@ struct DetectionScope {
   /// detector's cost must depend on the list and on the virtual features that
   /// it could extend, not on the size of the graph.
   const std::vector<FeatureId>* features = nullptr;
+  /// With a list: features of lower levels that belong to the same part of the
+  /// graph, ascending, for a detector that reads those as well. May be null.
+  const std::vector<FeatureId>* lower_features = nullptr;
   /// For detectors that draw random numbers; the same seed gives the same
   /// proposal.
   std::uint64_t seed = 1;
@@ -40,6 +43,14 @@ class StructureDetector {
   /// Fewest live constraints from below that keep a virtual feature of this
   /// detector alive.
   virtual int minimum_support() const { return 1; }
+
+  /// Whether these live constraints from below, at least minimum_support of
+  /// them, keep a virtual feature of this detector alive: not when a part of it
+  /// would hang in the air.
+  virtual bool IsSupported(
+      const std::vector<const Constraint*>& /*support*/) const {
+    return true;
+  }
 
   /// Whether a virtual feature of this detector stays when it has a single live
   /// constraint. It only follows what it is on, but a detector of the next

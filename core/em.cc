@@ -137,9 +137,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
         options(options_in) {
     for (const auto& level : hierarchy) {
       for (const auto& detector : level) {
-        minimum_support[detector->name()] = detector->minimum_support();
-        if (detector->keeps_followers())
-          keeps_followers.insert(detector->name());
+        detectors_by_name[detector->name()] = detector.get();
       }
     }
     for (const Feature* feature : std::as_const(*graph).Features()) {
@@ -559,9 +557,16 @@ struct EmOrchestrator::Impl final : public GraphListener {
     return transaction;
   }
 
-  int MinimumSupport(const Feature& feature) const {
-    const auto found = minimum_support.find(feature.source);
-    return found == minimum_support.end() ? 1 : found->second;
+  // The detector that made a feature; null when it is none of the hierarchy's.
+  const StructureDetector* MakerOf(const Feature& feature) const {
+    const auto found = detectors_by_name.find(feature.source);
+    return found == detectors_by_name.end() ? nullptr : found->second;
+  }
+
+  static bool IsEnough(const StructureDetector& detector,
+                       const std::vector<const Constraint*>& support) {
+    return static_cast<int>(support.size()) >= detector.minimum_support() &&
+           detector.IsSupported(support);
   }
 
   bool IsSupport(const Constraint& constraint, const Feature& feature) const {
@@ -584,7 +589,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
       Transaction transaction;
       const Constraint* last = nullptr;
       int live = 0;
-      int support = 0;
+      std::vector<const Constraint*> support;
       bool is_measured = false;
       for (const ConstraintId constraint_id : graph->ConstraintsOf(id)) {
         const Constraint& constraint = *graph->FindConstraint(constraint_id);
@@ -594,14 +599,16 @@ struct EmOrchestrator::Impl final : public GraphListener {
           break;
         }
         ++live;
-        if (IsSupport(constraint, *feature)) ++support;
+        if (IsSupport(constraint, *feature)) support.push_back(&constraint);
         last = &constraint;
         transaction.RemoveConstraint(constraint_id);
       }
       if (is_measured) continue;
-      const bool is_supported = support >= MinimumSupport(*feature);
+      const StructureDetector* const maker = MakerOf(*feature);
+      const bool is_supported =
+          maker == nullptr ? !support.empty() : IsEnough(*maker, support);
       if (is_supported &&
-          (live > 1 || keeps_followers.count(feature->source) > 0)) {
+          (live > 1 || (maker != nullptr && maker->keeps_followers()))) {
         continue;
       }
       if (is_supported && last != nullptr) {
@@ -615,12 +622,15 @@ struct EmOrchestrator::Impl final : public GraphListener {
     return has_dropped;
   }
 
-  // What a detector of a level may look at in a scope.
-  std::vector<FeatureId> FeaturesOfLevel(const Scope& scope, int level) const {
-    std::vector<FeatureId> ids;
+  // What a detector of a level may look at in a scope: features of the level,
+  // and those of lower ones.
+  std::pair<std::vector<FeatureId>, std::vector<FeatureId>> FeaturesUpTo(
+      const Scope& scope, int level) const {
+    std::pair<std::vector<FeatureId>, std::vector<FeatureId>> ids;
     for (const FeatureId id : scope.attached) {
       const Feature* feature = graph->FindFeature(id);
-      if (feature != nullptr && feature->level == level) ids.push_back(id);
+      if (feature == nullptr || feature->level > level) continue;
+      (feature->level == level ? ids.first : ids.second).push_back(id);
     }
     return ids;
   }
@@ -631,8 +641,11 @@ struct EmOrchestrator::Impl final : public GraphListener {
     const Scope scope = MakeScope(scope_features);
     DetectionScope detection;
     detection.level = level;
-    const std::vector<FeatureId> ids = FeaturesOfLevel(scope, level);
-    if (scope_features != nullptr) detection.features = &ids;
+    const auto ids = FeaturesUpTo(scope, level);
+    if (scope_features != nullptr) {
+      detection.features = &ids.first;
+      detection.lower_features = &ids.second;
+    }
     bool has_changed = false;
     const auto& detectors = hierarchy[static_cast<std::size_t>(level)];
     for (std::size_t i = 0; i < detectors.size(); ++i) {
@@ -726,7 +739,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
         };
         const Constraint* last = nullptr;
         int live = 0;
-        int support = 0;
+        std::vector<const Constraint*> support;
         for (const Constraint& constraint : constraints) {
           if (!is_on(constraint)) continue;
           ++live;
@@ -737,10 +750,10 @@ struct EmOrchestrator::Impl final : public GraphListener {
                             return feature != nullptr &&
                                    feature->level < features[i].level;
                           })) {
-            ++support;
+            support.push_back(&constraint);
           }
         }
-        if (support >= detector.minimum_support() &&
+        if (IsEnough(detector, support) &&
             !(live == 1 && silent_alone.count(AloneKey(*last, id)) > 0)) {
           continue;
         }
@@ -832,9 +845,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
   const Registry& registry;
   Hierarchy hierarchy;
   EmOptions options;
-  std::map<std::string, int> minimum_support;
-  // Detectors whose features stay with a single constraint.
-  std::set<std::string> keeps_followers;
+  std::map<std::string, const StructureDetector*> detectors_by_name;
 
   std::map<HypothesisKey, std::vector<BrokenHypothesis>> memory;
   // Keys of hypotheses that were broken and not measured since.

@@ -106,10 +106,10 @@ struct EmReport {
 ///
 /// Support: a virtual feature is dropped, with its constraints, when it has
 /// fewer live structure constraints from features of lower levels than its
-/// detector's minimum_support, or a single live constraint altogether: it would
-/// follow that one and say nothing (unless its detector keeps_followers).
-/// Dropping goes on up the levels. Fixed virtual features and those with
-/// measurements stay.
+/// detector's minimum_support (or not those that it needs, IsSupported), or a
+/// single live constraint altogether: it would follow that one and say nothing
+/// (unless its detector keeps_followers). Dropping goes on up the levels. Fixed
+/// virtual features and those with measurements stay.
 ///
 /// Memory: what was broken is remembered by what it said (relation, expected
 /// value, features; virtual ones by their type and value, since they come again

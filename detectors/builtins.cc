@@ -5,6 +5,7 @@
 #include <plumbline/detectors/line_ransac.h>
 #include <plumbline/detectors/orientation_mixture.h>
 #include <plumbline/detectors/orientation_relation.h>
+#include <plumbline/detectors/rectangle.h>
 #include <plumbline/detectors/same_wall.h>
 
 #include <utility>
@@ -15,7 +16,7 @@ void RegisterBuiltinDetectors(Registry* registry) {
   for (DetectorType type :
        {CenterClusterType(), CircleCenterType(), CircleRansacType(),
         LineRansacType(), OrientationMixtureType(), OrientationRelationType(),
-        SameWallType()}) {
+        RectangleType(), SameWallType()}) {
     if (registry->FindDetector(type.name) == nullptr) {
       registry->Register(std::move(type));
     }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -13,10 +14,12 @@ namespace {
 
 constexpr char kName[] = "orientation_mixture";
 
-// A feature that may join an orientation.
+// A direction of a feature that may join an orientation.
 struct Candidate {
   const Feature* feature;
   double angle;
+  // Of the relation: pi/2 across a rectangle, else 0.
+  double expected;
 };
 
 // Index of the direction among the parameters; -1 for types without one.
@@ -31,22 +34,97 @@ double LengthOf(const Feature& feature) {
   return length == 0.0 ? 1.0 : std::abs(length);
 }
 
-bool IsTied(const Graph& graph, const Feature& feature) {
+bool IsLiveStructure(const Constraint& constraint) {
+  return constraint.state == ConstraintState::kLive &&
+         constraint.kind == ConstraintClass::kStructure;
+}
+
+// Whether a wall is tied to an orientation, or to a rectangle that is read as
+// well and speaks for it.
+bool IsTied(const Graph& graph, const Feature& feature, int level) {
   for (const ConstraintId id : graph.ConstraintsOf(feature.id)) {
     const Constraint& constraint = graph.GetConstraint(id);
-    if (constraint.state != ConstraintState::kLive ||
-        constraint.kind != ConstraintClass::kStructure) {
-      continue;
-    }
-    for (const FeatureId other : constraint.features) {
-      if (other != feature.id &&
-          graph.GetFeature(other).type->name == "orientation") {
+    if (!IsLiveStructure(constraint)) continue;
+    for (const FeatureId other_id : constraint.features) {
+      const Feature& other = graph.GetFeature(other_id);
+      if (other.type->name == "orientation" ||
+          (other.type->name == "rectangle" && other.level <= level)) {
         return true;
       }
     }
   }
   return false;
 }
+
+// Collects what has no orientation yet.
+class CandidateList {
+ public:
+  CandidateList(const Graph& graph, int level,
+                const OrientationMixtureOptions& options)
+      : graph_(graph), level_(level), options_(options) {}
+
+  void Consider(const Feature& feature) {
+    if (feature.level > level_) return;
+    if (feature.type->name == "rectangle") return AddRectangle(feature);
+    const int parameter = DirectionParameter(feature);
+    if (parameter < 0 || LengthOf(feature) < options_.min_length) return;
+    if (IsTied(graph_, feature, level_)) return;
+    candidates_.push_back({&feature, feature.parameters[parameter], 0.0});
+    AddSample(feature.parameters[parameter], LengthOf(feature));
+  }
+
+  const std::vector<Candidate>& candidates() const { return candidates_; }
+  const std::vector<AxialSample>& samples() const { return samples_; }
+
+ private:
+  void AddSample(double angle, double length) {
+    samples_.push_back({angle,
+                        options_.direction_noise / (length * std::sqrt(length)),
+                        length});
+  }
+
+  // Both directions; its walls are the evidence.
+  void AddRectangle(const Feature& rectangle) {
+    bool is_tied[2] = {false, false};
+    const auto is_across = [](double angle) {
+      return std::abs(NormalizeAxial(angle)) > 0.25 * kPi;
+    };
+    for (const ConstraintId id : graph_.ConstraintsOf(rectangle.id)) {
+      const Constraint& constraint = graph_.GetConstraint(id);
+      if (IsLiveStructure(constraint) &&
+          constraint.type->name == "rectangle_orientation") {
+        is_tied[is_across(constraint.expected[0])] = true;
+      }
+    }
+    for (const bool across : {false, true}) {
+      if (is_tied[across]) continue;
+      const double expected = across ? 0.5 * kPi : 0.0;
+      candidates_.push_back(
+          {&rectangle, rectangle.parameters[2] + expected, expected});
+    }
+    for (const ConstraintId id : graph_.ConstraintsOf(rectangle.id)) {
+      const Constraint& constraint = graph_.GetConstraint(id);
+      if (!IsLiveStructure(constraint) ||
+          (constraint.type->name != "segment_rectangle" &&
+           constraint.type->name != "line_rectangle") ||
+          is_tied[is_across(constraint.expected[1])]) {
+        continue;
+      }
+      const Feature& wall = graph_.GetFeature(constraint.features[0]);
+      // A wall may be on two rectangles.
+      if (!spoken_for_.insert(wall.id).second) continue;
+      AddSample(rectangle.parameters[2] + constraint.expected[1],
+                LengthOf(wall));
+    }
+  }
+
+  const Graph& graph_;
+  int level_;
+  const OrientationMixtureOptions& options_;
+  std::vector<Candidate> candidates_;
+  std::vector<AxialSample> samples_;
+  std::set<FeatureId> spoken_for_;
+};
 
 }  // namespace
 
@@ -61,22 +139,19 @@ const std::string& OrientationMixture::name() const {
 Transaction OrientationMixture::Detect(const Graph& graph,
                                        const Registry& registry,
                                        const DetectionScope& scope) const {
-  std::vector<Candidate> candidates;
-  const auto consider = [&](const Feature& feature) {
-    if (feature.level > scope.level) return;
-    const int parameter = DirectionParameter(feature);
-    if (parameter < 0 || LengthOf(feature) < options_.min_length) return;
-    if (IsTied(graph, feature)) return;
-    candidates.push_back({&feature, feature.parameters[parameter]});
-  };
+  CandidateList list(graph, scope.level, options_);
   if (scope.features != nullptr) {
-    for (const FeatureId id : *scope.features) {
-      const Feature* feature = graph.FindFeature(id);
-      if (feature != nullptr) consider(*feature);
+    for (const auto* ids : {scope.features, scope.lower_features}) {
+      if (ids == nullptr) continue;
+      for (const FeatureId id : *ids) {
+        const Feature* feature = graph.FindFeature(id);
+        if (feature != nullptr) list.Consider(*feature);
+      }
     }
   } else {
-    for (const Feature* feature : graph.Features()) consider(*feature);
+    for (const Feature* feature : graph.Features()) list.Consider(*feature);
   }
+  const std::vector<Candidate>& candidates = list.candidates();
   Transaction transaction;
   if (candidates.empty()) return transaction;
 
@@ -89,16 +164,8 @@ Transaction OrientationMixture::Detect(const Graph& graph,
     directions.push_back(feature.parameters[0]);
   }
 
-  std::vector<AxialSample> samples;
-  samples.reserve(candidates.size());
-  for (const Candidate& candidate : candidates) {
-    const double length = LengthOf(*candidate.feature);
-    samples.push_back({candidate.angle,
-                       options_.direction_noise / (length * std::sqrt(length)),
-                       length});
-  }
   const std::vector<AxialComponent> components =
-      FindAxialComponents(samples, directions, options_.mixture);
+      FindAxialComponents(list.samples(), directions, options_.mixture);
   for (const AxialComponent& component : components) {
     Feature orientation;
     orientation.type = &registry.GetFeature("orientation");
@@ -118,7 +185,7 @@ Transaction OrientationMixture::Detect(const Graph& graph,
     constraint.type =
         &registry.GetRelation(candidate.feature->type->name + "_orientation");
     constraint.features = {candidate.feature->id, orientations[nearest]};
-    constraint.expected = Eigen::VectorXd::Zero(1);
+    constraint.expected = Eigen::VectorXd::Constant(1, candidate.expected);
     constraint.information = Eigen::MatrixXd::Constant(
         1, 1, 1.0 / (options_.sigma * options_.sigma));
     constraint.kind = ConstraintClass::kStructure;
@@ -133,9 +200,9 @@ DetectorType OrientationMixtureType() {
   DetectorType type;
   type.name = kName;
   type.description =
-      "Orientations of segments and lines: Gaussian mixture of unknown size "
-      "over clutter, split by the K^2 test of normality";
-  type.reads = {"segment", "line"};
+      "Orientations of segments, lines and rectangles: Gaussian mixture of "
+      "unknown size over clutter, split by the K^2 test of normality";
+  type.reads = {"segment", "line", "rectangle"};
   type.makes = {"orientation"};
   type.defaults = {
       {"sigma_deg", RadToDeg(defaults.sigma)},

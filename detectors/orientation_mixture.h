@@ -33,12 +33,16 @@ struct OrientationMixtureOptions {
 /// walls (level 0 or 1) and rows of columns (level 2 or 3) have directions in
 /// common when the detector stands above both.
 ///
+/// A "rectangle" is tied by rectangle_orientation in both its directions
+/// (expected 0 and pi/2), where they have an orientation; its walls speak for
+/// it among the others, and are not tied themselves.
+///
 /// A feature that no live constraint ties to an orientation yet joins the
 /// nearest one within the gate, one that is there already or a new one. New
 /// ones are what FindAxialComponents sees in the features that are beyond every
-/// gate. With a list in the scope only the listed features join or make
-/// orientations; those that exist are known to Graph::VirtualFeatures, so none
-/// is missed and none made twice.
+/// gate. With a list in the scope only the listed features, of this level and
+/// of lower ones, join or make orientations; those that exist are known to
+/// Graph::VirtualFeatures, so none is missed and none made twice.
 class OrientationMixture : public StructureDetector {
  public:
   /// Options that make no sense are refused by the type's factory.

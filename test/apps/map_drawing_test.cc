@@ -236,6 +236,8 @@ TEST_F(MapDrawingTest, DegenerateDrawings) {
                        Wall(0.0, 0.0, infinity, 0.0, 7)};
   drawings[1].circles = {
       {nan, 0.0, 1.0, 0}, {0.0, 0.0, -1.0, 1}, {1e300, 0.0, 1.0, 2}};
+  drawings[1].rectangles = {{0.0, 0.0, nan, 1.0, 1.0, 0},
+                            {0.0, 0.0, 0.0, 1e300, 1.0, 1}};
   drawings[1].path = {Pose2(nan, nan, nan)};
   drawings[1].points = {{infinity, 0.0}};
   // A single point; a very long and thin map, both ways.
@@ -307,6 +309,60 @@ TEST_F(MapDrawingTest, PointsAndCommonCenters) {
   EXPECT_GT(picture.Count(kCircleColor, 0.3, 0.0, 0.7, 0.4), 10);
   EXPECT_EQ(picture.Count(kCircleColor, 0.0, 0.4, 1.0, 0.85), 0);
   EXPECT_GT(picture.Count(kCircleColor, 0.0, 0.85, 1.0, 1.0), 10);
+}
+
+TEST_F(MapDrawingTest, Rectangles) {
+  Graph graph;
+  Transaction transaction;
+  // 8 m along 0.2 rad, 4 m across; a wall on its left side has the direction
+  // across, one below has none.
+  Feature rectangle = MakeFeature("rectangle", {5.0, 3.0, 0.2, 4.0, 2.0});
+  rectangle.is_virtual = true;
+  rectangle.level = 1;
+  const FeatureId room = transaction.AddFeature(rectangle);
+  const FeatureId left = transaction.AddFeature(
+      MakeFeature("segment", {1.0, 3.0, 1.8}, -2.0, 2.0));
+  const FeatureId below = transaction.AddFeature(
+      MakeFeature("segment", {5.0, 1.0, 0.2}, -4.0, 4.0));
+  const FeatureId across =
+      transaction.AddFeature(MakeFeature("orientation", {0.2 - kPi / 2}));
+  Constraint tie = Tie("rectangle_orientation", room, across);
+  tie.expected[0] = kPi / 2;
+  transaction.AddConstraint(tie);
+  for (const auto& [wall, side] :
+       {std::pair(left, -kPi / 2), std::pair(below, 0.0)}) {
+    tie = Tie("segment_rectangle", wall, room);
+    tie.expected = Eigen::Vector2d(0.0, side);
+    tie.information = Eigen::Matrix2d::Identity();
+    transaction.AddConstraint(tie);
+  }
+  graph.Apply(std::move(transaction));
+  MapDrawing drawing = DrawingFromGraph(graph, {});
+  ASSERT_EQ(drawing.rectangles.size(), 1u);
+  EXPECT_EQ(drawing.rectangles[0].x, 5.0);
+  EXPECT_EQ(drawing.rectangles[0].direction, 0.2);
+  EXPECT_EQ(drawing.rectangles[0].half_length, 4.0);
+  EXPECT_EQ(drawing.rectangles[0].half_width, 2.0);
+  ASSERT_EQ(drawing.walls.size(), 2u);
+  EXPECT_EQ(drawing.walls[0].cluster, 0);
+  EXPECT_EQ(drawing.walls[1].cluster, -1);
+
+  // Alone: it fills the page, and its corners at two opposite ends of the sides
+  // are farthest right and up.
+  drawing.walls.clear();
+  WriteMapPng(drawing, File("map.png"));
+  const Picture picture(File("map.png"));
+  constexpr int kRectangleColor = 0xFBF4DC;
+  EXPECT_EQ(picture.at(picture.width() / 2, picture.height() / 2),
+            kRectangleColor);
+  EXPECT_EQ(picture.Count(kRectangleColor, 0.02, 0.02, 0.08, 0.08), 0);
+  const double area = picture.Count(kRectangleColor, 0.0, 0.0, 1.0, 0.9) /
+                      (static_cast<double>(picture.width()) * picture.height());
+  // 32 m^2 in a box of 8.63 m times 5.51 m and its margins.
+  EXPECT_GT(area, 0.45);
+  EXPECT_LT(area, 0.67);
+  // In the legend.
+  EXPECT_GT(picture.Count(kRectangleColor, 0.0, 0.92, 1.0, 1.0), 100);
 }
 
 TEST_F(MapDrawingTest, ClustersOfAGraphByLengthOfWall) {

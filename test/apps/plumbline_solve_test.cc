@@ -26,6 +26,8 @@
 #include <string>
 #include <vector>
 
+#include "detectors/hierarchy_worlds.h"
+
 namespace plumbline {
 namespace {
 
@@ -744,6 +746,54 @@ TEST_F(SolveTest, GraphOfPoints) {
   ASSERT_EQ(Solve(input, "without", "--structure=false", &output), 0) << output;
   EXPECT_EQ(SummaryOf("without")["counts"]["features"].size(), 1u);
   EXPECT_EQ(SummaryOf("without")["cost"]["structure"], 0.0);
+}
+
+// Table 1, row 4: rooms, in all that is written.
+TEST_F(SolveTest, GraphOfRooms) {
+  const std::vector<HierarchyCase> cases = HierarchyCases();
+  const auto rooms = std::find_if(
+      cases.begin(), cases.end(),
+      [](const HierarchyCase& row) { return row.name.find("Row4") == 0; });
+  ASSERT_NE(rooms, cases.end());
+  HierarchyWorld world(registry_, 1);
+  rooms->make(&world);
+  Graph graph;
+  world.Build(&graph);
+  std::ostringstream text;
+  WriteG2o(graph, nullptr, text);
+  const std::string input = Write("rooms.g2o", text.str());
+  const std::string flags = "--hierarchy=" + rooms->hierarchy;
+  std::string output;
+  ASSERT_EQ(Solve(input, "out", flags + " --num_threads=1", &output), 0)
+      << output;
+  ASSERT_EQ(Solve(input, "again", flags + " --num_threads=2", &output), 0)
+      << output;
+  CheckFiles("out", FilesOfAGraph());
+  ExpectSame("out", "again");
+  const auto counts = SummaryOf("out")["counts"];
+  EXPECT_EQ(counts["features"]["rectangle"]["1"], 5);
+  EXPECT_EQ(counts["features"]["orientation"]["2"], 2);
+  EXPECT_EQ(counts["constraints"]["segment_rectangle"]["structure"], 21);
+  EXPECT_EQ(counts["constraints"]["rectangle_orientation"]["structure"], 10);
+  Graph map;
+  std::istringstream json(Out("out", "map.json"));
+  ReadGraphJson(json, "map.json", registry_, &map);
+  EXPECT_THAT(CompareWithTruth(map, world.truth()), ::testing::IsEmpty());
+  // Each is an area on the map, and one stands for them in the legend.
+  const std::string svg = Out("out", "map.svg");
+  const std::string color = "98.431373%";
+  int areas = 0;
+  for (std::size_t at = svg.find(color); at != std::string::npos;
+       at = svg.find(color, at + 1)) {
+    ++areas;
+  }
+  EXPECT_EQ(areas, 6);
+  // A level that is in the wrong place is refused with what fits where.
+  EXPECT_EQ(Solve(input, "none", "--hierarchy=orientation_mixture/rectangle",
+                  &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("'rectangle' has nothing to read at level 1"));
+  EXPECT_THAT(output, HasSubstr("level 0 (pose, segment): "));
 }
 
 TEST_F(SolveTest, DegenerateGraphsOfPoints) {

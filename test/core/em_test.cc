@@ -811,6 +811,11 @@ TEST_F(EmTest, DetectorsGetLevelScopeAndSeed) {
     else
       for (const FeatureId id : *scope.features)
         text += " " + std::to_string(id);
+    if (scope.lower_features != nullptr) {
+      text += " below";
+      for (const FeatureId id : *scope.lower_features)
+        text += " " + std::to_string(id);
+    }
     seen.push_back(text);
     return Transaction();
   };
@@ -830,7 +835,8 @@ TEST_F(EmTest, DetectorsGetLevelScopeAndSeed) {
   const std::vector<FeatureId> scope = {segments_[1], robot_};
   em_->Iterate(&scope);
   // The robot has the id 0, the walls 1 and 2, their orientation 3.
-  EXPECT_THAT(seen, ElementsAre("0: all", "1: all", "0: 0 2", "1: 3"));
+  EXPECT_THAT(
+      seen, ElementsAre("0: all", "1: all", "0: 0 2 below", "1: 3 below 0 2"));
   EXPECT_EQ(seeds.size(), 2u);
 }
 

@@ -5,6 +5,7 @@
 #include <plumbline/detectors/builtins.h>
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -56,14 +57,25 @@ TEST_P(HierarchyTest, FindsAllAndNothingElse) {
     EXPECT_THAT(CompareWithTruth(graph, world.truth()), IsEmpty());
     EXPECT_EQ(CountLive(graph, "orientation_orientation"),
               world.num_relations());
-    // Each has its orientation, one that was found above all of them.
-    int lines = 0, segments = 0;
+    // Each has its orientation, one that was found above all of them, a wall
+    // of a rectangle by it.
+    std::map<std::string, int> alone;
+    int rectangles = 0;
     for (const Feature* feature : std::as_const(graph).Features()) {
-      if (feature->type->name == "line") ++lines;
-      if (feature->type->name == "segment") ++segments;
+      if (feature->type->name == "rectangle") ++rectangles;
+      bool is_on_rectangle = false;
+      for (const ConstraintId id : graph.ConstraintsOf(feature->id)) {
+        const Constraint& constraint = graph.GetConstraint(id);
+        if (constraint.state == ConstraintState::kLive &&
+            constraint.type->name == feature->type->name + "_rectangle") {
+          is_on_rectangle = true;
+        }
+      }
+      if (!is_on_rectangle) ++alone[feature->type->name];
     }
-    EXPECT_EQ(CountLive(graph, "line_orientation"), lines);
-    EXPECT_EQ(CountLive(graph, "segment_orientation"), segments);
+    EXPECT_EQ(CountLive(graph, "line_orientation"), alone["line"]);
+    EXPECT_EQ(CountLive(graph, "segment_orientation"), alone["segment"]);
+    EXPECT_EQ(CountLive(graph, "rectangle_orientation"), 2 * rectangles);
   }
 }
 

@@ -24,7 +24,7 @@ struct TrueFeature {
   std::string type;
   int level;
   // point: x, y; circle: x, y, R; line: both ends, x1, y1, x2, y2; m.
-  // orientation: degrees.
+  // orientation: degrees. rectangle: x, y, degrees, half its sides, m.
   std::vector<double> at;
 };
 
@@ -209,6 +209,22 @@ inline double Mismatch(const Feature& feature, const TrueFeature& truth) {
   if (truth.type == "orientation") {
     return std::abs(NormalizeAxial(p[0] - DegToRad(at[0]))) / kAngle;
   }
+  if (truth.type == "rectangle") {
+    // Turned by 90 degrees with its sides exchanged it is the same.
+    double smallest = 1e9;
+    for (const int turned : {0, 1}) {
+      const double size = std::max(std::abs(p[3 + turned] - at[3]),
+                                   std::abs(p[4 - turned] - at[4]));
+      const double angle =
+          NormalizeAxial(p[2] + 0.5 * kPi * turned - DegToRad(at[2]));
+      smallest = std::min(
+          smallest,
+          std::max(
+              std::max(std::hypot(p[0] - at[0], p[1] - at[1]), size) / kLength,
+              std::abs(angle) / kAngle));
+    }
+    return smallest;
+  }
   // A line: both ends of the true one lie on it, it does not reach beyond them
   // by more than 1 m, and at least three quarters of it are seen (a corner may
   // belong to the other wall).
@@ -357,6 +373,41 @@ inline void AddRowsOfColumns(
   world->Expect("line", center_level + 1, {23.0, -2.0, 23.0, 16.0});
 }
 
+// Five rooms along a corridor, one of them with a door in a side wall; the
+// corridor, open at its ends, and a niche are no rectangles, nor is what
+// several rooms make together.
+inline void AddRooms(
+    HierarchyWorld* world, int rectangle_level,
+    const std::function<void(double, double, double, double)>& add) {
+  const auto room = [&](double x1, double y1, double x2, double y2) {
+    constexpr double kGap = 0.3;  // to the corners
+    add(x1 + kGap, y1, x2 - kGap, y1);
+    add(x2, y1 + kGap, x2, y2 - kGap);
+    add(x1 + kGap, y2, x2 - kGap, y2);
+    if (x1 == 0.0) {
+      // With a door.
+      add(x1, y1 + kGap, x1, 0.5 * (y1 + y2) - 0.5);
+      add(x1, 0.5 * (y1 + y2) + 0.5, x1, y2 - kGap);
+    } else {
+      add(x1, y1 + kGap, x1, y2 - kGap);
+    }
+    world->Expect("rectangle", rectangle_level,
+                  {0.5 * (x1 + x2), 0.5 * (y1 + y2), 0.0, 0.5 * (x2 - x1),
+                   0.5 * (y2 - y1)});
+  };
+  room(0.0, 0.0, 7.0, 6.0);
+  room(8.0, 0.0, 13.0, 6.0);
+  room(14.0, 0.0, 22.0, 6.0);
+  room(1.0, 10.0, 10.0, 15.0);
+  room(11.0, 10.0, 21.0, 15.0);
+  // The corridor, and a niche beyond its end.
+  add(-3.0, 7.0, 24.0, 7.0);
+  add(-3.0, 9.0, 24.0, 9.0);
+  add(28.0, 5.0, 34.0, 5.0);
+  add(28.0, 11.0, 34.0, 11.0);
+  add(34.3, 5.3, 34.3, 10.7);
+}
+
 // Table 1 of the paper, by row, and combinations of its rows.
 inline std::vector<HierarchyCase> HierarchyCases() {
   std::vector<HierarchyCase> cases;
@@ -405,6 +456,31 @@ inline std::vector<HierarchyCase> HierarchyCases() {
                      world->Expect("orientation", 1, {45.0});
                      world->ExpectRelations(3);
                    }});
+  cases.push_back({"Row4SegmentsRectanglesOrientations",
+                   "rectangle/orientation_mixture/orientation_relation",
+                   {"segment"},
+                   [](HierarchyWorld* world) {
+                     AddRooms(world, 1,
+                              [&](double x1, double y1, double x2, double y2) {
+                                world->AddSegment(x1, y1, x2, y2);
+                              });
+                     world->Expect("orientation", 2, {0.0});
+                     world->Expect("orientation", 2, {90.0});
+                     world->ExpectRelations(1);
+                   }});
+  cases.push_back(
+      {"PointsLinesRectanglesOrientations",
+       "line_ransac/rectangle/orientation_mixture/orientation_relation",
+       {"point"},
+       [](HierarchyWorld* world) {
+         AddRooms(world, 2, [&](double x1, double y1, double x2, double y2) {
+           world->AddPointWall(x1, y1, x2, y2, 0.25);
+           world->Expect("line", 1, {x1, y1, x2, y2});
+         });
+         world->Expect("orientation", 3, {0.0});
+         world->Expect("orientation", 3, {90.0});
+         world->ExpectRelations(1);
+       }});
   cases.push_back({"Row5CirclesCentresLinesOrientations",
                    "circle_center/line_ransac/orientation_mixture/"
                    "orientation_relation",

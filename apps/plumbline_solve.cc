@@ -265,6 +265,8 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
         registry, {raw.begin(), raw.end()}, options.detector_parameters);
   }
   options.session.max_iterations = FLAGS_max_solver_iterations;
+  // Only structure is ever broken.
+  options.session.fast_removal = options.structure;
   SolverSession session(&graph, registry, options.session);
   const CostReport initial_cost = session.Cost();
   EmOrchestrator em(&graph, &session, registry, std::move(hierarchy),

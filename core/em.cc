@@ -900,12 +900,18 @@ EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
   impl_->Optimize(whole);
   bool goes_on = impl_->EndPhase(
       impl_->structure_count == 0 ? "measurements" : "optimize", whole, start);
-  double cost = impl_->session->Cost().total();
+  // With no structure there and none looked for, nothing moves after the first
+  // solve, and its cost need not be known.
+  const bool is_still = impl_->structure_count == 0 && impl_->hierarchy.empty();
+  const auto total_cost = [&] {
+    return is_still ? 0.0 : impl_->session->Cost().total();
+  };
+  double cost = total_cost();
   for (int i = 0; goes_on && i < impl_->options.max_iterations; ++i) {
     const bool has_changed = impl_->Iterate(nullptr);
     goes_on = !impl_->is_stopped;
     const double last_cost = cost;
-    cost = impl_->session->Cost().total();
+    cost = total_cost();
     if (goes_on && !has_changed && impl_->is_usable &&
         std::abs(cost - last_cost) <=
             impl_->options.cost_tolerance * std::max(cost, last_cost)) {

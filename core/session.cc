@@ -27,6 +27,7 @@ constexpr int kMaxInvalidSteps = 20;
 // Rows times squared columns below which a dense solve is done before a sparse
 // one has been set up.
 constexpr double kDenseWork = 3e5;
+constexpr int kUnknownRank = -1;
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
@@ -116,8 +117,9 @@ struct Residual {
   std::unique_ptr<ceres::LossFunction> loss;
   // Null while the constraint is not live.
   ceres::ResidualBlockId id = nullptr;
-  // Rank of the information.
-  int degrees_of_freedom = 0;
+  // Rank of the information; kUnknownRank until somebody asks: for most
+  // measurements nobody does, and it takes an eigen decomposition.
+  int degrees_of_freedom = kUnknownRank;
 };
 
 }  // namespace
@@ -128,7 +130,7 @@ struct SolverSession::Impl {
       : graph(graph_in),
         options(options_in),
         loss_type(registry.GetLoss(options_in.delta_mode)),
-        problem(ProblemOptions(/*fast_removal=*/true)) {
+        problem(ProblemOptions(options_in.fast_removal)) {
     totals.usable = true;
     totals.converged = true;
   }
@@ -142,6 +144,7 @@ struct SolverSession::Impl {
   RelationArguments ArgumentsOf(const Constraint& constraint) const {
     RelationArguments arguments;
     arguments.expected = constraint.expected;
+    arguments.features.reserve(constraint.features.size());
     for (const FeatureId id : constraint.features) {
       arguments.features.push_back(&std::as_const(*graph).GetFeature(id));
     }
@@ -164,18 +167,18 @@ struct SolverSession::Impl {
     blocks[index].type = InfoOf(feature->type);
   }
 
+  // Makes cost and loss; they are not in the problem yet.
   void AddConstraint(const Constraint& constraint) {
     const std::size_t index = static_cast<std::size_t>(constraint.id);
     if (residuals.size() <= index) residuals.resize(index + 1);
     auto residual = std::make_unique<Residual>();
     residual->cost = MakeCost(constraint);
-    residual->degrees_of_freedom = InformationRank(constraint.information);
     if (constraint.kind == ConstraintClass::kStructure) {
+      residual->degrees_of_freedom = InformationRank(constraint.information);
       residual->loss =
           loss_type.make_loss(&constraint.delta, residual->degrees_of_freedom);
     }
     residuals[index] = std::move(residual);
-    if (constraint.state == ConstraintState::kLive) AddResidual(constraint);
   }
 
   void AddResidual(const Constraint& constraint) {
@@ -368,7 +371,18 @@ struct SolverSession::Impl {
   }
 
   double SquaredResidual(const Constraint& constraint) const {
-    Eigen::VectorXd whitened(constraint.type->residual_size);
+    // On the stack for any usual relation.
+    constexpr int kUsualSize = 6;
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kUsualSize, 1> usual;
+    Eigen::VectorXd unusual;
+    const int size = constraint.type->residual_size;
+    if (size <= kUsualSize) {
+      usual.resize(size);
+    } else {
+      unusual.resize(size);
+    }
+    Eigen::Map<Eigen::VectorXd> whitened(
+        size <= kUsualSize ? usual.data() : unusual.data(), size);
     const bool evaluated =
         Evaluate(constraint, *residuals[constraint.id]->cost, whitened.data());
     const double squared = whitened.squaredNorm();
@@ -380,7 +394,10 @@ struct SolverSession::Impl {
   }
 
   double Delta(const Constraint& constraint) const {
-    const int degrees = residuals[constraint.id]->degrees_of_freedom;
+    int& degrees = residuals[constraint.id]->degrees_of_freedom;
+    if (degrees == kUnknownRank) {
+      degrees = InformationRank(constraint.information);
+    }
     if (degrees < 1) return 1.0;
     return ChiSquarePValue(SquaredResidual(constraint), degrees);
   }
@@ -474,8 +491,17 @@ SolverSession::SolverSession(Graph* graph, const Registry& registry,
                              const SessionOptions& options)
     : impl_(std::make_unique<Impl>(graph, registry, options)) {
   for (Feature* feature : graph->MutableFeatures()) impl_->AddFeature(feature);
-  for (const Constraint* constraint : graph->Constraints()) {
+  // One after the other, so that the costs lie side by side: a solve goes over
+  // them again and again.
+  const auto constraints = std::as_const(*graph).Constraints();
+  impl_->residuals.reserve(constraints.size());
+  for (const Constraint* constraint : constraints) {
     impl_->AddConstraint(*constraint);
+  }
+  for (const Constraint* constraint : constraints) {
+    if (constraint->state == ConstraintState::kLive) {
+      impl_->AddResidual(*constraint);
+    }
   }
   graph->AddListener(this);
 }
@@ -632,6 +658,9 @@ void SolverSession::OnFeatureRemoved(const Feature& feature) {
 
 void SolverSession::OnConstraintAdded(const Constraint& constraint) {
   impl_->AddConstraint(constraint);
+  if (constraint.state == ConstraintState::kLive) {
+    impl_->AddResidual(constraint);
+  }
 }
 
 void SolverSession::OnConstraintChanged(const Constraint& constraint) {
@@ -640,7 +669,7 @@ void SolverSession::OnConstraintChanged(const Constraint& constraint) {
   const bool is_live = residual.id != nullptr;
   if (is_live) impl_->RemoveResidual(constraint);
   residual.cost = std::move(cost);
-  residual.degrees_of_freedom = InformationRank(constraint.information);
+  residual.degrees_of_freedom = kUnknownRank;
   if (is_live) impl_->AddResidual(constraint);
 }
 

@@ -25,6 +25,11 @@ struct SessionOptions {
   /// adds up costs in any order: results agree to rounding only, the same bytes
   /// come with one thread. Residuals are not where the time goes.
   int num_threads = 1;
+  /// Taking constraints out costs next to nothing, whatever the size of the
+  /// graph. False: making the session and global solves are cheaper, and every
+  /// constraint taken out costs a pass over all; for graphs from which none or
+  /// few are.
+  bool fast_removal = true;
 };
 
 /// What one solve did and cost.

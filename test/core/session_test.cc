@@ -103,6 +103,41 @@ class SessionTest : public ::testing::Test {
 
 constexpr ConstraintClass kStructure = ConstraintClass::kStructure;
 
+// A session made for graphs that keep their constraints takes them out all the
+// same, to the same result.
+TEST_F(SessionTest, WithoutFastRemoval) {
+  const FeatureId a = Add("pose", {0.0, 0.0, 0.0}, /*fixed=*/true);
+  const FeatureId b = Add("pose", {5.0, 5.0, 1.0});
+  SessionOptions options;
+  options.fast_removal = false;
+  SolverSession session(&graph_, registry_, options);
+  std::vector<ConstraintId> ids;
+  for (const double x : {1.0, 2.0, 6.0}) {
+    Transaction transaction;
+    transaction.AddConstraint(MakeConstraint("pose_pose", {a, b},
+                                             Eigen::Vector3d(x, 0.0, 0.0),
+                                             Eigen::Matrix3d::Identity()));
+    ids.push_back(graph_.Apply(transaction).constraints[0]);
+  }
+  EXPECT_TRUE(session.SolveGlobal().converged);
+  EXPECT_NEAR(graph_.GetFeature(b).parameters[0], 3.0, 1e-9);
+  Transaction broken;
+  broken.BreakConstraint(ids[2]);
+  graph_.Apply(broken);
+  EXPECT_TRUE(session.SolveGlobal().converged);
+  EXPECT_NEAR(graph_.GetFeature(b).parameters[0], 1.5, 1e-9);
+  Transaction removed;
+  removed.RemoveConstraint(ids[0]);
+  removed.RemoveConstraint(ids[1]);
+  graph_.Apply(removed);
+  // Nothing is left to solve; the feature can go too.
+  EXPECT_EQ(session.SolveGlobal().variable_blocks, 0);
+  Transaction gone;
+  gone.RemoveFeature(b);
+  graph_.Apply(gone);
+  EXPECT_TRUE(session.SolveGlobal().usable);
+}
+
 TEST_F(SessionTest, OneStep) {
   const FeatureId a = Add("pose", {1.0, 2.0, kPi / 2}, true);
   const FeatureId b = Add("pose", {0.0, 0.0, 0.0});

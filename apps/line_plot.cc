@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numeric>
 #include <sstream>
 
 namespace plumbline {
@@ -257,22 +258,36 @@ std::vector<double> RoundTicks(double low, double high, int count) {
   return ticks;
 }
 
-std::string PlotSvg(const std::vector<LinePlot>& plots) {
-  int width = 0;
-  int height = 0;
+std::string PlotSvg(const std::vector<LinePlot>& plots, int columns) {
+  const auto per_row = static_cast<std::size_t>(std::max(columns, 1));
+  int column_width = 0;
   for (const LinePlot& plot : plots) {
-    width = std::max(width, plot.width);
-    height += plot.height;
+    column_width = std::max(column_width, plot.width);
   }
+  std::vector<int> row_heights((plots.size() + per_row - 1) / per_row, 0);
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    int& height = row_heights[i / per_row];
+    height = std::max(height, plots[i].height);
+  }
+  const int width =
+      column_width * static_cast<int>(std::min(
+                         per_row, std::max<std::size_t>(plots.size(), 1)));
+  const int height = std::accumulate(row_heights.begin(), row_heights.end(), 0);
   std::ostringstream output;
   output << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << width
          << "\" height=\"" << height << "\" viewBox=\"0 0 " << width << ' '
          << height << "\" font-family=\"sans-serif\">\n"
          << "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
   int top = 0;
-  for (const LinePlot& plot : plots) {
-    PlotWriter(plot, top, &output).Write();
-    top += plot.height;
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    const std::size_t column = i % per_row;
+    if (column > 0) {
+      output << "<g transform=\"translate("
+             << column_width * static_cast<int>(column) << " 0)\">\n";
+    }
+    PlotWriter(plots[i], top, &output).Write();
+    if (column > 0) output << "</g>\n";
+    if (column + 1 == per_row) top += row_heights[i / per_row];
   }
   output << "</svg>\n";
   return output.str();

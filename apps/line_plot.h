@@ -41,9 +41,10 @@ struct LinePlot {
 /// most `count` of them (at least 2).
 std::vector<double> RoundTicks(double low, double high, int count);
 
-/// The plots below each other as one SVG document. The same plots give the same
-/// bytes. Throws Error when a series has sizes that disagree.
-std::string PlotSvg(const std::vector<LinePlot>& plots);
+/// The plots as one SVG document, in rows of so many, below each other. The
+/// same plots give the same bytes. Throws Error when a series has sizes that
+/// disagree.
+std::string PlotSvg(const std::vector<LinePlot>& plots, int columns = 1);
 
 }  // namespace plumbline
 

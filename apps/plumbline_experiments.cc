@@ -2,6 +2,7 @@
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/app.h>
+#include <plumbline/apps/detector_parameters.h>
 #include <plumbline/apps/experiments.h>
 #include <plumbline/apps/progress.h>
 #include <plumbline/core/atomic_file.h>
@@ -10,11 +11,9 @@
 #include <plumbline/detectors/builtins.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -63,35 +62,6 @@ std::vector<std::string> SelectedExperiments() {
   return {FLAGS_experiment};
 }
 
-// "detector.name=value,..." by detector.
-std::map<std::string, DetectorParameters> ParseDetectorParameters(
-    const std::string& text) {
-  std::map<std::string, DetectorParameters> parameters;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string entry = text.substr(begin, end - begin);
-    const std::size_t dot = entry.find('.');
-    const std::size_t equals = entry.find('=');
-    double value = 0.0;
-    const char* const last = entry.data() + entry.size();
-    if (dot != std::string::npos && equals != std::string::npos &&
-        dot < equals) {
-      const auto parsed =
-          std::from_chars(entry.data() + equals + 1, last, value);
-      if (parsed.ec == std::errc() && parsed.ptr == last) {
-        parameters[entry.substr(0, dot)]
-                  [entry.substr(dot + 1, equals - dot - 1)] = value;
-        begin = end + 1;
-        continue;
-      }
-    }
-    throw Error("--detector_parameters", 0, "cannot read '" + entry + "'",
-                "detector.name=value, as in line_ransac.sigma=0.02");
-  }
-  return parameters;
-}
-
 using Json = nlohmann::ordered_json;
 
 // The claims and the means of an experiment, for programs.
@@ -99,10 +69,15 @@ Json ToJson(const ExperimentResult& result) {
   if (!result.skipped.empty()) return {{"skipped", result.skipped}};
   Json claims = Json::object();
   for (const Claim& claim : result.claims) {
-    claims[claim.text] = {{"value", claim.measured.value},
-                          {"low", claim.measured.low},
-                          {"high", claim.measured.high},
-                          {"holds", claim.holds}};
+    // "(19 of 20)" at the end differs from run to run.
+    const std::size_t end = claim.text.rfind(" (");
+    const bool has_count = end != std::string::npos &&
+                           claim.text.find(" of ", end) != std::string::npos;
+    claims[has_count ? claim.text.substr(0, end) : claim.text] = {
+        {"value", claim.measured.value},
+        {"low", claim.measured.low},
+        {"high", claim.measured.high},
+        {"holds", claim.holds}};
   }
   Json means = Json::object();
   for (const SummaryRow& row : Summarize(result)) {

@@ -8,6 +8,7 @@
 #include <plumbline/apps/sweep.h>
 #include <plumbline/apps/sweep_grid.h>
 #include <plumbline/apps/sweep_launcher.h>
+#include <plumbline/apps/sweep_overview.h>
 #include <plumbline/apps/sweep_table.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
@@ -30,11 +31,16 @@
 #include <thread>
 #include <vector>
 
-DEFINE_string(grid, "",
-              "Flags of the command and their values: "
-              "flag=values;flag=values;... Values are separated by commas; "
-              "a:step:b is a range, log(a,b,n) are n values from a to b at "
-              "equal ratios, \"...\" is a value that holds commas");
+DEFINE_string(
+    grid, "",
+    "Flags of the command and their values: "
+    "flag=values;flag=values;... Values are separated by commas; "
+    "a:step:b is a range, log(a,b,n) are n values from a to b at "
+    "equal ratios, \"...\" is a value that holds commas. flag:key=values "
+    "is for flags that take lists of key=value");
+DEFINE_bool(one_at_a_time, false,
+            "Not all combinations: the first values of all flags, and the "
+            "other values of each flag with the first ones of the others");
 DEFINE_int32(trials, 1, "Runs of every setting, each with its own seed");
 PLUMBLINE_FLAG_RANGE(trials, 1, 1000000);
 DEFINE_uint64(seed, 1, "Seed of the first trial; the next have the next ones");
@@ -73,6 +79,10 @@ DEFINE_string(minimize, "",
               "Figure by which the best setting is chosen: a column of "
               "sweep.csv, as in evaluation.relations.translation_m.mean");
 DEFINE_string(maximize, "", "The same, the most of it being best");
+DEFINE_string(figures, "",
+              "Figures to draw, separated by commas: columns of sweep.csv; "
+              "empty: the one to minimize or maximize and some others that "
+              "differ between runs");
 DEFINE_bool(times, true,
             "Columns of measured time and memory; without them the same sweep "
             "gives the same bytes of sweep.csv");
@@ -144,6 +154,7 @@ SweepDefinition DefinitionFromFlags(const std::vector<std::string>& command) {
                   "other flags (--trials and --seed say which seeds)");
     }
   }
+  definition.one_at_a_time = FLAGS_one_at_a_time;
   definition.trials = FLAGS_trials;
   definition.first_seed = FLAGS_seed;
   definition.seed_flag = FLAGS_seed_flag;
@@ -235,16 +246,6 @@ void DoRuns(const SweepDefinition& definition, const std::string& folder) {
   }
 }
 
-std::string SettingText(const SweepDefinition& definition,
-                        const std::vector<std::string>& values) {
-  std::string text;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    text += (i == 0 ? "--" : " --") + definition.axes[i].flag + "=" +
-            QuoteForShell(values[i]);
-  }
-  return text.empty() ? "(no flags)" : text;
-}
-
 void TellRuns(const SweepResult& result) {
   int counts[3] = {0, 0, 0};
   int missing = 0;
@@ -288,10 +289,30 @@ void TellBest(const SweepResult& result, const std::string& folder) {
                 SettingText(result.definition, settings[i].values).c_str());
   }
   WriteFileAtomically(folder + "/best.flags", [&](std::ostream& output) {
-    for (std::size_t i = 0; i < setting.values.size(); ++i) {
-      output << "--" << result.definition.axes[i].flag << '='
-             << setting.values[i] << '\n';
+    for (const std::string& flag :
+         SettingFlags(result.definition, setting.values)) {
+      output << flag << '\n';
     }
+  });
+}
+
+// sweep.svg and sweep.html.
+void WriteOverview(const SweepResult& result, const std::string& folder) {
+  constexpr std::size_t kFigures = 8;
+  OverviewOptions options;
+  options.minimize = FLAGS_maximize.empty();
+  options.objective = options.minimize ? FLAGS_minimize : FLAGS_maximize;
+  std::istringstream names(FLAGS_figures);
+  std::string name;
+  while (std::getline(names, name, ',')) options.figures.push_back(name);
+  if (options.figures.empty()) {
+    options.figures = ChooseFigures(result, options.objective, kFigures);
+  }
+  WriteFileAtomically(folder + "/sweep.html", [&](std::ostream& output) {
+    output << OverviewHtml(result, options);
+  });
+  WriteFileAtomically(folder + "/sweep.svg", [&](std::ostream& output) {
+    output << OverviewSvg(result, options);
   });
 }
 
@@ -357,6 +378,7 @@ int Run(const std::vector<std::string>& command) {
     WriteSweepTable(result, FLAGS_times, output);
   });
   TellRuns(result);
+  WriteOverview(result, folder);
   if (!FLAGS_minimize.empty() || !FLAGS_maximize.empty()) {
     TellBest(result, folder);
   }
@@ -382,11 +404,12 @@ int main(int argc, char** argv) {
       "plumbline_solve --input=datasets/office.clf.gz --outputs=none";
   info.groups = {
       {"Runs",
-       {"grid", "trials", "seed", "seed_flag", "evaluate", "time_limit",
-        "retry_failed"}},
+       {"grid", "one_at_a_time", "trials", "seed", "seed_flag", "evaluate",
+        "time_limit", "retry_failed"}},
       {"Where they run", {"launcher", "jobs", "hosts", "launcher_options"}},
       {"Results",
-       {"output_dir", "minimize", "maximize", "times", "quiet", "verbose"}},
+       {"output_dir", "minimize", "maximize", "figures", "times", "quiet",
+        "verbose"}},
       {"Inner workings", {"run"}}};
   info.takes_arguments = true;
   const std::vector<std::string> command =

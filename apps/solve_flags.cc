@@ -1,4 +1,5 @@
 #include <gflags/gflags.h>
+#include <plumbline/apps/detector_parameters.h>
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/error.h>
 
@@ -51,6 +52,10 @@ DEFINE_string(hierarchy, "",
               "orientation_mixture/orientation_relation; points: "
               "line_ransac,circle_ransac/center_cluster,orientation_mixture/"
               "orientation_relation)");
+DEFINE_string(detector_parameters, "",
+              "Parameters of detectors other than their defaults, as "
+              "detector.name=value, separated by commas; they come before the "
+              "flags that say the same");
 DEFINE_string(allowed_angles, "0,45,90,135",
               "Angles between orientations that are looked for, degrees");
 DEFINE_double(angle_resolution, 0.0,
@@ -177,8 +182,8 @@ std::vector<FlagGroup> SolveFlagGroups() {
       {"Graphs",
        {"initial_guess", "max_solver_iterations", "information_frame"}},
       {"Structure",
-       {"structure", "hierarchy", "allowed_angles", "angle_resolution",
-        "structure_sigma_segment_orientation",
+       {"structure", "hierarchy", "detector_parameters", "allowed_angles",
+        "angle_resolution", "structure_sigma_segment_orientation",
         "structure_sigma_orientation_orientation", "structure_sigma_same_wall",
         "structure_sigma_same_wall_angle",
         "structure_sigma_point_line_distance",
@@ -237,6 +242,12 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.global_association = FLAGS_global_association;
   set("same_wall", "sigma_offset", FLAGS_structure_sigma_same_wall);
   set("same_wall", "sigma_angle_deg", FLAGS_structure_sigma_same_wall_angle);
+  for (const auto& [detector, parameters] :
+       ParseDetectorParameters(FLAGS_detector_parameters)) {
+    for (const auto& [name, value] : parameters) {
+      options.detector_parameters[detector][name] = value;
+    }
+  }
   options.refine = FLAGS_refine == "none"  ? Refinement::kNone
                    : FLAGS_refine == "map" ? Refinement::kMap
                                            : Refinement::kFull;

@@ -4,14 +4,15 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/number_text.h>
 
+#include <algorithm>
 #include <cctype>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <string_view>
 #include <system_error>
 
@@ -55,7 +56,9 @@ std::string RunName(const SweepDefinition& definition, const SweepRun& run) {
   std::string name;
   for (std::size_t i = 0; i < run.values.size(); ++i) {
     exact += definition.axes[i].flag + '\0' + run.values[i] + '\0';
-    name += definition.axes[i].flag + "=" + run.values[i] + ",";
+    std::string flag = definition.axes[i].flag;
+    std::replace(flag.begin(), flag.end(), ':', '.');
+    name += flag + "=" + run.values[i] + ",";
   }
   const std::string seed = "seed=" + std::to_string(run.seed);
   bool is_exact = name.size() + seed.size() <= kLongestName;
@@ -98,6 +101,36 @@ void AddNumbers(const Json& json, const std::string& name, bool count_lists,
   } else if (json.is_number()) {
     figures->emplace_back(name, json.get<double>());
   }
+}
+
+// Runs without seeds and names.
+std::vector<SweepRun> AllCombinations(const std::vector<SweepAxis>& axes) {
+  std::vector<SweepRun> settings(1);
+  for (const SweepAxis& axis : axes) {
+    std::vector<SweepRun> finer;
+    for (const SweepRun& setting : settings) {
+      for (const std::string& value : axis.values) {
+        finer.push_back(setting);
+        finer.back().values.push_back(value);
+      }
+    }
+    settings = std::move(finer);
+  }
+  return settings;
+}
+
+std::vector<SweepRun> OneAtATime(const std::vector<SweepAxis>& axes) {
+  std::vector<SweepRun> settings(1);
+  for (const SweepAxis& axis : axes) {
+    settings[0].values.push_back(axis.values[0]);
+  }
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    for (std::size_t k = 1; k < axes[i].values.size(); ++k) {
+      settings.push_back(settings[0]);
+      settings.back().values[i] = axes[i].values[k];
+    }
+  }
+  return settings;
 }
 
 RunStatus StatusFromName(const std::string& name) {
@@ -155,6 +188,7 @@ void WriteDefinition(const SweepDefinition& definition,
     environment[name] = value;
   }
   WriteJson({{"axes", std::move(axes)},
+             {"one_at_a_time", definition.one_at_a_time},
              {"trials", definition.trials},
              {"first_seed", definition.first_seed},
              {"seed_flag", definition.seed_flag},
@@ -178,6 +212,7 @@ std::optional<SweepDefinition> ReadDefinition(const std::string& folder) {
           {axis.at("flag").get<std::string>(),
            axis.at("values").get<std::vector<std::string>>()});
     }
+    definition.one_at_a_time = json.at("one_at_a_time").get<bool>();
     definition.trials = json.at("trials").get<int>();
     definition.first_seed = json.at("first_seed").get<std::uint64_t>();
     definition.seed_flag = json.at("seed_flag").get<std::string>();
@@ -222,17 +257,9 @@ void CheckSameRuns(const SweepDefinition& old_one,
 }
 
 std::vector<SweepRun> MakeRuns(const SweepDefinition& definition) {
-  std::vector<SweepRun> settings(1);
-  for (const SweepAxis& axis : definition.axes) {
-    std::vector<SweepRun> finer;
-    for (const SweepRun& setting : settings) {
-      for (const std::string& value : axis.values) {
-        finer.push_back(setting);
-        finer.back().values.push_back(value);
-      }
-    }
-    settings = std::move(finer);
-  }
+  const std::vector<SweepRun> settings = definition.one_at_a_time
+                                             ? OneAtATime(definition.axes)
+                                             : AllCombinations(definition.axes);
   std::vector<SweepRun> runs;
   for (const SweepRun& setting : settings) {
     for (int trial = 0; trial < definition.trials; ++trial) {
@@ -244,12 +271,44 @@ std::vector<SweepRun> MakeRuns(const SweepDefinition& definition) {
   return runs;
 }
 
+std::vector<std::string> SettingFlags(const SweepDefinition& definition,
+                                      const std::vector<std::string>& values) {
+  std::vector<std::string> flags;
+  // Where the list of a flag with keys stands.
+  std::map<std::string, std::size_t> lists;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::string& flag = definition.axes[i].flag;
+    const std::size_t colon = flag.find(':');
+    if (colon == std::string::npos) {
+      flags.push_back("--" + flag + "=" + values[i]);
+      continue;
+    }
+    const std::string entry = flag.substr(colon + 1) + "=" + values[i];
+    const auto list = lists.emplace(flag.substr(0, colon), flags.size());
+    if (list.second) {
+      flags.push_back("--" + list.first->first + "=" + entry);
+    } else {
+      flags[list.first->second] += "," + entry;
+    }
+  }
+  return flags;
+}
+
+std::string SettingText(const SweepDefinition& definition,
+                        const std::vector<std::string>& values) {
+  std::string text;
+  for (const std::string& flag : SettingFlags(definition, values)) {
+    text += (text.empty() ? "" : " ") + QuoteForShell(flag);
+  }
+  return text.empty() ? "(no flags)" : text;
+}
+
 std::vector<std::string> RunCommand(const SweepDefinition& definition,
                                     const SweepRun& run,
                                     const std::string& run_folder) {
   std::vector<std::string> command = definition.command;
-  for (std::size_t i = 0; i < run.values.size(); ++i) {
-    command.push_back("--" + definition.axes[i].flag + "=" + run.values[i]);
+  for (std::string& flag : SettingFlags(definition, run.values)) {
+    command.push_back(std::move(flag));
   }
   if (!definition.seed_flag.empty()) {
     command.push_back("--" + definition.seed_flag + "=" +

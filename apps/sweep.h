@@ -16,6 +16,9 @@ namespace plumbline {
 /// any machine that sees the folder can do any of the runs.
 struct SweepDefinition {
   std::vector<SweepAxis> axes;
+  /// The settings are not all combinations, but the first values of all axes
+  /// and, axis by axis, its other values with the first ones of the rest.
+  bool one_at_a_time = false;
   /// Runs of every setting, with the seeds first_seed, first_seed + 1, ...
   int trials = 1;
   std::uint64_t first_seed = 1;
@@ -58,8 +61,17 @@ struct SweepRun {
   std::string name;
 };
 
-/// All runs: the first axis varies slowest, the seed fastest.
+/// All runs: the first axis varies slowest, the seed fastest; one at a time the
+/// first values of all axes come first, then the axes in their order.
 std::vector<SweepRun> MakeRuns(const SweepDefinition& definition);
+
+/// The flags of a setting as the command takes them: "--link_radius=5".
+std::vector<std::string> SettingFlags(const SweepDefinition& definition,
+                                      const std::vector<std::string>& values);
+
+/// The same in one line for a shell.
+std::string SettingText(const SweepDefinition& definition,
+                        const std::vector<std::string>& values);
 
 /// What the run executes: the command with the run's flags behind it.
 std::vector<std::string> RunCommand(const SweepDefinition& definition,

@@ -127,7 +127,8 @@ std::vector<SweepAxis> ParseGrid(const std::string& text) {
     const bool is_name =
         !axis.flag.empty() && axis.flag[0] != '-' &&
         std::all_of(axis.flag.begin(), axis.flag.end(), [](unsigned char c) {
-          return std::isalnum(c) || c == '_' || c == '-' || c == '.';
+          return std::isalnum(c) || c == '_' || c == '-' || c == '.' ||
+                 c == ':';
         });
     if (equals == std::string::npos || !is_name) {
       Refuse("cannot read '" + Trim(piece) + "'",

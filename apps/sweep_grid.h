@@ -8,7 +8,8 @@ namespace plumbline {
 
 /// A flag and the values that a sweep gives it.
 struct SweepAxis {
-  /// Without dashes.
+  /// Without dashes. Or "flag:key", for flags that take a list of keys and
+  /// values: all axes of one such flag make one --flag=key=value,key=value.
   std::string flag;
   /// As they are written on the command line; no two are the same.
   std::vector<std::string> values;

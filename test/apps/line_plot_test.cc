@@ -111,5 +111,19 @@ TEST(LinePlotTest, RefusesSizesThatDisagree) {
   EXPECT_THROW(PlotSvg({plot}), Error);
 }
 
+TEST(PlotSvgTest, RowsOfSeveralPlots) {
+  LinePlot plot;
+  plot.width = 300;
+  plot.height = 200;
+  LinePlot tall = plot;
+  tall.height = 250;
+  const std::string svg = PlotSvg({plot, tall, plot}, 2);
+  EXPECT_NE(svg.find("width=\"600\" height=\"450\""), std::string::npos);
+  EXPECT_NE(svg.find("translate(300 0)"), std::string::npos);
+  EXPECT_EQ(PlotSvg({plot}, 2).find("translate"), std::string::npos);
+  EXPECT_NE(PlotSvg({plot}, 2).find("width=\"300\" height=\"200\""),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -880,6 +880,10 @@ TEST_F(SolveTest, AbsurdFlags) {
         "--hierarchy=orientation_relation/orientation_mixture",
         "--allowed_angles=x", "--allowed_angles=0,,90", "--allowed_angles=1e9",
         "--allowed_angles=", "--angle_resolution=1e-6", "--laser_start_angle=x",
+        "--detector_parameters=sigma",
+        "--detector_parameters=no_such_detector.sigma=1",
+        "--detector_parameters=orientation_mixture.no_such=1",
+        "--detector_parameters=orientation_mixture.sigma_deg=-1",
         "--laser_step=nan", "--laser_step=0", "--laser_max_range=-1"}) {
     EXPECT_EQ(Solve(log, "out", flag, &output), 2) << flag << "\n" << output;
     EXPECT_THAT(output, HasSubstr(": expected ")) << flag;

@@ -146,6 +146,8 @@ TEST_F(SweepBinaryTest, ATableOfAllRuns) {
   EXPECT_THAT(output, HasSubstr("runs: 6; 6 done, 0 failed, 0 timed out\n"));
   EXPECT_THAT(output, HasSubstr("best: --x=1: y = 1.55 [1.5, 1.6]\n"));
   EXPECT_EQ(Read("out/best.flags"), "--x=1\n");
+  EXPECT_THAT(Read("out/sweep.svg"), HasSubstr("</svg>"));
+  EXPECT_THAT(Read("out/sweep.html"), HasSubstr("Least y"));
 
   // More values and another question: only what is new is run.
   ASSERT_EQ(Run("--grid='x=1,4' --trials=2 --seed=5 --maximize=y "
@@ -161,6 +163,11 @@ TEST_F(SweepBinaryTest, ATableOfAllRuns) {
   // Without a command the sweep in the folder goes on.
   ASSERT_EQ(Run("--minimize=y --output_dir=" + folder_ + "/out", &output), 0);
   EXPECT_EQ(Notes().size(), 8u);
+  EXPECT_EQ(Run("--figures=z --output_dir=" + folder_ + "/out", &output), 2);
+  EXPECT_THAT(output, HasSubstr("--figures: no run has a figure 'z'"));
+  ASSERT_EQ(
+      Run("--figures=y --minimize=y --output_dir=" + folder_ + "/out", &output),
+      0);
   EXPECT_EQ(Read("out/best.flags"), "--x=1\n");
 }
 

@@ -328,7 +328,7 @@ TEST_F(SweepLauncherTest, SlurmOnOneNode) {
     } else {
       ASSERT_TRUE(WIFSIGNALED(status));
       Shell("squeue --noheader --format=%t", &output);
-      EXPECT_EQ(output, "R\n");
+      EXPECT_THAT(output, HasSubstr("R\n"));
       // The slow run again, with a limit.
       EXPECT_EQ(Shell(binary_ +
                           " --time_limit=1 --launcher=slurm "

@@ -69,6 +69,7 @@ class SweepTest : public ::testing::Test {
 TEST_F(SweepTest, DefinitionsComeBackFromTheirFile) {
   EXPECT_FALSE(ReadDefinition(folder_));
   definition_.axes = {{"x", {"1", "a,b"}}, {"y", {""}}};
+  definition_.one_at_a_time = true;
   definition_.trials = 7;
   definition_.first_seed = 18446744073709551000u;
   definition_.seed_flag = "";
@@ -83,6 +84,7 @@ TEST_F(SweepTest, DefinitionsComeBackFromTheirFile) {
   EXPECT_EQ(read->axes[0].flag, "x");
   EXPECT_THAT(read->axes[0].values, ElementsAre("1", "a,b"));
   EXPECT_THAT(read->axes[1].values, ElementsAre(""));
+  EXPECT_TRUE(read->one_at_a_time);
   EXPECT_EQ(read->trials, 7);
   EXPECT_EQ(read->first_seed, 18446744073709551000u);
   EXPECT_EQ(read->seed_flag, "");
@@ -134,8 +136,24 @@ TEST_F(SweepTest, RunsAreAllCombinationsTheSeedFastest) {
   EXPECT_THAT(RunCommand(definition_, runs[0], "/out"),
               ElementsAre("/bin/program", "--input=i", "--a=1", "--b=x",
                           "--output_dir=/out"));
+  definition_.one_at_a_time = true;
+  definition_.trials = 1;
+  std::vector<std::string> names;
+  for (const SweepRun& run : MakeRuns(definition_)) names.push_back(run.name);
+  EXPECT_THAT(names, ElementsAre("a=1,b=x,seed=5", "a=2,b=x,seed=5",
+                                 "a=1,b=y,seed=5", "a=1,b=z,seed=5"));
   definition_.axes.clear();
   EXPECT_EQ(MakeRuns(definition_).at(0).name, "seed=5");
+}
+
+TEST_F(SweepTest, AxesOfAFlagWithKeysMakeOneList) {
+  definition_.command = {"p"};
+  definition_.axes = {{"d:a.x", {"1"}}, {"y", {"2"}}, {"d:b.z", {"3"}}};
+  const SweepRun run = MakeRuns(definition_).at(0);
+  EXPECT_THAT(RunCommand(definition_, run, "/o"),
+              ElementsAre("p", "--d=a.x=1,b.z=3", "--y=2", "--seed=1",
+                          "--output_dir=/o"));
+  EXPECT_EQ(run.name, "d.a.x=1,y=2,d.b.z=3,seed=1");
 }
 
 TEST_F(SweepTest, FoldersOfRunsAreDifferentAndShort) {

@@ -15,9 +15,42 @@ double Now() {
       .count();
 }
 
+std::string RawType(const LogSolverOptions& options) {
+  return options.features == RawFeatures::kPoints ? "point" : "segment";
+}
+
 std::string HierarchyOf(const LogSolverOptions& options) {
-  return options.hierarchy.empty() ? DefaultHierarchy({"segment"})
+  return options.hierarchy.empty() ? DefaultHierarchy({RawType(options)})
                                    : options.hierarchy;
+}
+
+// The constraints from the robot that an EM step while replaying reaches at
+// most: points are bound to farther ones than segments, and there are more.
+constexpr int kPointEmDepth = 1;
+
+// The detectors of lines and circles have the synthetic worlds' noise of
+// decimetres as defaults. A point of a log is placed across its wall by many
+// returns, to a centimetre. Walls go on behind open doors, and a row of points
+// is a wall of its own when it is a hand's breadth from another.
+DetectorParameters CurvesOfALog() {
+  return {{"tolerance", 0.1}, {"gate", 0.06}, {"max_gap", 2.5}, {"reach", 2.0}};
+}
+
+// What points cannot do is off.
+LogSolverOptions Settle(LogSolverOptions options) {
+  if (options.features == RawFeatures::kPoints) {
+    options.global_association = false;
+    options.complete_walls = false;
+    if (options.refine == Refinement::kFull) options.refine = Refinement::kMap;
+    for (const char* detector : {"line_ransac", "circle_ransac"}) {
+      // What was given stays.
+      for (const auto& parameter : CurvesOfALog()) {
+        options.detector_parameters[detector].insert(parameter);
+      }
+    }
+    options.em_depth = std::min(options.em_depth, kPointEmDepth);
+  }
+  return options;
 }
 
 // With same_wall as the last detector of level 0, unless it is there.
@@ -30,12 +63,35 @@ std::string WithSameWall(std::string hierarchy) {
 
 }  // namespace
 
+std::unique_ptr<GraphBuilder> MakeGraphBuilder(const LogSolverOptions& options,
+                                               Graph* graph,
+                                               const Registry& registry) {
+  if (options.features == RawFeatures::kPoints) {
+    return std::make_unique<PointMapBuilder>(graph, registry,
+                                             options.point_builder);
+  }
+  return std::make_unique<MapBuilder>(graph, registry, options.builder);
+}
+
+KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
+                    const std::vector<ScanPoint>& returns) {
+  KeyScan key;
+  key.index = index;
+  key.motion = refined.since_key;
+  key.start = refined.pose;
+  key.returns = returns;
+  key.laser = scan.laser_offset.head<2>();
+  key.angle_step = scan.angle_step;
+  return key;
+}
+
 LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
-    : registry_(registry), options_(options) {
+    : registry_(registry), options_(Settle(options)) {
   Hierarchy hierarchy;
   if (options_.structure) {
-    hierarchy = MakeHierarchy(HierarchyOf(options_), registry_, {"segment"},
-                              options_.detector_parameters);
+    hierarchy =
+        MakeHierarchy(HierarchyOf(options_), registry_, {RawType(options_)},
+                      options_.detector_parameters);
   }
   session_ =
       std::make_unique<SolverSession>(&graph_, registry_, options_.session);
@@ -63,8 +119,8 @@ void LogSolver::BeginClosing() {
   before_closing_ = em_->totals();
   em_ = std::make_unique<EmOrchestrator>(
       &graph_, session_.get(), registry_,
-      MakeHierarchy(WithSameWall(HierarchyOf(options_)), registry_, {"segment"},
-                    options_.detector_parameters),
+      MakeHierarchy(WithSameWall(HierarchyOf(options_)), registry_,
+                    {RawType(options_)}, options_.detector_parameters),
       options);
   TraceEm();
 }
@@ -82,7 +138,8 @@ LogSolverResult LogSolver::Run(
     const std::function<bool()>& stop) {
   LogSolverResult result;
   OdometryRefiner refiner(options_.odometry);
-  MapBuilder builder(&graph_, registry_, options_.builder);
+  const std::unique_ptr<GraphBuilder> builder =
+      MakeGraphBuilder(options_, &graph_, registry_);
   std::vector<RefinedScan> refined;
   refined.reserve(log.scans.size());
   result.scan_seconds.reserve(log.scans.size());
@@ -101,15 +158,12 @@ LogSolverResult LogSolver::Run(
     refined.push_back(refiner.Process(scan));
     ++since_em;
     if (refined.back().is_key) {
-      builder.AddKeyScan(
-          static_cast<int>(i), refined.back().since_key,
-          ExtractSegments(refiner.points(), scan.laser_offset.head<2>(),
-                          scan.angle_step, options_.segments),
-          refined.back().pose);
+      builder->AddScan(MakeKeyScan(static_cast<int>(i), scan, refined.back(),
+                                   refiner.points()));
       if (options_.em_every > 0 && since_em >= options_.em_every) {
         since_em = 0;
         const double em_begin = Now();
-        builder.WriteRobot();
+        builder->WriteRobot();
         if (graph_.num_features() <
                 static_cast<std::size_t>(options_.small_map) &&
             graph_.num_features() > features_at_last_global + 10) {
@@ -117,10 +171,10 @@ LogSolverResult LogSolver::Run(
           em_->Iterate();
         } else {
           const std::vector<FeatureId> scope =
-              builder.Neighborhood(options_.em_depth);
+              builder->Neighborhood(options_.em_depth);
           em_->Iterate(&scope);
         }
-        builder.ReadRobot();
+        builder->ReadRobot();
         em_seconds += Now() - em_begin;
       }
     }
@@ -129,7 +183,7 @@ LogSolverResult LogSolver::Run(
   }
   result.frontend_seconds = Now() - begin - em_seconds;
 
-  builder.WriteRobot();
+  builder->WriteRobot();
   result.initial_cost = session_->Cost();
   TraceEm();
   result.em = em_->Run(stop);
@@ -140,7 +194,7 @@ LogSolverResult LogSolver::Run(
     result.em.iterations += closing.iterations;
     result.em.converged = closing.converged;
   }
-  builder.ReadRobot();
+  builder->ReadRobot();
   result.final_cost = session_->Cost();
   if (stop && stop()) result.interrupted = true;
 
@@ -149,15 +203,15 @@ LogSolverResult LogSolver::Run(
     const double relocalization_begin = Now();
     keys.clear();
     if (options_.refine != Refinement::kNone) {
-      keys = RelocalizeKeyScans(graph_, builder.records(),
+      keys = RelocalizeKeyScans(graph_, builder->records(),
                                 options_.relocalization);
     } else {
-      for (const KeyScanRecord& record : builder.records()) {
+      for (const KeyScanRecord& record : builder->records()) {
         keys.push_back(record.pose);
       }
     }
     std::vector<Pose2> poses =
-        InterpolateScans(refined, builder.records(), keys);
+        InterpolateScans(refined, builder->records(), keys);
     result.relocalization_seconds += Now() - relocalization_begin;
     return poses;
   };
@@ -176,7 +230,7 @@ LogSolverResult LogSolver::Run(
       const EmReport again = em_->Run(stop);
       result.em.iterations += again.iterations;
       result.em.converged = again.converged;
-      builder.ReadRobot();
+      builder->ReadRobot();
       result.final_cost = session_->Cost();
       result.trajectory = trajectory();
       if (stop && stop()) result.interrupted = true;
@@ -186,15 +240,15 @@ LogSolverResult LogSolver::Run(
   if (options_.refine == Refinement::kFull && !result.interrupted) {
     const double adjustment_begin = Now();
     JointAdjustment adjustment(&graph_, session_.get(), registry_, log.scans,
-                               refined, builder.records(), keys,
-                               builder.robot_id(), options_.adjustment);
+                               refined, builder->records(), keys,
+                               builder->robot_id(), options_.adjustment);
     adjustment.Adjust();
     const EmReport again = em_->Run(stop);
     result.em.iterations += again.iterations;
     result.em.converged = again.converged;
     result.final_cost = session_->Cost();
     result.trajectory =
-        InterpolateScans(refined, builder.records(), adjustment.KeyPoses());
+        InterpolateScans(refined, builder->records(), adjustment.KeyPoses());
     result.scan_relations = adjustment.num_relations();
     result.wall_votes = adjustment.num_votes();
     result.adjustment_seconds = Now() - adjustment_begin;
@@ -204,12 +258,12 @@ LogSolverResult LogSolver::Run(
   result.solve_seconds =
       before_closing_.solve_seconds + em_->totals().solve_seconds;
 
-  result.key_scans = static_cast<std::int64_t>(builder.records().size());
+  result.key_scans = static_cast<std::int64_t>(builder->records().size());
   result.wide_searches = refiner.wide_searches();
   result.refused_matches = refiner.refusals();
-  result.segment_matches = builder.num_matches();
-  result.segments_created = builder.num_created();
-  result.records = builder.records();
+  result.feature_matches = builder->num_matches();
+  result.features_created = builder->num_created();
+  result.records = builder->records();
   result.refined = std::move(refined);
   return result;
 }

@@ -5,12 +5,13 @@
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/session.h>
+#include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/joint_adjustment.h>
 #include <plumbline/frontend/map_builder.h>
 #include <plumbline/frontend/odometry_refinement.h>
+#include <plumbline/frontend/point_map_builder.h>
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/frontend/scan.h>
-#include <plumbline/frontend/segment_extraction.h>
 #include <plumbline/frontend/wall_completion.h>
 
 #include <functional>
@@ -31,15 +32,25 @@ enum class Refinement {
   kFull,
 };
 
+/// Raw features that a log's scans become: level 0 of the hierarchy.
+enum class RawFeatures {
+  kSegments,
+  kPoints,
+};
+
 struct LogSolverOptions {
+  /// With points there are no walls at level 0 and hence no global association,
+  /// no completion of walls, and no refinement further than Refinement::kMap.
+  RawFeatures features = RawFeatures::kSegments;
   /// Find structure. False: measurements only.
   bool structure = true;
   /// Detectors by level (MakeHierarchy); empty: DefaultHierarchy.
   std::string hierarchy;
   std::map<std::string, DetectorParameters> detector_parameters;
   OdometryRefinementOptions odometry;
-  SegmentExtractionOptions segments;
+  /// Of segments, and of points.
   MapBuilderOptions builder;
+  PointMapBuilderOptions point_builder;
   SessionOptions session;
   EmOptions em;
   RelocalizationOptions relocalization;
@@ -92,8 +103,9 @@ struct LogSolverResult {
   std::int64_t key_scans = 0;
   std::int64_t wide_searches = 0;
   std::int64_t refused_matches = 0;
-  std::int64_t segment_matches = 0;
-  std::int64_t segments_created = 0;
+  /// Observations recognized as a raw feature, and raw features made.
+  std::int64_t feature_matches = 0;
+  std::int64_t features_created = 0;
   /// Ended early because `stop` said so: what there is, is whole.
   bool interrupted = false;
   /// What the front-end made of each scan and of the key scans: enough to
@@ -101,6 +113,17 @@ struct LogSolverResult {
   std::vector<RefinedScan> refined;
   std::vector<KeyScanRecord> records;
 };
+
+/// What grows the graph from a log's scans, by options.features. The graph and
+/// registry must outlive it.
+std::unique_ptr<GraphBuilder> MakeGraphBuilder(const LogSolverOptions& options,
+                                               Graph* graph,
+                                               const Registry& registry);
+
+/// A scan as a GraphBuilder takes it: `refined` and `returns` are what odometry
+/// refinement made of the scan with this index.
+KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
+                    const std::vector<ScanPoint>& returns);
 
 /// Replays a log: front-end, EM steps near the robot on the way, EM on the
 /// whole map at the end, and every scan found again on the final map.

@@ -220,6 +220,10 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
   LogSolverOptions options = LogSolverOptionsFromFlags(registry);
+  if (options.features != LogSolverOptions().features) {
+    Remark("%s is a graph: --features is for logs and has no effect",
+           input->name().c_str());
+  }
 
   const double parse_begin = Now();
   Graph graph;

@@ -92,7 +92,7 @@ PLUMBLINE_FLAG_RANGE(delta_threshold, 0.0, 1.0);
 DEFINE_string(full_weight_test, "auto",
               "Judge structure by a solve in which all of it has its full "
               "weight, in place of the weights of the last test: true, false, "
-              "auto (true for graphs of points)");
+              "auto (true for points)");
 PLUMBLINE_FLAG_CHOICES(full_weight_test, "auto", "true", "false");
 DEFINE_string(delta_mode, "frozen",
               "Weighting of structure: frozen, continuous, huber, cauchy, "
@@ -105,6 +105,11 @@ PLUMBLINE_FLAG_RANGE(em_every, 0, 1e9);
 DEFINE_int32(em_max_iterations, 50, "Most EM iterations at the end");
 PLUMBLINE_FLAG_RANGE(em_max_iterations, 1, 100000);
 
+DEFINE_string(features, "segments",
+              "Raw features that a log's scans become: segments, or points "
+              "(on walls, bound by distances; no loops are closed, and the "
+              "final refinement is that of the map)");
+PLUMBLINE_FLAG_CHOICES(features, "segments", "points");
 DEFINE_bool(odometry_refinement, true,
             "Match each scan to what was seen last before association");
 DEFINE_double(link_radius, 10.0,
@@ -173,6 +178,18 @@ std::vector<double> ParseList(const std::string& flag,
   return values;
 }
 
+// Throws when a flag was given this value, which needs segments. A default of
+// the same value is passed over.
+void RefuseForPoints(const std::string& flag, const std::string& value,
+                     const std::string& why) {
+  const gflags::CommandLineFlagInfo info =
+      gflags::GetCommandLineFlagInfoOrDie(flag.c_str());
+  if (info.is_default || info.current_value != value) return;
+  throw Error("--" + flag, 0,
+              "'" + value + "' does not go with --features=points: " + why,
+              "another value, or --features=segments");
+}
+
 }  // namespace
 
 std::vector<FlagGroup> SolveFlagGroups() {
@@ -193,7 +210,7 @@ std::vector<FlagGroup> SolveFlagGroups() {
        {"delta_threshold", "delta_mode", "full_weight_test", "em_every",
         "em_max_iterations"}},
       {"Front-end",
-       {"odometry_refinement", "link_radius", "association_depth",
+       {"features", "odometry_refinement", "link_radius", "association_depth",
         "global_association", "refine", "usable_range"}},
       {"Laser", {"laser_start_angle", "laser_step", "laser_max_range"}},
       {"Running",
@@ -203,6 +220,11 @@ std::vector<FlagGroup> SolveFlagGroups() {
 
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   LogSolverOptions options;
+  if (FLAGS_features == "points") {
+    options.features = RawFeatures::kPoints;
+    RefuseForPoints("global_association", "true", "same_wall reads segments");
+    RefuseForPoints("refine", "full", "returns vote for segments");
+  }
   options.structure = FLAGS_structure;
   options.hierarchy = FLAGS_hierarchy;
 
@@ -233,9 +255,13 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.odometry.points.usable_range = FLAGS_usable_range;
   options.builder.link_radius = FLAGS_link_radius;
   options.builder.association_depth = FLAGS_association_depth;
+  options.point_builder.link_radius = FLAGS_link_radius;
+  options.point_builder.association_depth = FLAGS_association_depth;
   options.session.delta_mode = FLAGS_delta_mode;
   options.em.delta_threshold = FLAGS_delta_threshold;
-  options.em.full_weight_test = FLAGS_full_weight_test == "true";
+  options.em.full_weight_test =
+      FLAGS_full_weight_test == "true" ||
+      (FLAGS_full_weight_test == "auto" && FLAGS_features == "points");
   options.em.max_iterations = FLAGS_em_max_iterations;
   options.em.seed = FLAGS_seed;
   options.em_every = FLAGS_em_every;

@@ -2,6 +2,7 @@
 #include <plumbline/core/session.h>
 
 #include <cmath>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -62,32 +63,32 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
   MapWithoutStructure map;
   if (!options.structure || result.records.empty()) return map;
   Graph graph;
-  MapBuilder builder(&graph, registry, options.builder);
+  const std::unique_ptr<GraphBuilder> builder =
+      MakeGraphBuilder(options, &graph, registry);
   std::vector<ScanPoint> points;
   for (const KeyScanRecord& record : result.records) {
     const Scan& scan = scans[static_cast<std::size_t>(record.scan)];
     const RefinedScan& refined =
         result.refined[static_cast<std::size_t>(record.scan)];
     ExtractScanPoints(scan, options.odometry.points, &points);
-    builder.AddKeyScan(record.scan, refined.since_key,
-                       ExtractSegments(points, scan.laser_offset.head<2>(),
-                                       scan.angle_step, options.segments),
-                       refined.pose);
+    builder->AddScan(MakeKeyScan(record.scan, scan, refined, points));
   }
-  builder.WriteRobot();
+  builder->WriteRobot();
   SolverSession session(&graph, registry, options.session);
   if (!session.SolveGlobal().usable) return map;
 
   std::vector<Pose2> keys;
   if (options.refine != Refinement::kNone) {
-    keys = RelocalizeKeyScans(graph, builder.records(), options.relocalization);
+    keys =
+        RelocalizeKeyScans(graph, builder->records(), options.relocalization);
   }
   for (std::size_t i = 0; i < result.records.size(); ++i) {
-    const std::vector<FeatureMatch>& others = builder.records()[i].matches;
-    if (keys.size() == i) keys.push_back(builder.records()[i].pose);
-    for (const FeatureMatch& match : result.records[i].matches) {
+    const KeyScanRecord& here = result.records[i];
+    const KeyScanRecord& there = builder->records()[i];
+    if (keys.size() == i) keys.push_back(there.pose);
+    for (const FeatureMatch& match : here.matches) {
       if (map.features.count(match.feature) > 0) continue;
-      for (const FeatureMatch& other : others) {
+      for (const FeatureMatch& other : there.matches) {
         if (other.observation.pose != match.observation.pose) continue;
         const Feature* feature = graph.FindFeature(other.feature);
         if (feature == nullptr) continue;
@@ -96,8 +97,28 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
         break;
       }
     }
+    // Where a scan saw a point, this map may have chosen another one on the
+    // same surface.
+    for (const PointMatch& match : here.points) {
+      if (map.features.count(match.feature) > 0) continue;
+      const PointMatch* nearest = nullptr;
+      double smallest = options.point_builder.spacing;
+      for (const PointMatch& other : there.points) {
+        const double distance =
+            (other.observation.position - match.observation.position).norm();
+        if (distance >= smallest ||
+            graph.FindFeature(other.feature) == nullptr) {
+          continue;
+        }
+        smallest = distance;
+        nearest = &other;
+      }
+      if (nearest == nullptr) continue;
+      map.features[match.feature] = graph.GetFeature(nearest->feature);
+      map.features[match.feature].id = match.feature;
+    }
   }
-  map.path = InterpolateScans(result.refined, builder.records(), keys);
+  map.path = InterpolateScans(result.refined, builder->records(), keys);
   return map;
 }
 

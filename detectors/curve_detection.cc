@@ -13,8 +13,6 @@
 namespace plumbline {
 namespace {
 
-// With a list of features, points so many constraints away are looked at too.
-constexpr int kReach = 8;
 constexpr int kMaxRounds = 50;
 
 // A curve with the points that support it, those that are proposed included.
@@ -32,7 +30,7 @@ class CurveDetection {
  public:
   CurveDetection(const Graph& graph, const DetectionScope& scope,
                  CurveKind kind, const CurveSearchOptions& options)
-      : points_(graph, scope, kReach),
+      : points_(graph, scope, options.reach),
         options_(options),
         kind_(kind),
         entries_of_(static_cast<std::size_t>(points_.size())),
@@ -434,6 +432,7 @@ DetectorParameters CurveSearchDefaults() {
       {"min_arc_deg", RadToDeg(defaults.min_arc)},
       {"min_corner_deg", RadToDeg(defaults.min_corner)},
       {"max_radius", defaults.max_radius},
+      {"reach", static_cast<double>(defaults.reach)},
   };
 }
 
@@ -450,6 +449,7 @@ CurveSearchOptions ReadCurveSearchOptions(const ParameterReader& reader) {
   options.min_arc = DegToRad(reader.Get("min_arc_deg", 0.0, 360.0));
   options.min_corner = DegToRad(reader.Get("min_corner_deg", 0.0, 90.0));
   options.max_radius = reader.Get("max_radius", 0.0);
+  options.reach = reader.GetInt("reach", 0);
   return options;
 }
 

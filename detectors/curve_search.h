@@ -41,6 +41,10 @@ struct CurveSearchOptions {
   double min_corner = DegToRad(15.0);
   /// Larger circles are not looked for.
   double max_radius = 50.0;
+  /// Where only some of the points are to be looked at, those so many
+  /// constraints away are taken along: they tell what a curve of theirs is. For
+  /// the detectors; SearchCurves takes its points as they are.
+  int reach = 8;
 };
 
 /// A curve and what tells that it is there.

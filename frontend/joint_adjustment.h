@@ -5,7 +5,7 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/core/session.h>
 #include <plumbline/factors/pose2.h>
-#include <plumbline/frontend/map_builder.h>
+#include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/odometry_refinement.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/scan_relations.h>

@@ -63,6 +63,13 @@ MapBuilder::MapBuilder(Graph* graph, const Registry& registry,
                        const MapBuilderOptions& options)
     : graph_(graph), registry_(registry), options_(options), robot_(graph) {}
 
+void MapBuilder::AddScan(const KeyScan& scan) {
+  AddKeyScan(scan.index, scan.motion,
+             ExtractSegments(scan.returns, scan.laser, scan.angle_step,
+                             options_.extraction),
+             scan.start);
+}
+
 void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
                             const std::vector<SegmentObservation>& observations,
                             const Pose2& start) {

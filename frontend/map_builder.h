@@ -5,10 +5,13 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/association.h>
+#include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/robot_links.h>
 #include <plumbline/frontend/segment_extraction.h>
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <string>
 #include <vector>
 
 namespace plumbline {
@@ -21,6 +24,7 @@ struct MapBuilderOptions {
   /// linked features only.
   int association_depth = 3;
   AssociationOptions association;
+  SegmentExtractionOptions extraction;
   /// A new feature is bound to so many features that the robot is linked to,
   /// and to so many new ones of its own scan.
   int links_per_feature = 5;
@@ -39,62 +43,41 @@ struct MapBuilderOptions {
   double relation_floor_angle = DegToRad(0.3);
 };
 
-/// One observation that was recognized as a feature.
-struct FeatureMatch {
-  FeatureId feature = kNoId;
-  SegmentObservation observation;
-};
-
-/// What is remembered of a key scan: enough to find its pose again when the
-/// map has moved.
-struct KeyScanRecord {
-  /// Index of the scan in the log.
-  int scan = 0;
-  /// Motion since the key scan before, in that scan's frame.
-  UncertainPose2 motion;
-  /// Pose (map frame) as it was when the scan came in.
-  Pose2 pose = Pose2::Zero();
-  /// Recognized features, and those that this scan made.
-  std::vector<FeatureMatch> matches;
-};
-
 /// Grows a graph of segments from scans (method.md, section 7, steps 1 to 4):
 /// predicts, associates by distance in the graph, corrects the robot alone,
-/// adds what is new. Only the last robot pose is kept; what the poses before
-/// it knew is in the relations between features.
-class MapBuilder {
+/// adds what is new. What marginalized poses knew is in the relations between
+/// segments.
+class MapBuilder final : public GraphBuilder {
  public:
   /// The graph and registry must outlive the builder; the graph may have
   /// features already.
   MapBuilder(Graph* graph, const Registry& registry,
              const MapBuilderOptions& options);
 
-  /// Takes a key scan: `motion` since the last one (ignored for the first,
-  /// which starts at `start`), and what it saw.
+  std::string feature_type() const override { return "segment"; }
+
+  void AddScan(const KeyScan& scan) override;
+
+  /// Takes a key scan by what was made of it: `motion` since the last one
+  /// (ignored for the first, which starts at `start`), and what it saw.
   void AddKeyScan(int scan, const UncertainPose2& motion,
                   const std::vector<SegmentObservation>& observations,
                   const Pose2& start);
 
-  /// Writes the robot and its links into the graph as it stands now, so that
-  /// a solve carries the robot along with what it is linked to.
-  void WriteRobot();
-  /// Takes the robot's pose back from the graph after a solve.
-  void ReadRobot() { robot_.Read(); }
-
-  /// Features that the robot is linked to and those they are bound to, up to
-  /// `depth` constraints from the robot, and the robot, ascending.
-  std::vector<FeatureId> Neighborhood(int depth) const {
+  void WriteRobot() override;
+  void ReadRobot() override { robot_.Read(); }
+  std::vector<FeatureId> Neighborhood(int depth) const override {
     return robot_.Neighborhood(depth);
   }
 
-  /// The robot's pose (map frame) and its feature, and what was kept of key
-  /// scans.
+  /// The robot's pose, map frame.
   const Pose2& robot() const { return robot_.pose(); }
-  FeatureId robot_id() const { return robot_.id(); }
-  const std::vector<KeyScanRecord>& records() const { return records_; }
-  /// Observations that matched a feature, and that made one, so far.
-  std::int64_t num_matches() const { return num_matches_; }
-  std::int64_t num_created() const { return num_created_; }
+  FeatureId robot_id() const override { return robot_.id(); }
+  const std::vector<KeyScanRecord>& records() const override {
+    return records_;
+  }
+  std::int64_t num_matches() const override { return num_matches_; }
+  std::int64_t num_created() const override { return num_created_; }
 
  private:
   void SecondLook(const std::vector<FeatureMatch>& matches);

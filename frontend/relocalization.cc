@@ -1,6 +1,7 @@
 #include <ceres/ceres.h>
 #include <plumbline/core/error.h>
 #include <plumbline/factors/information.h>
+#include <plumbline/factors/pose_point.h>
 #include <plumbline/factors/pose_pose.h>
 #include <plumbline/factors/pose_segment_collinearity.h>
 #include <plumbline/frontend/relocalization.h>
@@ -20,6 +21,7 @@ std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
   if (records.empty()) return poses;
 
   std::map<FeatureId, Pose2> features;
+  std::map<FeatureId, Eigen::Vector2d> points;
   ceres::Problem::Options problem_options;
   problem_options.disable_all_safety_checks = true;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -64,8 +66,30 @@ std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
           &loss, poses[k].data(), segment.data());
       anchored = true;
     }
+    for (const PointMatch& match : record.points) {
+      const Feature* feature = graph.FindFeature(match.feature);
+      if (feature == nullptr) continue;
+      Eigen::Vector2d& point =
+          points
+              .emplace(match.feature, Eigen::Vector2d(feature->parameters[0],
+                                                      feature->parameters[1]))
+              .first->second;
+      const PointObservation& observation = match.observation;
+      Eigen::Matrix2d covariance = observation.covariance;
+      covariance.diagonal().array() +=
+          options.point_sigma * options.point_sigma;
+      covariance /= observation.share;
+      problem.AddResidualBlock(
+          PosePoint::Create(observation.position,
+                            SqrtInformationFromCovariance(covariance)),
+          &loss, poses[k].data(), point.data());
+      anchored = true;
+    }
   }
   for (auto& entry : features) {
+    problem.SetParameterBlockConstant(entry.second.data());
+  }
+  for (auto& entry : points) {
     problem.SetParameterBlockConstant(entry.second.data());
   }
   if (!anchored) {

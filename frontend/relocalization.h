@@ -3,7 +3,7 @@
 
 #include <plumbline/core/graph.h>
 #include <plumbline/factors/pose2.h>
-#include <plumbline/frontend/map_builder.h>
+#include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/odometry_refinement.h>
 
 #include <vector>
@@ -16,6 +16,8 @@ struct RelocalizationOptions {
   /// added to each observation's own covariance.
   double feature_offset_sigma = 0.03;
   double feature_angle_sigma = DegToRad(0.7);
+  /// The same of points, m.
+  double point_sigma = 0.03;
   /// Scale of the Cauchy loss on an observation, in sigmas.
   double loss_scale = 2.0;
   int max_iterations = 30;
@@ -23,9 +25,9 @@ struct RelocalizationOptions {
 };
 
 /// Finds every key scan's pose again on the final map: refined odometry from
-/// key to key, and each recognized segment on its feature, whose place is held
-/// constant. Returns the poses (map frame) in the order of records. Throws
-/// Error when the solve fails.
+/// key to key, and each recognized segment or point on its feature, whose place
+/// is held constant. Returns the poses (map frame) in the order of records.
+/// Throws Error when the solve fails.
 std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
                                       const std::vector<KeyScanRecord>& records,
                                       const RelocalizationOptions& options);

@@ -61,7 +61,7 @@ TEST_F(LogSolverTest, SolvesTheStartOfALog) {
   ExpectFinite(result.trajectory);
   EXPECT_GT(result.key_scans, 20);
   EXPECT_LE(result.key_scans, 250);
-  EXPECT_GT(result.segment_matches, result.segments_created);
+  EXPECT_GT(result.feature_matches, result.features_created);
   EXPECT_TRUE(result.em.converged);
   EXPECT_TRUE(std::isfinite(result.final_cost.total()));
   EXPECT_FALSE(solver.trace().empty());
@@ -230,6 +230,93 @@ TEST_F(LogSolverTest, ScansWithoutAnyReturn) {
   for (std::size_t i = 0; i < 40; ++i) {
     EXPECT_LT((result.trajectory[i] - log.scans[i].odometry).norm(), 1e-6) << i;
   }
+}
+
+LogSolverOptions Points() {
+  LogSolverOptions options;
+  options.features = RawFeatures::kPoints;
+  options.em.full_weight_test = true;
+  return options;
+}
+
+TEST_F(LogSolverTest, PointsAsLevelZero) {
+  LogSolver solver(registry_, Points());
+  const LogSolverResult result = solver.Run(Office(250));
+  EXPECT_FALSE(result.interrupted);
+  ASSERT_EQ(result.trajectory.size(), 250u);
+  ExpectFinite(result.trajectory);
+  EXPECT_GT(result.feature_matches, 5 * result.features_created);
+  EXPECT_TRUE(result.em.converged);
+  std::map<std::string, std::map<int, int>> features;
+  for (const Feature* feature : solver.graph().Features()) {
+    ++features[feature->type->name][feature->level];
+  }
+  EXPECT_EQ(features.count("segment"), 0u);
+  EXPECT_EQ(features["point"][0], result.features_created);
+  EXPECT_EQ(features["pose"][0], 1);
+  EXPECT_GE(features["line"][1], 5);
+  EXPECT_GE(features["orientation"][2], 2);
+  std::set<std::string> relations;
+  for (const Constraint* constraint : solver.graph().Constraints()) {
+    relations.insert(constraint->type->name);
+  }
+  EXPECT_EQ(relations,
+            (std::set<std::string>{
+                "line_orientation", "orientation_orientation",
+                "point_line_distance", "point_point_distance", "pose_point"}));
+  // What needs walls at level 0 was left out, though the options ask for it.
+  EXPECT_EQ(result.glimpsed_walls, 0);
+  EXPECT_EQ(result.scan_relations, 0);
+  EXPECT_EQ(result.wall_votes, 0);
+}
+
+TEST_F(LogSolverTest, PointsWithoutStructure) {
+  LogSolverOptions options = Points();
+  options.structure = false;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(Office(150));
+  ASSERT_EQ(result.trajectory.size(), 150u);
+  ExpectFinite(result.trajectory);
+  EXPECT_EQ(result.final_cost.structure, 0.0);
+  for (const Feature* feature : solver.graph().Features()) {
+    EXPECT_FALSE(feature->is_virtual);
+  }
+}
+
+TEST_F(LogSolverTest, PointsSameBytesEveryTime) {
+  const Log log = Office(150);
+  LogSolver first(registry_, Points());
+  LogSolver second(registry_, Points());
+  const LogSolverResult a = first.Run(log);
+  const LogSolverResult b = second.Run(log);
+  EXPECT_EQ(a.trajectory, b.trajectory);
+  EXPECT_EQ(Json(first.graph()), Json(second.graph()));
+}
+
+TEST_F(LogSolverTest, PointsOfBrokenLogs) {
+  LogSolver empty(registry_, Points());
+  EXPECT_TRUE(empty.Run(Log()).trajectory.empty());
+  Log log = Office(40);
+  for (Scan& scan : log.scans) {
+    scan.ranges.assign(scan.ranges.size(), 0.0f);
+  }
+  log.scans[3].ranges.clear();
+  LogSolver solver(registry_, Points());
+  const LogSolverResult result = solver.Run(log);
+  ASSERT_EQ(result.trajectory.size(), 40u);
+  for (std::size_t i = 0; i < 40; ++i) {
+    EXPECT_LT((result.trajectory[i] - log.scans[i].odometry).norm(), 1e-6) << i;
+  }
+}
+
+TEST_F(LogSolverTest, PointsTakeTheirOwnHierarchyOnly) {
+  LogSolverOptions options = Points();
+  options.hierarchy = "line_ransac/orientation_mixture/orientation_relation";
+  LogSolver solver(registry_, options);
+  EXPECT_EQ(solver.Run(Office(60)).trajectory.size(), 60u);
+  // Segments' detectors find nothing to read.
+  options.hierarchy = "orientation_mixture/orientation_relation";
+  EXPECT_THROW(LogSolver(registry_, options), Error);
 }
 
 TEST_F(LogSolverTest, WrongHierarchyIsRefused) {

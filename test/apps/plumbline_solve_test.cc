@@ -401,6 +401,94 @@ TEST_F(SolveTest, SameBytesEveryTime) {
   ExpectSame("a", "two");
 }
 
+TEST_F(SolveTest, OfficeWithPoints) {
+  std::string output;
+  const std::string points = "--features=points ";
+  ASSERT_EQ(Solve(office_, "out", points + "--num_threads=1", &output), 0)
+      << output;
+  EXPECT_EQ(output, "");
+  CheckFiles("out", FilesOfALog());
+  const auto summary = SummaryOf("out");
+  EXPECT_EQ(summary["flags"]["features"], "points");
+  EXPECT_TRUE(summary["em"]["converged"].get<bool>());
+  EXPECT_LT(summary["orthogonality_deg"].get<double>(), 1.0);
+  EXPECT_EQ(summary["closures"]["proposed"], 0);
+  const auto& features = summary["counts"]["features"];
+  EXPECT_GT(features["point"]["0"].get<int>(), 300);
+  EXPECT_LT(features["point"]["0"].get<int>(), 700);
+  EXPECT_GE(features["line"]["1"].get<int>(), 20);
+  EXPECT_GE(features["orientation"]["2"].get<int>(), 2);
+  EXPECT_FALSE(features.contains("segment"));
+
+  const RelationEvaluation evaluation =
+      EvaluateRelations(ReadTum((folder_ / "out/trajectory.tum").string()),
+                        ReadRelations(std::string(PLUMBLINE_SOURCE_DIR) +
+                                      "/datasets/office.relations"));
+  EXPECT_TRUE(evaluation.unmatched.empty());
+  EXPECT_LT(evaluation.translation.mean, 0.03);
+  EXPECT_LT(evaluation.rotation_deg.mean, 0.2);
+
+  // The building's directions, and no others.
+  Graph map;
+  std::istringstream text(Out("out", "map.json"));
+  ReadGraphJson(text, "map.json", registry_, &map);
+  std::set<int> found;
+  for (const Feature* feature : map.Features()) {
+    if (feature->type->name != "orientation") continue;
+    bool is_true = false;
+    for (const int direction : {-60, 0, 30, 90}) {
+      if (std::abs(std::remainder(RadToDeg(feature->parameters[0]) - direction,
+                                  180.0)) < 1.0) {
+        is_true = true;
+        found.insert(direction);
+      }
+    }
+    EXPECT_TRUE(is_true) << RadToDeg(feature->parameters[0]);
+  }
+  EXPECT_EQ(found.count(0), 1u);
+  EXPECT_EQ(found.count(90), 1u);
+
+  // Whatever the number of threads.
+  ASSERT_EQ(Solve(office_, "two", points + "--num_threads=2", &output), 0)
+      << output;
+  ExpectSame("out", "two");
+}
+
+TEST_F(SolveTest, WhatPointsCannotDo) {
+  const std::string log = Write("office.log", Join(OfficeLines(30)));
+  std::string output;
+  const std::string points = "--features=points ";
+  EXPECT_EQ(Solve(log, "a", points + "--refine=full", &output), 2);
+  EXPECT_THAT(output, HasSubstr("--refine: 'full' does not go with "
+                                "--features=points"));
+  EXPECT_EQ(Solve(log, "b", points + "--global_association", &output), 2);
+  EXPECT_THAT(output, HasSubstr("--global_association: 'true' does not go "
+                                "with --features=points"));
+  EXPECT_EQ(
+      Solve(log, "c", points + "--hierarchy=orientation_mixture", &output), 2);
+  EXPECT_THAT(output, HasSubstr("level 0 (point)"));
+  EXPECT_EQ(Solve(log, "d", "--features=lines", &output), 1);
+  EXPECT_TRUE(Files("a").empty());
+  EXPECT_TRUE(Files("b").empty());
+  // Off or left alone is fine.
+  EXPECT_EQ(Solve(log, "e",
+                  points + "--refine=map --global_association=false "
+                           "--outputs=none",
+                  &output),
+            0)
+      << output;
+  EXPECT_EQ(Solve(log, "f", points + "--refine=none --outputs=none", &output),
+            0)
+      << output;
+  // A graph has its features.
+  ASSERT_EQ(Solve(log, "g", "--outputs=graph.g2o", &output), 0) << output;
+  EXPECT_EQ(Solve((folder_ / "g/graph.g2o").string(), "h",
+                  points + "--outputs=none", &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("--features is for logs"));
+}
+
 TEST_F(SolveTest, FilesThatAreAskedFor) {
   const std::string log = Write("office.log", Join(OfficeLines(60)));
   std::string output;

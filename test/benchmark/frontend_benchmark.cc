@@ -103,7 +103,7 @@ Recording Record(const Log& log) {
     recording.keys.push_back(
         {static_cast<int>(i), refined.since_key, refined.pose,
          ExtractSegments(refiner.points(), scan.laser_offset.head<2>(),
-                         scan.angle_step, options.segments)});
+                         scan.angle_step, options.builder.extraction)});
   }
   return recording;
 }
@@ -122,7 +122,7 @@ class Replay {
   std::vector<SegmentObservation> Segments(std::size_t i) const {
     const Scan& scan = recording_.scans[i];
     return ExtractSegments(recording_.points[i], scan.laser_offset.head<2>(),
-                           scan.angle_step, options_.segments);
+                           scan.angle_step, options_.builder.extraction);
   }
   // With a solver session that keeps in step, as in a solve.
   void AddKeyScan(std::size_t i) {

@@ -115,6 +115,58 @@ TEST_F(RelocalizationTest, FollowsATurnedMap) {
   }
 }
 
+TEST_F(RelocalizationTest, FollowsAMapOfPoints) {
+  // Points on two walls at right angles, each seen across its wall only.
+  Transaction transaction;
+  std::vector<Eigen::Vector2d> points;
+  for (int i = 0; i < 5; ++i) {
+    points.emplace_back(i - 2.0, 3.0);
+    points.emplace_back(4.0, i - 2.0);
+  }
+  const Pose2 move(0.3, -0.2, DegToRad(10.0));
+  for (const Eigen::Vector2d& point : points) {
+    const Eigen::Vector2d moved = TransformPoint(move, point);
+    Feature feature;
+    feature.type = &registry_.GetFeature("point");
+    feature.parameters = {moved.x(), moved.y()};
+    transaction.AddFeature(feature);
+  }
+  const std::vector<FeatureId> ids =
+      graph_.Apply(std::move(transaction)).features;
+  Pose2 robot(-1.0, -1.0, 0.2);
+  for (int k = 0; k < 5; ++k) {
+    KeyScanRecord record;
+    record.scan = k;
+    record.pose = robot;
+    if (k > 0) record.motion.mean = Pose2(0.3, 0.0, 0.1);
+    record.motion.covariance =
+        Eigen::Vector3d(0.02 * 0.02, 0.02 * 0.02, 0.01 * 0.01).asDiagonal();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      SegmentObservation surface;
+      surface.pose = Between(robot, Pose2(points[i].x(), points[i].y(),
+                                          i % 2 == 0 ? kPi : -0.5 * kPi));
+      surface.covariance = Eigen::Vector2d(1e-4, 1e-5).asDiagonal();
+      PointMatch match;
+      match.feature = ids[i];
+      match.observation = PointOnSurface(surface, 0.0, 50.0);
+      match.observation.share = 0.2;
+      record.points.push_back(match);
+    }
+    // A feature that is gone is passed over.
+    record.points.push_back(record.points.front());
+    record.points.back().feature = 1000;
+    records_.push_back(record);
+    truth_.push_back(Compose(move, robot));
+    robot = Compose(robot, Pose2(0.3, 0.0, 0.1));
+  }
+  const std::vector<Pose2> poses = Relocalize();
+  ASSERT_EQ(poses.size(), 5u);
+  for (int k = 0; k < 5; ++k) {
+    EXPECT_LT(PositionError(poses[k], truth_[k]), 1e-3) << k;
+    EXPECT_LT(HeadingError(poses[k], truth_[k]), 1e-4) << k;
+  }
+}
+
 TEST_F(RelocalizationTest, FollowsAMapTenKilometresAway) {
   Build(6);
   // Map and remembered poses together; the map turns a little on top.

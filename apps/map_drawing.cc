@@ -45,6 +45,7 @@ constexpr Color kNoClusterColor = Rgb(0x4D4D4D);
 constexpr Color kCircleColor = Rgb(0xE69F00);
 constexpr Color kRectangleColor = Rgb(0xFBF4DC);
 constexpr Color kRectangleEdgeColor = Rgb(0xDCCB98);
+constexpr Color kEllipseColor = Rgb(0xCC3311);
 constexpr Color kPathColor = Rgb(0xA9BDCE);
 constexpr Color kPointColor = Rgb(0xC4C4C4);
 constexpr Color kInkColor = Rgb(0x222222);
@@ -122,6 +123,12 @@ std::array<Eigen::Vector2d, 4> CornersOf(const DrawnRectangle& rectangle) {
           center + along + across, center - along + across};
 }
 
+bool IsDrawable(const DrawnEllipse& ellipse) {
+  return IsDrawable(ellipse.x, ellipse.y) &&
+         IsDrawable(ellipse.major, ellipse.minor) &&
+         std::isfinite(ellipse.direction);
+}
+
 bool IsDrawable(const DrawnRectangle& rectangle) {
   for (const Eigen::Vector2d& corner : CornersOf(rectangle)) {
     if (!IsDrawable(corner.x(), corner.y())) return false;
@@ -140,6 +147,15 @@ Bounds BoundsOf(const MapDrawing& drawing) {
     if (!IsDrawable(circle)) continue;
     bounds.Add(circle.x - circle.radius, circle.y - circle.radius);
     bounds.Add(circle.x + circle.radius, circle.y + circle.radius);
+  }
+  for (const DrawnEllipse& ellipse : drawing.ellipses) {
+    if (!IsDrawable(ellipse)) continue;
+    const double c = std::cos(ellipse.direction);
+    const double d = std::sin(ellipse.direction);
+    const double x = std::hypot(ellipse.major * c, ellipse.minor * d);
+    const double y = std::hypot(ellipse.major * d, ellipse.minor * c);
+    bounds.Add(ellipse.x - x, ellipse.y - y);
+    bounds.Add(ellipse.x + x, ellipse.y + y);
   }
   for (const DrawnRectangle& rectangle : drawing.rectangles) {
     if (!IsDrawable(rectangle)) continue;
@@ -237,6 +253,9 @@ std::vector<LegendEntry> Legend(const MapDrawing& drawing) {
   }
   if (!drawing.circles.empty()) {
     legend.push_back({Swatch::kCircle, kCircleColor, "circles"});
+  }
+  if (!drawing.ellipses.empty()) {
+    legend.push_back({Swatch::kCircle, kEllipseColor, drawing.ellipses_title});
   }
   if (!drawing.centers.empty()) {
     legend.push_back({Swatch::kCenter, kCircleColor, "common centres"});
@@ -550,6 +569,30 @@ void DrawCircles(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   cairo_stroke(cr);
 }
 
+void DrawEllipses(cairo_t* cr, const MapDrawing& drawing,
+                  const Layout& layout) {
+  SetColor(cr, kEllipseColor);
+  cairo_set_line_width(cr, kPathWidth * layout.unit);
+  for (const DrawnEllipse& ellipse : drawing.ellipses) {
+    if (!IsDrawable(ellipse)) continue;
+    cairo_matrix_t before;
+    cairo_get_matrix(cr, &before);
+    cairo_translate(cr, layout.X(ellipse.x), layout.Y(ellipse.y));
+    // y of the page points downwards.
+    cairo_rotate(cr, -ellipse.direction);
+    // What is known exactly is a dash, and a matrix must not be singular.
+    const double least = 0.05 * layout.unit;
+    cairo_scale(cr, std::max(layout.scale * ellipse.major, least),
+                std::max(layout.scale * ellipse.minor, least));
+    cairo_new_sub_path(cr);
+    cairo_arc(cr, 0.0, 0.0, 1.0, 0.0, 2.0 * kPi);
+    cairo_close_path(cr);
+    // The line is as wide in every direction.
+    cairo_set_matrix(cr, &before);
+    cairo_stroke(cr);
+  }
+}
+
 void AddCross(cairo_t* cr, double x, double y, double reach) {
   cairo_move_to(cr, x - reach, y);
   cairo_line_to(cr, x + reach, y);
@@ -656,6 +699,7 @@ void Draw(cairo_t* cr, const MapDrawing& drawing, const Layout& layout) {
   DrawClosures(cr, drawing, layout);
   DrawCircles(cr, drawing, layout);
   DrawCenters(cr, drawing, layout);
+  DrawEllipses(cr, drawing, layout);
   DrawFrame(cr, drawing, layout);
   CheckStatus(cairo_status(cr));
 }

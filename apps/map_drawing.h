@@ -42,6 +42,17 @@ struct DrawnRectangle {
   FeatureId id = kNoId;
 };
 
+/// How well a position is known, m, map frame.
+struct DrawnEllipse {
+  double x = 0.0;
+  double y = 0.0;
+  /// Half axes, and the direction of the longer one, rad.
+  double major = 0.0;
+  double minor = 0.0;
+  double direction = 0.0;
+  FeatureId id = kNoId;
+};
+
 /// A map as a person wants to see it. Whatever has a number that is not finite,
 /// or lies more than 10,000 km from the origin, is passed over.
 struct MapDrawing {
@@ -52,6 +63,9 @@ struct MapDrawing {
   /// Where walls of different visits were found to be one: x, y (m, map frame),
   /// direction of the wall (rad). A thin mark across the wall.
   std::vector<Pose2> closures;
+  /// Drawn thin, over everything; what they are of, for the legend.
+  std::vector<DrawnEllipse> ellipses;
+  std::string ellipses_title;
   /// Drawn thin and light under the walls.
   std::vector<Pose2> path;
   /// Scan points or landmarks, m, map frame: faint, under everything.

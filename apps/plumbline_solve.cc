@@ -3,6 +3,7 @@
 #include <gflags/gflags.h>
 #include <plumbline/apps/app.h>
 #include <plumbline/apps/log_solver.h>
+#include <plumbline/apps/marginals_output.h>
 #include <plumbline/apps/progress.h>
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/apps/solve_outputs.h>
@@ -87,6 +88,20 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin) {
   outcome->summary.total_seconds = Now() - total_begin;
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   WriteSummary(outcome->summary, folder / "summary.json");
+}
+
+// Covariances and ellipses that were asked for.
+void TakeMarginals(const SolverSession* session, SolveOutcome* outcome) {
+  const double begin = Now();
+  outcome->covariances = ComputeMarginals(
+      *outcome->graph, session,
+      ParseMarginalsSelection(FLAGS_marginals, *outcome->registry),
+      FLAGS_marginals_hold_gauge);
+  outcome->ellipse_sigmas = FLAGS_ellipse_sigmas;
+  if (!outcome->covariances.empty()) {
+    Detail("covariances of %zu features in %.1f s", outcome->covariances.size(),
+           Now() - begin);
+  }
 }
 
 // What the summary says of costs and EM.
@@ -200,6 +215,7 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   Summarize(result.initial_cost, result.final_cost, result.em, &summary);
   outcome.graph = &solver.graph();
   outcome.registry = &registry;
+  TakeMarginals(nullptr, &outcome);
   outcome.scans = &log.scans;
   outcome.without_structure = [&] {
     return ReplayWithoutStructure(log.scans, registry, options, result);
@@ -306,6 +322,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   }
   outcome.graph = &graph;
   outcome.registry = &registry;
+  TakeMarginals(&session, &outcome);
   outcome.g2o = &g2o;
   outcome.without_structure = [&] {
     return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
@@ -334,6 +351,11 @@ int Run() {
   }
   // Wrong lists are refused before the work.
   SelectOutputs(FLAGS_outputs, registry);
+  if (ParseMarginalsSelection(FLAGS_marginals, registry).empty() &&
+      FLAGS_ellipse_sigmas > 0.0) {
+    throw Error("--ellipse_sigmas", 0, "ellipses of nothing",
+                "features named by --marginals");
+  }
   InputStream input(FLAGS_input);
   const std::string_view prefix = input.Peek(1 << 16);
   const LogReaderType* reader =

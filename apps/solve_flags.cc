@@ -42,6 +42,16 @@ DEFINE_string(outputs, "default",
               "Files to write beside summary.json: all, default (all but "
               "floorplan.geojson), none, or names separated by commas; a minus "
               "in front takes one out: -report.html,-occupancy.pgm");
+DEFINE_string(marginals, "none",
+              "Features whose covariance goes into map.json: types, numbers of "
+              "features, all, separated by commas; none: no covariances");
+DEFINE_bool(marginals_hold_gauge, false,
+            "Take the first feature of a part of the graph that nothing ties "
+            "to the plane as known, for --marginals; false: an error there");
+DEFINE_double(ellipse_sigmas, 0.0,
+              "Standard deviations of the ellipses drawn into map.svg and "
+              "map.png around the positions of --marginals; 0: none");
+PLUMBLINE_FLAG_RANGE(ellipse_sigmas, 0.0, 1000.0);
 DEFINE_double(grid_resolution, 0.05, "Side of a cell of occupancy.pgm, m");
 PLUMBLINE_FLAG_RANGE(grid_resolution, 0.001, 10.0);
 
@@ -198,6 +208,7 @@ std::vector<FlagGroup> SolveFlagGroups() {
        {"input", "output_dir", "log_reader", "outputs", "grid_resolution"}},
       {"Graphs",
        {"initial_guess", "max_solver_iterations", "information_frame"}},
+      {"Uncertainty", {"marginals", "marginals_hold_gauge", "ellipse_sigmas"}},
       {"Structure",
        {"structure", "hierarchy", "detector_parameters", "allowed_angles",
         "angle_resolution", "structure_sigma_segment_orientation",

@@ -4,6 +4,7 @@
 #include <plumbline/apps/floor_plan_geojson.h>
 #include <plumbline/apps/floor_plan_svg.h>
 #include <plumbline/apps/map_drawing.h>
+#include <plumbline/apps/marginals_output.h>
 #include <plumbline/apps/relations.h>
 #include <plumbline/apps/report.h>
 #include <plumbline/apps/solve_outputs.h>
@@ -11,6 +12,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
 
+#include <cstdio>
 #include <exception>
 #include <functional>
 #include <mutex>
@@ -34,6 +36,14 @@ std::vector<Pose2> Poses(const SolveOutcome& outcome) {
 MapDrawing Drawing(const SolveOutcome& outcome) {
   MapDrawing drawing = DrawingFromGraph(*outcome.graph, Poses(outcome));
   drawing.title = outcome.title;
+  if (outcome.ellipse_sigmas > 0.0) {
+    drawing.ellipses =
+        EllipsesOf(*outcome.graph, outcome.covariances, outcome.ellipse_sigmas);
+    char text[64];
+    std::snprintf(text, sizeof(text), "%g standard deviations",
+                  outcome.ellipse_sigmas);
+    drawing.ellipses_title = text;
+  }
   return drawing;
 }
 
@@ -146,7 +156,7 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
   add("map.json", "every feature and constraint", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {
         WriteFileAtomically(folder / "map.json", [&](std::ostream& output) {
-          WriteGraphJson(*outcome.graph, output);
+          WriteGraphJson(*outcome.graph, output, &outcome.covariances);
         });
       }));
   add("graph.g2o", "the same as g2o text", true, false,

@@ -4,6 +4,7 @@
 #include <plumbline/apps/occupancy_grid.h>
 #include <plumbline/apps/summary.h>
 #include <plumbline/apps/without_structure.h>
+#include <plumbline/core/graph_json.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/output_writer.h>
 
@@ -21,6 +22,10 @@ struct SolveOutcome : SolvedRun {
   double delta_threshold = 0.0;
   /// All of them, for the report.
   std::vector<FlagValue> flags;
+  /// For map.json, and of how many standard deviations ellipses are drawn (0:
+  /// none).
+  FeatureCovariances covariances;
+  double ellipse_sigmas = 0.0;
   /// Makes the map without structure, for the report; may be null.
   std::function<MapWithoutStructure()> without_structure;
   /// Complete but for the times and memory of writing.

@@ -80,8 +80,20 @@ std::vector<ConstraintId> SupportOf(const Graph& graph,
   return support;
 }
 
+void AppendRows(const Eigen::MatrixXd& matrix, std::string* text) {
+  *text += '[';
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    if (i > 0) *text += ", ";
+    const Eigen::VectorXd row = matrix.row(i);
+    AppendNumbers(std::vector<double>(row.data(), row.data() + row.size()),
+                  text);
+  }
+  *text += ']';
+}
+
+// Without a covariance when null.
 void AppendFeature(const Graph& graph, const Feature& feature,
-                   std::string* text) {
+                   const Eigen::MatrixXd* covariance, std::string* text) {
   *text += "{\"id\": ";
   AppendNumber(feature.id, text);
   *text += ", \"type\": ";
@@ -107,6 +119,10 @@ void AppendFeature(const Graph& graph, const Feature& feature,
   AppendString(feature.source, text);
   *text += ", \"support\": ";
   AppendIds(SupportOf(graph, feature), text);
+  if (covariance != nullptr) {
+    *text += ", \"covariance\": ";
+    AppendRows(*covariance, text);
+  }
   *text += '}';
 }
 
@@ -122,14 +138,9 @@ void AppendConstraint(const Constraint& constraint, std::string* text) {
   AppendNumbers(
       std::vector<double>(expected.data(), expected.data() + expected.size()),
       text);
-  *text += ", \"information\": [";
-  for (Eigen::Index i = 0; i < constraint.information.rows(); ++i) {
-    if (i > 0) *text += ", ";
-    const Eigen::VectorXd row = constraint.information.row(i);
-    AppendNumbers(std::vector<double>(row.data(), row.data() + row.size()),
-                  text);
-  }
-  *text += "], \"class\": ";
+  *text += ", \"information\": ";
+  AppendRows(constraint.information, text);
+  *text += ", \"class\": ";
   *text += constraint.kind == ConstraintClass::kStructure ? "\"structure\""
                                                           : "\"measurement\"";
   *text += ", \"delta\": ";
@@ -330,13 +341,19 @@ json Parse(const std::string& text, const std::string& name) {
 
 }  // namespace
 
-void WriteGraphJson(const Graph& graph, std::ostream& output) {
+void WriteGraphJson(const Graph& graph, std::ostream& output,
+                    const FeatureCovariances* covariances) {
   std::string text = "{\n\"features\": [";
   const char* separator = "\n";
   for (const Feature* feature : graph.Features()) {
     text += separator;
     separator = ",\n";
-    AppendFeature(graph, *feature, &text);
+    const Eigen::MatrixXd* covariance = nullptr;
+    if (covariances != nullptr) {
+      const auto found = covariances->find(feature->id);
+      if (found != covariances->end()) covariance = &found->second;
+    }
+    AppendFeature(graph, *feature, covariance, &text);
   }
   text += "\n],\n\"constraints\": [";
   separator = "\n";

@@ -749,6 +749,44 @@ TEST_F(SolveTest, FrameOfTheInformation) {
   }
 }
 
+TEST_F(SolveTest, MarginalsOfAGraph) {
+  // The second pose: 1/4, 1/9 and 1/16.
+  const std::string graph =
+      "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n"
+      "EDGE_SE2 0 1 1 0 0 4 0 0 9 0 16\n";
+  std::string output;
+  const std::string loose = Write("loose.g2o", graph);
+  EXPECT_EQ(Solve(loose, "loose", "--marginals=pose", &output), 2);
+  EXPECT_THAT(output, HasSubstr("gauge"));
+  EXPECT_THAT(output, HasSubstr("FIX"));
+  EXPECT_EQ(Solve(loose, "held",
+                  "--marginals=pose --marginals_hold_gauge --outputs=map.json",
+                  &output),
+            0)
+      << output;
+  const std::string input = Write("fixed.g2o", graph + "FIX 0\n");
+  ASSERT_EQ(Solve(input, "out", "--marginals=pose --ellipse_sigmas=2", &output),
+            0)
+      << output;
+  for (const char* out : {"held", "out"}) {
+    const auto map = nlohmann::json::parse(Out(out, "map.json"));
+    const auto covariance = map["features"][1]["covariance"];
+    EXPECT_NEAR(covariance[0][0].get<double>(), 0.25, 1e-9);
+    EXPECT_NEAR(covariance[1][1].get<double>(), 1.0 / 9.0, 1e-9);
+    EXPECT_NEAR(covariance[2][2].get<double>(), 1.0 / 16.0, 1e-9);
+  }
+  // The ellipse is drawn: the picture differs from one without.
+  const std::string with = Out("out", "map.svg");
+  EXPECT_TRUE(IsWellFormed(with));
+  ASSERT_EQ(Solve(input, "plain", "--marginals=pose", &output), 0) << output;
+  EXPECT_GT(with.size(), Out("plain", "map.svg").size());
+  EXPECT_NE(Out("out", "map.png"), Out("plain", "map.png"));
+  EXPECT_EQ(Solve(input, "bad", "--marginals=tree", &output), 2);
+  EXPECT_THAT(output, HasSubstr("unknown word 'tree'"));
+  EXPECT_EQ(Solve(input, "bad", "--ellipse_sigmas=2", &output), 2);
+  EXPECT_THAT(output, HasSubstr("--marginals"));
+}
+
 // The graphs that the field compares by, to the objective that a solve to
 // rounding reaches (README).
 TEST_F(SolveTest, PublicGraphs) {

@@ -11,6 +11,9 @@
 #include <plumbline/core/initial_guess.h>
 #include <plumbline/core/session.h>
 #include <plumbline/factors/information.h>
+#include <plumbline/factors/line_manifold.h>
+#include <plumbline/factors/point_line_distance.h>
+#include <plumbline/factors/pose_line.h>
 #include <plumbline/factors/pose_point.h>
 #include <plumbline/factors/pose_pose.h>
 #include <plumbline/frontend/input_stream.h>
@@ -21,7 +24,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <memory>
+#include <map>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -54,38 +57,68 @@ void MakeOpenMpSerial() {
 // What a file says, without this project's graph.
 struct PlainGraph {
   struct Edge {
-    bool is_pose;
+    enum class Kind { kPose, kPoint, kLine, kPointOnLine };
+    Kind kind;
     int first;
     int second;
     Eigen::Vector3d expected;
     Eigen::Matrix3d information;
   };
   std::vector<std::array<double, 3>> blocks;
+  std::vector<int> lines;
   std::vector<Edge> edges;
 };
 
 PlainGraph MakePlain(const Graph& graph) {
+  using Kind = PlainGraph::Edge::Kind;
+  const std::map<std::string, Kind> kinds = {
+      {"pose_pose", Kind::kPose},
+      {"pose_point", Kind::kPoint},
+      {"pose_line", Kind::kLine},
+      {"point_line_distance", Kind::kPointOnLine}};
   PlainGraph plain;
   for (const Feature* feature : graph.Features()) {
+    if (feature->type->name == "line") {
+      plain.lines.push_back(static_cast<int>(feature->id));
+    }
     plain.blocks.push_back({feature->parameters[0], feature->parameters[1],
                             feature->parameters[2]});
   }
   for (const Constraint* constraint : graph.Constraints()) {
     PlainGraph::Edge edge;
-    const std::string& type = constraint->type->name;
-    if (type != "pose_pose" && type != "pose_point") {
-      throw Error("graphs_benchmark", 0, "a " + type,
-                  "graphs of poses and points");
+    const auto kind = kinds.find(constraint->type->name);
+    if (kind == kinds.end()) {
+      throw Error("graphs_benchmark", 0, "a " + constraint->type->name,
+                  "graphs of poses, points and lines");
     }
-    edge.is_pose = type == "pose_pose";
+    edge.kind = kind->second;
     edge.first = static_cast<int>(constraint->features[0]);
     edge.second = static_cast<int>(constraint->features[1]);
-    const int size = edge.is_pose ? 3 : 2;
+    const int size = constraint->type->residual_size;
     edge.expected.head(size) = constraint->expected;
     edge.information.topLeftCorner(size, size) = constraint->information;
     plain.edges.push_back(edge);
   }
   return plain;
+}
+
+ceres::CostFunction* MakeCost(const PlainGraph::Edge& edge) {
+  using Kind = PlainGraph::Edge::Kind;
+  const Eigen::Vector2d origin = Eigen::Vector2d::Zero();
+  const Eigen::Vector2d expected = edge.expected.head<2>();
+  const Eigen::Matrix2d information = edge.information.topLeftCorner<2, 2>();
+  switch (edge.kind) {
+    case Kind::kPose:
+      return PosePose::Create(edge.expected, SqrtInformation(edge.information));
+    case Kind::kPoint:
+      return PosePoint::Create(expected, SqrtInformation(information));
+    case Kind::kLine:
+      return PoseLine::Create(expected, origin, SqrtInformation(information));
+    case Kind::kPointOnLine:
+      return PointLineDistance::Create<2>(expected[0], origin,
+                                          std::sqrt(information(0, 0)));
+  }
+  return nullptr;
 }
 
 // A bare program: one problem, one solve, the settings that the session has.
@@ -95,16 +128,15 @@ ceres::Solver::Summary SolveBare(PlainGraph* graph,
   const double begin = CpuSeconds();
   ceres::Problem problem;
   for (const PlainGraph::Edge& edge : graph->edges) {
-    ceres::CostFunction* cost =
-        edge.is_pose
-            ? PosePose::Create(edge.expected, SqrtInformation(edge.information))
-            : PosePoint::Create(
-                  edge.expected.head<2>(),
-                  SqrtInformation(edge.information.topLeftCorner<2, 2>()));
+    ceres::CostFunction* cost = MakeCost(edge);
     problem.AddResidualBlock(
         cost, nullptr,
         graph->blocks[static_cast<std::size_t>(edge.first)].data(),
         graph->blocks[static_cast<std::size_t>(edge.second)].data());
+  }
+  for (const int line : graph->lines) {
+    problem.SetManifold(graph->blocks[static_cast<std::size_t>(line)].data(),
+                        new LineManifold);
   }
   problem.SetParameterBlockConstant(graph->blocks[0].data());
   const SessionOptions session;
@@ -205,7 +237,9 @@ void RegisterGraphs(const std::filesystem::path& folder) {
       {"city10000", InitialGuessMethod::kChordal},
       {"victoriaPark", InitialGuessMethod::kChordal},
       {"dlr", InitialGuessMethod::kFile},
-      {"dlr", InitialGuessMethod::kChordal}};
+      {"dlr", InitialGuessMethod::kChordal},
+      {"intel_posegraph", InitialGuessMethod::kChordal},
+      {"segway_lines", InitialGuessMethod::kFile}};
   for (const auto& entry : cases) {
     const std::string name = entry.first;
     const InitialGuessMethod method = entry.second;

@@ -184,6 +184,44 @@ std::string Row(const RelationComment& relation, const Registry& registry) {
   return row;
 }
 
+// Compares the lines of a page from a marker to the other with `table` (which
+// holds both), or writes it there.
+void ExpectTable(const std::string& name, const char* first, const char* last,
+                 const std::vector<std::string>& table) {
+  std::vector<std::string> page = ReadLines(name);
+  const auto begin = std::find(page.begin(), page.end(), first);
+  const auto end = std::find(page.begin(), page.end(), last);
+  ASSERT_TRUE(begin < end && end != page.end())
+      << name << " has no table between " << first << " and " << last;
+  const std::vector<std::string> present(begin, end + 1);
+  if (UpdatesPages()) {
+    std::vector<std::string> updated(page.begin(), begin);
+    updated.insert(updated.end(), table.begin(), table.end());
+    updated.insert(updated.end(), end + 1, page.end());
+    WriteLines(name, updated);
+    return;
+  }
+  const std::set<std::string> has(present.begin(), present.end());
+  const std::set<std::string> wants(table.begin(), table.end());
+  for (const std::string& row : table) {
+    EXPECT_EQ(has.count(row), 1u)
+        << name << " lacks, or has otherwise, the row\n"
+        << row;
+  }
+  for (const std::string& row : present) {
+    EXPECT_EQ(wants.count(row), 1u)
+        << name << " has a row that the code has not:\n"
+        << row;
+  }
+  if (!::testing::Test::HasFailure()) {
+    EXPECT_EQ(present, table) << "rows in another order";
+  }
+  if (::testing::Test::HasFailure()) {
+    ADD_FAILURE() << "PLUMBLINE_UPDATE_PAGES=1 core_test "
+                     "--gtest_filter='*PageTest*' writes the table";
+  }
+}
+
 constexpr char kRelationsPage[] = "factors/relations.md";
 constexpr char kTableBegin[] = "<!-- relations -->";
 constexpr char kTableEnd[] = "<!-- end of relations -->";
@@ -246,39 +284,72 @@ TEST_F(RelationsPageTest, TableIsThatOfTheHeaders) {
   table.push_back("");
   table.push_back(kTableEnd);
 
-  std::vector<std::string> page = ReadLines(kRelationsPage);
-  const auto begin = std::find(page.begin(), page.end(), kTableBegin);
-  const auto end = std::find(page.begin(), page.end(), kTableEnd);
-  ASSERT_TRUE(begin < end && end != page.end())
-      << kRelationsPage << " has no table between " << kTableBegin << " and "
-      << kTableEnd;
-  const std::vector<std::string> present(begin, end + 1);
-  if (UpdatesPages()) {
-    std::vector<std::string> updated(page.begin(), begin);
-    updated.insert(updated.end(), table.begin(), table.end());
-    updated.insert(updated.end(), end + 1, page.end());
-    WriteLines(kRelationsPage, updated);
-    return;
+  ExpectTable(kRelationsPage, kTableBegin, kTableEnd, table);
+}
+
+constexpr char kGraphFilesPage[] = "core/graph_files.md";
+
+// "theta" of "theta rad".
+std::string NameOf(const std::string& parameter) {
+  return parameter.substr(0, parameter.find(' '));
+}
+
+class GraphFilesPageTest : public RelationsPageTest {};
+
+TEST_F(GraphFilesPageTest, VerticesAreThoseOfTheRegistry) {
+  std::vector<std::string> table = {
+      "<!-- vertices -->", "", "| line | feature | units |", "|---|---|---|"};
+  for (const FeatureType* type : registry_.features()) {
+    std::string fields;
+    std::string units;
+    for (const std::string& parameter : type->parameter_names) {
+      fields += " " + NameOf(parameter);
+      units += (units.empty() ? "" : ", ") +
+               parameter.substr(parameter.find(' ') + 1);
+    }
+    table.push_back("| `" + type->g2o_tag + " id" + fields + "` | " +
+                    type->name + ": " + type->description + " | " + units +
+                    " |");
+    for (const G2oVertexFormat& format : type->other_g2o_formats) {
+      // Numbers of another meaning are told of in the text.
+      std::string line = format.tag + " id" + (format.read ? " ..." : fields);
+      for (const std::string& extra : format.extra_fields) line += " " + extra;
+      table.push_back("| `" + line + "` | " + type->name + " | |");
+    }
   }
-  const std::set<std::string> has(present.begin(), present.end());
-  const std::set<std::string> wants(table.begin(), table.end());
-  for (const std::string& row : table) {
-    EXPECT_EQ(has.count(row), 1u)
-        << kRelationsPage << " lacks, or has otherwise, the row\n"
-        << row;
+  table.push_back("");
+  table.push_back("<!-- end of vertices -->");
+  ExpectTable(kGraphFilesPage, "<!-- vertices -->", "<!-- end of vertices -->",
+              table);
+}
+
+TEST_F(GraphFilesPageTest, EdgesAreThoseOfTheRegistry) {
+  std::vector<std::string> table = {
+      "<!-- edges -->", "",
+      "| tag | ids of | values | relation, what the values are compared with |",
+      "|---|---|---|---|"};
+  for (const RelationType* type : registry_.relations()) {
+    std::string features;
+    for (const std::vector<std::string>& fitting : type->feature_types) {
+      std::string words;
+      for (const std::string& word : fitting) {
+        words += (words.empty() ? "" : " or ") + word;
+      }
+      features += (features.empty() ? "" : ", ") + words;
+    }
+    const std::string size = std::to_string(type->residual_size);
+    table.push_back("| `" + type->g2o_tag + "` | " + features + " | " + size +
+                    " | `" + type->name + "`: " + Cell(type->description) +
+                    " |");
+    for (const G2oEdgeFormat& format : type->other_g2o_formats) {
+      table.push_back("| `" + format.tag + "` | | " + size + " | `" +
+                      type->name + "`, written otherwise |");
+    }
   }
-  for (const std::string& row : present) {
-    EXPECT_EQ(wants.count(row), 1u)
-        << kRelationsPage << " has a row that no header has:\n"
-        << row;
-  }
-  if (!HasFailure()) {
-    EXPECT_EQ(present, table) << "rows in another order";
-  }
-  if (HasFailure()) {
-    ADD_FAILURE() << "PLUMBLINE_UPDATE_PAGES=1 core_test "
-                     "--gtest_filter='*PageTest*' writes the table";
-  }
+  table.push_back("");
+  table.push_back("<!-- end of edges -->");
+  ExpectTable(kGraphFilesPage, "<!-- edges -->", "<!-- end of edges -->",
+              table);
 }
 
 // Lines of a file between two lines that hold the marker "! [name]"; all lines

@@ -749,6 +749,32 @@ TEST_F(SolveTest, FrameOfTheInformation) {
   }
 }
 
+TEST_F(SolveTest, PublicGraphsComeBackByteForByte) {
+  const char* const folder = std::getenv("PLUMBLINE_DATASETS");
+  for (const char* name : {"manhattanOlson3500", "city10000", "intel_posegraph",
+                           "dlr", "segway_lines", "victoriaPark"}) {
+    SCOPED_TRACE(name);
+    const fs::path path = fs::path(folder == nullptr ? "" : folder) / "graphs" /
+                          (std::string(name) + ".g2o.bz2");
+    if (folder == nullptr || !fs::exists(path)) {
+      GTEST_SKIP() << "PLUMBLINE_DATASETS names no folder with graphs/" << name
+                   << ".g2o.bz2";
+    }
+    InputStream input(path.string());
+    const std::string text = input.ReadRest();
+    for (const bool information_at_second : {false, true}) {
+      G2oOptions options;
+      options.information_at_second = information_at_second;
+      std::istringstream stream(text);
+      Graph graph;
+      const G2oFile file = ReadG2o(stream, name, registry_, &graph, options);
+      std::ostringstream output;
+      WriteG2o(graph, &file, output);
+      EXPECT_TRUE(output.str() == text);
+    }
+  }
+}
+
 TEST_F(SolveTest, MarginalsOfAGraph) {
   // The second pose: 1/4, 1/9 and 1/16.
   const std::string graph =

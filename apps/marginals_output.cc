@@ -1,4 +1,5 @@
 #include <plumbline/apps/marginals_output.h>
+#include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/marginals.h>
 #include <plumbline/core/number_text.h>
@@ -50,6 +51,42 @@ MarginalsSelection ParseMarginalsSelection(const std::string& list,
     }
   }
   return selection;
+}
+
+void CheckGauge(const Graph& graph, const MarginalsSelection& selection) {
+  if (selection.empty()) return;
+  const auto size = static_cast<std::size_t>(graph.feature_id_end());
+  DisjointSets parts(size);
+  std::vector<bool> is_tied(size, false);
+  for (const Constraint* constraint : graph.Constraints()) {
+    if (constraint->state != ConstraintState::kLive) continue;
+    const auto first = static_cast<std::size_t>(constraint->features[0]);
+    // A relation of one feature refers to the plane itself.
+    if (constraint->features.size() == 1) is_tied[first] = true;
+    for (const FeatureId id : constraint->features) {
+      parts.Join(first, static_cast<std::size_t>(id));
+    }
+  }
+  const std::vector<const Feature*> features = graph.Features();
+  std::vector<bool> has_gauge(size, false);
+  for (const Feature* feature : features) {
+    const auto id = static_cast<std::size_t>(feature->id);
+    if (feature->fixed || is_tied[id]) has_gauge[parts.Find(id)] = true;
+  }
+  for (const Feature* feature : features) {
+    const bool is_selected = selection.all ||
+                             selection.types.count(feature->type->name) > 0 ||
+                             selection.ids.count(feature->id) > 0;
+    if (is_selected && HasLiveConstraint(graph, feature->id) &&
+        !has_gauge[parts.Find(static_cast<std::size_t>(feature->id))]) {
+      throw Error("--marginals", 0,
+                  "the gauge of " + feature->type->name + " " +
+                      std::to_string(feature->id) +
+                      " is not fixed: nothing ties it, or what it is connected "
+                      "with, to the plane",
+                  "a FIX line or a prior there, or --marginals_hold_gauge");
+    }
+  }
 }
 
 FeatureCovariances ComputeMarginals(const Graph& graph,

@@ -27,6 +27,11 @@ struct MarginalsSelection {
 MarginalsSelection ParseMarginalsSelection(const std::string& list,
                                            const Registry& registry);
 
+/// Throws Error, as ComputeMarginals would, when a feature selected by its type
+/// or number is in a part of the graph that nothing ties to the plane: before
+/// the work and not after it.
+void CheckGauge(const Graph& graph, const MarginalsSelection& selection);
+
 /// Covariances of the features selected in the map frame, at the present state.
 /// `session` may be null: structure then counts by its delta. Types select the
 /// features that a live constraint speaks of; a number must be such a feature.

@@ -258,6 +258,9 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
            input->name().c_str(), tag.second, tag.first.c_str());
   }
 
+  if (!FLAGS_marginals_hold_gauge) {
+    CheckGauge(graph, ParseMarginalsSelection(FLAGS_marginals, registry));
+  }
   Summary::Solver figures;
   const InitialGuessOptions start = InitialGuessOptionsFromFlags();
   if (start.method != InitialGuessMethod::kFile) {

@@ -107,6 +107,39 @@ TEST_F(MarginalsOutputTest, GaugeThatIsNotFixed) {
   EXPECT_NEAR(held.at(1)(1, 1), 4.0, 1e-9);
 }
 
+TEST_F(MarginalsOutputTest, GaugeIsCheckedBeforehand) {
+  const auto refusal = [&](const std::string& list) -> std::string {
+    try {
+      CheckGauge(graph_, ParseMarginalsSelection(list, registry_));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  Make(/*fixed=*/true);
+  EXPECT_EQ(refusal("all"), "");
+  Make(/*fixed=*/false);
+  EXPECT_THAT(refusal("all"), HasSubstr("the gauge of pose 3 is not fixed"));
+  EXPECT_THAT(refusal("4"), HasSubstr("point 4"));
+  // Those of the part that is tied, those without relations, and none.
+  EXPECT_EQ(refusal("0,1,2,5"), "");
+  EXPECT_EQ(refusal("none"), "");
+  // A prior ties the second part.
+  Constraint prior;
+  prior.type = &registry_.GetRelation("pose_prior");
+  prior.features = {3};
+  prior.expected = Eigen::Vector3d::Zero();
+  prior.information = Eigen::Matrix3d::Identity();
+  Transaction transaction;
+  transaction.AddConstraint(prior);
+  const ConstraintId id = graph_.Apply(transaction).constraints[0];
+  EXPECT_EQ(refusal("all"), "");
+  Transaction broken;
+  broken.BreakConstraint(id);
+  graph_.Apply(broken);
+  EXPECT_THAT(refusal("point"), HasSubstr("FIX"));
+}
+
 TEST_F(MarginalsOutputTest, FeaturesThatHaveNone) {
   Make(/*fixed=*/true);
   EXPECT_THAT(Refusal("99"), HasSubstr("--marginals: no feature 99"));

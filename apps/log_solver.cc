@@ -242,10 +242,11 @@ LogSolverResult LogSolver::Run(
     JointAdjustment adjustment(&graph_, session_.get(), registry_, log.scans,
                                refined, builder->records(), keys,
                                builder->robot_id(), options_.adjustment);
-    adjustment.Adjust();
+    adjustment.Adjust(stop);
     const EmReport again = em_->Run(stop);
     result.em.iterations += again.iterations;
     result.em.converged = again.converged;
+    if (stop && stop()) result.interrupted = true;
     result.final_cost = session_->Cost();
     result.trajectory =
         InterpolateScans(refined, builder->records(), adjustment.KeyPoses());

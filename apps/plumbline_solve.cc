@@ -247,6 +247,10 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   {
     const ReadingProgress progress(input);
     std::istringstream text(input->ReadRest());
+    if (InterruptRequested()) {
+      std::fprintf(stderr, "interrupted: the graph is not read whole\n");
+      return kExitInterrupted;
+    }
     if (!input->damage().empty()) {
       throw Error(input->name(), 0, input->damage(), "a whole graph");
     }
@@ -359,8 +363,12 @@ int Run() {
     throw Error("--ellipse_sigmas", 0, "ellipses of nothing",
                 "features named by --marginals");
   }
-  InputStream input(FLAGS_input);
+  InputStream input(FLAGS_input, [] { return InterruptRequested(); });
   const std::string_view prefix = input.Peek(1 << 16);
+  if (prefix.empty() && InterruptRequested()) {
+    std::fprintf(stderr, "interrupted: nothing was read yet\n");
+    return kExitInterrupted;
+  }
   const LogReaderType* reader =
       FLAGS_log_reader.empty() ? RecognizeLog(registry, prefix)
                                : &registry.Get<LogReaderType>(FLAGS_log_reader);

@@ -2,6 +2,7 @@
 #include <fcntl.h>
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/input_stream.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -19,8 +20,12 @@ constexpr std::size_t kChunk = std::size_t{1} << 18;
 // The bytes as they are stored: a file descriptor or a string.
 class StoredBytes {
  public:
-  StoredBytes(std::string name, int descriptor, bool owned)
-      : name_(std::move(name)), descriptor_(descriptor), owned_(owned) {
+  StoredBytes(std::string name, int descriptor, bool owned,
+              std::function<bool()> stop)
+      : name_(std::move(name)),
+        descriptor_(descriptor),
+        owned_(owned),
+        stop_(std::move(stop)) {
     buffer_.resize(kChunk);
   }
   StoredBytes(std::string name, const std::string& contents)
@@ -46,6 +51,7 @@ class StoredBytes {
       std::memmove(buffer_.data(), buffer_.data() + begin_, size());
       end_ -= begin_;
       begin_ = 0;
+      if (!WaitForInput()) return false;
       const ssize_t got =
           read(descriptor_, buffer_.data() + end_, buffer_.size() - end_);
       if (got < 0) {
@@ -62,9 +68,22 @@ class StoredBytes {
   }
 
  private:
+  // Until there is something to read; false when it is time to stop.
+  bool WaitForInput() const {
+    if (!stop_) return true;
+    while (!stop_()) {
+      pollfd descriptor = {descriptor_, POLLIN, 0};
+      const int ready = poll(&descriptor, 1, 200);
+      // Errors are for read() to find.
+      if (ready > 0 || (ready < 0 && errno != EINTR)) return true;
+    }
+    return false;
+  }
+
   std::string name_;
   int descriptor_ = -1;
   bool owned_ = false;
+  std::function<bool()> stop_;
   std::vector<char> buffer_;
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
@@ -235,7 +254,8 @@ std::unique_ptr<InputStream::Unpacker> InputStream::Unpacker::Create(
   return std::make_unique<Unpacker>(std::move(bytes));
 }
 
-InputStream::InputStream(const std::string& path) : name_(path) {
+InputStream::InputStream(const std::string& path, std::function<bool()> stop)
+    : name_(path) {
   int descriptor = STDIN_FILENO;
   const bool owned = path != "-";
   if (owned) {
@@ -248,7 +268,8 @@ InputStream::InputStream(const std::string& path) : name_(path) {
   } else {
     name_ = "standard input";
   }
-  auto bytes = std::make_unique<StoredBytes>(name_, descriptor, owned);
+  auto bytes =
+      std::make_unique<StoredBytes>(name_, descriptor, owned, std::move(stop));
   struct stat status = {};
   if (fstat(descriptor, &status) == 0 && S_ISDIR(status.st_mode))
     throw Error(name_, 0, "is a directory", "a file");

@@ -26,7 +26,11 @@ class InputStream {
 
   /// Opens the file `path`, or standard input when it is "-". Throws Error
   /// when it cannot be opened or read, or is a directory.
-  explicit InputStream(const std::string& path);
+  ///
+  /// `stop` (may be empty) is asked before every read, and five times a second
+  /// while nothing comes: once it returns true, the input ends there.
+  explicit InputStream(const std::string& path,
+                       std::function<bool()> stop = nullptr);
 
   /// Reads from memory in place of a file (plain or compressed too); `name`
   /// stands for the file's in messages.

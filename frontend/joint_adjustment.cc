@@ -228,10 +228,11 @@ void JointAdjustment::Reweigh() {
   }
 }
 
-void JointAdjustment::Adjust() {
+void JointAdjustment::Adjust(const std::function<bool()>& stop) {
   for (int pass = 0; pass < options_.max_passes; ++pass) {
     const std::vector<Pose2> before = PlacePoses();
     for (int round = 0; round < options_.rounds; ++round) {
+      if (stop && stop()) return;
       Vote();
       Reweigh();
       const SolveReport report = session_->SolveGlobal();
@@ -245,7 +246,7 @@ void JointAdjustment::Adjust() {
     for (std::size_t p = 0; p < after.size(); ++p) {
       moved = std::max(moved, (after[p] - before[p]).head<2>().norm());
     }
-    if (moved <= options_.settled_distance) break;
+    if (moved <= options_.settled_distance || (stop && stop())) break;
     if (pass + 1 < options_.max_passes) Match();
   }
 }

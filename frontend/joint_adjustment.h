@@ -12,6 +12,7 @@
 #include <plumbline/frontend/wall_votes.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -64,8 +65,9 @@ class JointAdjustment {
 
   /// Takes votes and weights anew at the present state and solves, `rounds`
   /// times, then matches what has come near and starts again, until the poses
-  /// have settled. Throws Error when a solve fails.
-  void Adjust();
+  /// have settled or `stop` (asked between solves, may be empty) returns true.
+  /// Throws Error when a solve fails.
+  void Adjust(const std::function<bool()>& stop = nullptr);
 
   /// The key poses as they stand, one a record: those between places by refined
   /// odometry, what is missing at the next place spread over the way.

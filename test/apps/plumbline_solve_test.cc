@@ -619,6 +619,57 @@ TEST_F(SolveTest, InterruptedRunsWriteWhatTheyHave) {
   EXPECT_EQ(SummaryOf("out")["counts"]["scans"], 0);
 }
 
+// Nothing more comes, and the pipe stays open.
+TEST_F(SolveTest, InterruptedWhileWaitingForInput) {
+  for (const int lines : {0, 300}) {
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const std::string name = "out" + std::to_string(lines);
+    const std::string out = (folder_ / name).string();
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      dup2(ends[0], STDIN_FILENO);
+      close(ends[0]);
+      close(ends[1]);
+      if (std::freopen("/dev/null", "w", stderr) == nullptr) _exit(99);
+      const std::string flag = "--output_dir=" + out;
+      execl(binary_.c_str(), binary_.c_str(), "--input=-", flag.c_str(),
+            static_cast<char*>(nullptr));
+      _exit(99);
+    }
+    close(ends[0]);
+    const std::string text = lines > 0 ? Join(OfficeLines(lines)) : "";
+    std::size_t written = 0;
+    while (written < text.size()) {
+      const ssize_t count =
+          write(ends[1], text.data() + written, text.size() - written);
+      ASSERT_GT(count, 0);
+      written += count;
+    }
+    // Past the start of the process, where the signal would just end it.
+    usleep(500000);
+    kill(child, SIGINT);
+    int status = 0;
+    pid_t ended = 0;
+    for (int i = 0; i < 600 && ended == 0; ++i) {
+      usleep(50000);
+      ended = waitpid(child, &status, WNOHANG);
+    }
+    if (ended == 0) kill(child, SIGKILL);
+    close(ends[1]);
+    ASSERT_EQ(ended, child);
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 130);
+    if (lines > 0) {
+      EXPECT_EQ(Files(name).count("map.json"), 1u);
+      EXPECT_EQ(SummaryOf(name)["counts"]["scans"], 0);
+    } else {
+      EXPECT_FALSE(fs::exists(out));
+    }
+  }
+}
+
 const char kGraph[] =
     "# two corners of a room, seen along a drive\n"
     "VERTEX_SE2 10 0 0 0\n"

@@ -164,6 +164,22 @@ TEST_F(JointAdjustmentTest, WhatStoodForThePosesGoes) {
   EXPECT_NEAR(graph_.GetFeature(unseen_).parameters[0], 30.0, 1e-3);
 }
 
+TEST_F(JointAdjustmentTest, EndsWhenItIsTold) {
+  SolverSession session(&graph_, registry_, {});
+  JointAdjustment adjustment(&graph_, &session, registry_, scans_, refined_,
+                             records_, keys_, robot_, options_);
+  const std::vector<Pose2> before = adjustment.KeyPoses();
+  adjustment.Adjust([] { return true; });
+  EXPECT_EQ(adjustment.KeyPoses(), before);
+  int questions = 0;
+  adjustment.Adjust([&] { return ++questions > 1; });
+  EXPECT_EQ(questions, 2);
+  const std::vector<Pose2> after_one = adjustment.KeyPoses();
+  EXPECT_LT(WorstKey(after_one), WorstKey(before));
+  adjustment.Adjust([] { return false; });
+  EXPECT_NE(adjustment.KeyPoses(), after_one);
+}
+
 TEST_F(JointAdjustmentTest, WithoutDriftNothingMovesFar) {
   SolverSession session(&graph_, registry_, {});
   for (int i = 0; i < 120; ++i) {

@@ -5,6 +5,7 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/session.h>
+#include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/carmen_reader.h>
 
@@ -215,7 +216,8 @@ std::string PhaseLabel(const SyntheticRun::Phase& phase) {
       {"break", "break"},
       {"detect_0", "detect level 0"},
       {"detect_1", "detect level 1"},
-      {"detect_2", "detect level 2"}};
+      {"detect_2", "detect level 2"},
+      {"final", "solve"}};
   const auto found = labels.find(phase.name);
   const std::string name = found == labels.end() ? phase.name : found->second;
   return phase.iteration > 0 ? std::to_string(phase.iteration) + ": " + name
@@ -637,6 +639,7 @@ void RunConcentricity(Concentricity method, double sigma,
   EmOptions em_options;
   em_options.delta_threshold = options.delta_threshold;
   em_options.full_weight_test = options.full_weight_test;
+  em_options.loop_tolerance = kPointsLoopTolerance;
   em_options.seed = job->seed;
   EmOrchestrator em(world.graph.get(), session.get(), registry, Hierarchy(),
                     em_options);
@@ -901,6 +904,7 @@ SyntheticRun RunOnWorld(const Registry& registry,
   em_options.delta_threshold = options.delta_threshold;
   em_options.break_constraints = options.break_constraints;
   em_options.full_weight_test = options.full_weight_test;
+  em_options.loop_tolerance = kPointsLoopTolerance;
   em_options.seed = options.seed;
   EmOrchestrator em(world->graph.get(), session.get(), registry,
                     MakeHierarchy(options.hierarchy, registry, {"point"},
@@ -945,6 +949,7 @@ OracleErrors RunOracle(const Registry& registry,
   EmOptions em_options;
   em_options.break_constraints = false;
   em_options.full_weight_test = options.full_weight_test;
+  em_options.loop_tolerance = kPointsLoopTolerance;
   EmOrchestrator em(world->graph.get(), session.get(), registry, Hierarchy(),
                     em_options);
   em.Run(options.stop);

@@ -74,17 +74,17 @@ class PlotWriter {
       : plot_(plot), output_(*output) {
     for (const PlotSeries& series : plot.series) {
       CheckSizes(series);
-      for (const double x : series.x) x_.Add(x);
-      for (const double y : series.y) y_.Add(y);
-      for (const double y : series.low) y_.Add(y);
-      for (const double y : series.high) y_.Add(y);
+      for (const double x : series.x) x_.Add(OnX(x));
+      for (const double y : series.y) y_.Add(OnY(y));
+      for (const double y : series.low) y_.Add(OnY(y));
+      for (const double y : series.high) y_.Add(OnY(y));
     }
     x_.Settle();
-    y_.low = std::min(y_.low, 0.0);
+    if (!plot.log_y) y_.low = std::min(y_.low, 0.0);
     y_.Settle();
     const double margin = 0.05 * (y_.high - y_.low);
     y_.high += margin;
-    if (y_.low < 0.0) y_.low -= margin;
+    if (y_.low < 0.0 || plot.log_y) y_.low -= margin;
     left_ = kLeft;
     right_ = plot.width - kRight - static_cast<int>(LegendWidth(plot));
     top_ = top + kTop;
@@ -114,11 +114,26 @@ class PlotWriter {
     return kColors[static_cast<std::size_t>(index) % kColors.size()];
   }
 
+  // On the axis; NaN where a logarithmic one has no place for it.
+  static double OnAxis(double value, bool is_log) {
+    if (!is_log) return value;
+    return value > 0.0 ? std::log10(value)
+                       : std::numeric_limits<double>::quiet_NaN();
+  }
+  double OnX(double x) const { return OnAxis(x, plot_.log_x); }
+  double OnY(double y) const { return OnAxis(y, plot_.log_y); }
+
   double X(double x) const {
-    return left_ + (x - x_.low) / (x_.high - x_.low) * (right_ - left_);
+    return left_ + (OnX(x) - x_.low) / (x_.high - x_.low) * (right_ - left_);
   }
   double Y(double y) const {
-    return bottom_ - (y - y_.low) / (y_.high - y_.low) * (bottom_ - top_);
+    return bottom_ - (OnY(y) - y_.low) / (y_.high - y_.low) * (bottom_ - top_);
+  }
+
+  static std::vector<double> Ticks(const Range& range, bool is_log, int count) {
+    return is_log ? LogTicks(std::pow(10.0, range.low),
+                             std::pow(10.0, range.high), count)
+                  : RoundTicks(range.low, range.high, count);
   }
 
   void Line(double x1, double y1, double x2, double y2,
@@ -142,18 +157,18 @@ class PlotWriter {
   }
 
   void WriteAxes() {
-    for (const double y : RoundTicks(y_.low, y_.high, 8)) {
+    for (const double y : Ticks(y_, plot_.log_y, 8)) {
       Line(left_, Y(y), right_, Y(y), "stroke=\"#dddddd\"");
       Text(left_ - 8, Y(y) + 4, "end", 12, Label(y));
     }
     if (plot_.x_ticks.empty()) {
-      for (const double x : RoundTicks(x_.low, x_.high, 10)) {
+      for (const double x : Ticks(x_, plot_.log_x, 10)) {
         Line(X(x), bottom_, X(x), bottom_ + 5, "stroke=\"black\"");
         Text(X(x), bottom_ + 19, "middle", 12, Label(x));
       }
     }
     for (const auto& [x, word] : plot_.x_ticks) {
-      if (x < x_.low || x > x_.high) continue;
+      if (!(OnX(x) >= x_.low && OnX(x) <= x_.high)) continue;
       Line(X(x), bottom_, X(x), bottom_ + 5, "stroke=\"black\"");
       Text(X(x) + 4, bottom_ + 10, "end", 11, word, false, -90.0);
     }
@@ -170,8 +185,9 @@ class PlotWriter {
     std::string forward;
     std::string backward;
     for (std::size_t i = 0; i < series.low.size(); ++i) {
-      if (!std::isfinite(series.x[i]) || !std::isfinite(series.low[i]) ||
-          !std::isfinite(series.high[i])) {
+      if (!std::isfinite(OnX(series.x[i])) ||
+          !std::isfinite(OnY(series.low[i])) ||
+          !std::isfinite(OnY(series.high[i]))) {
         continue;
       }
       const std::string x = Number(X(series.x[i]));
@@ -186,7 +202,8 @@ class PlotWriter {
   void WriteLine(const PlotSeries& series, const char* color) {
     std::string points;
     for (std::size_t i = 0; i < series.y.size(); ++i) {
-      if (!std::isfinite(series.x[i]) || !std::isfinite(series.y[i])) continue;
+      if (!std::isfinite(OnX(series.x[i])) || !std::isfinite(OnY(series.y[i])))
+        continue;
       const std::string x = Number(X(series.x[i]));
       const std::string y = Number(Y(series.y[i]));
       points += x + ',' + y + ' ';
@@ -256,6 +273,25 @@ std::vector<double> RoundTicks(double low, double high, int count) {
   const double last = std::floor(high / step + 1e-9);
   for (double k = first; k <= last; k += 1.0) ticks.push_back(k * step);
   return ticks;
+}
+
+std::vector<double> LogTicks(double low, double high, int count) {
+  if (!(low > 0.0) || !(high > low) || !std::isfinite(high)) return {low};
+  std::vector<double> ticks;
+  std::vector<double> powers;
+  // A rounding step must not cost a tick at an end.
+  const double slack = 1.0 + 1e-9;
+  for (double exponent = std::floor(std::log10(low));
+       exponent <= std::ceil(std::log10(high)); exponent += 1.0) {
+    for (const double factor : {1.0, 2.0, 5.0}) {
+      const double tick = factor * std::pow(10.0, exponent);
+      if (tick * slack < low || tick > high * slack) continue;
+      ticks.push_back(tick);
+      if (factor == 1.0) powers.push_back(tick);
+    }
+  }
+  return static_cast<int>(ticks.size()) <= count || powers.empty() ? ticks
+                                                                   : powers;
 }
 
 std::string PlotSvg(const std::vector<LinePlot>& plots, int columns) {

@@ -22,12 +22,15 @@ struct PlotSeries {
   int color = -1;
 };
 
-/// Lines over a pair of axes. The y axis starts at 0 unless a value is
-/// negative.
+/// Lines over a pair of axes. The y axis starts at 0 unless a value is negative
+/// or the axis is logarithmic.
 struct LinePlot {
   std::string title;
   std::string x_label;
   std::string y_label;
+  /// Logarithmic axes: numbers that are not positive are passed over.
+  bool log_x = false;
+  bool log_y = false;
   std::vector<PlotSeries> series;
   /// Words under the x axis in the place of numbers, where they belong; written
   /// upwards. Empty: numbers.
@@ -40,6 +43,10 @@ struct LinePlot {
 /// Numbers from `low` to `high` in steps of 1, 2 or 5 times a power of ten, at
 /// most `count` of them (at least 2).
 std::vector<double> RoundTicks(double low, double high, int count);
+
+/// 1, 2 and 5 times powers of ten from `low` to `high` (both > 0); powers of
+/// ten alone when those are more than `count`.
+std::vector<double> LogTicks(double low, double high, int count);
 
 /// The plots as one SVG document, in rows of so many, below each other. The
 /// same plots give the same bytes. Throws Error when a series has sizes that

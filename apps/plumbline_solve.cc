@@ -287,6 +287,9 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
       if (feature->level == 0) raw.insert(feature->type->name);
     }
     options.em.full_weight_test = FullWeightTestFromFlags(raw);
+    if (raw.count("point") > 0) {
+      options.em.loop_tolerance = kPointsLoopTolerance;
+    }
     hierarchy = MakeHierarchy(
         options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
         registry, {raw.begin(), raw.end()}, options.detector_parameters);

@@ -2,9 +2,11 @@
 #include <plumbline/apps/detector_parameters.h>
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/error.h>
+#include <plumbline/detectors/structure_prior.h>
 
 #include <charconv>
 #include <cmath>
+#include <fstream>
 #include <set>
 #include <string>
 #include <thread>
@@ -72,6 +74,9 @@ DEFINE_double(angle_resolution, 0.0,
               "Look for all multiples of this angle in place of "
               "--allowed_angles, degrees; 0: not set");
 PLUMBLINE_FLAG_RANGE(angle_resolution, 0.0, 90.0);
+DEFINE_string(structure_prior, "",
+              "File that says which relations and angles are expected, and how "
+              "tightly; it goes before the flags that say the same");
 DEFINE_double(structure_sigma_segment_orientation, 0.1,
               "Tolerance of a wall or line against its orientation, degrees");
 PLUMBLINE_FLAG_RANGE(structure_sigma_segment_orientation, 1e-3, 45.0);
@@ -210,8 +215,9 @@ std::vector<FlagGroup> SolveFlagGroups() {
        {"initial_guess", "max_solver_iterations", "information_frame"}},
       {"Uncertainty", {"marginals", "marginals_hold_gauge", "ellipse_sigmas"}},
       {"Structure",
-       {"structure", "hierarchy", "detector_parameters", "allowed_angles",
-        "angle_resolution", "structure_sigma_segment_orientation",
+       {"structure", "hierarchy", "structure_prior", "detector_parameters",
+        "allowed_angles", "angle_resolution",
+        "structure_sigma_segment_orientation",
         "structure_sigma_orientation_orientation", "structure_sigma_same_wall",
         "structure_sigma_same_wall_angle",
         "structure_sigma_point_line_distance",
@@ -284,6 +290,16 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
     for (const auto& [name, value] : parameters) {
       options.detector_parameters[detector][name] = value;
     }
+  }
+  if (!FLAGS_structure_prior.empty()) {
+    std::ifstream file(FLAGS_structure_prior);
+    if (!file) {
+      throw Error(FLAGS_structure_prior, 0, "cannot be opened",
+                  "a file that can be read");
+    }
+    ApplyStructurePrior(
+        ReadStructurePrior(file, FLAGS_structure_prior, registry), &options.em,
+        &options.detector_parameters);
   }
   options.refine = FLAGS_refine == "none"  ? Refinement::kNone
                    : FLAGS_refine == "map" ? Refinement::kMap

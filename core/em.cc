@@ -460,7 +460,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
     const auto start = std::chrono::steady_clock::now();
     if (scope.features == nullptr) {
       if (is_dirty) {
-        is_usable = session->SolveGlobal().usable;
+        is_usable = session->SolveGlobal(solve_tolerance).usable;
         is_dirty = false;
         for (int level = 0; level <= highest_level; ++level) {
           for (const FeatureId id : graph->VirtualFeatures(level)) {
@@ -697,6 +697,29 @@ struct EmOrchestrator::Impl final : public GraphListener {
            });
   }
 
+  // Gives a proposal the tolerances that are known beforehand; false when it is
+  // not expected at all.
+  bool ApplyPrior(Constraint* constraint) const {
+    if (constraint->type == nullptr) return true;
+    const auto found = options.relation_priors.find(constraint->type->name);
+    if (found == options.relation_priors.end()) return true;
+    const std::vector<double>& sigmas = found->second.sigmas;
+    if (!found->second.is_expected) return false;
+    if (sigmas.empty()) return true;
+    const auto rows = static_cast<Eigen::Index>(sigmas.size());
+    if (rows != constraint->type->residual_size) {
+      throw PLUMBLINE_ERROR("prior of " + found->first + " has " +
+                                std::to_string(rows) + " sigmas",
+                            std::to_string(constraint->type->residual_size));
+    }
+    constraint->information =
+        Eigen::Map<const Eigen::VectorXd>(sigmas.data(), rows)
+            .cwiseAbs2()
+            .cwiseInverse()
+            .asDiagonal();
+    return true;
+  }
+
   // Takes out of a proposal what is there already, what was broken before, and
   // virtual features that are left with too little support.
   Transaction Filter(Transaction proposal, const StructureDetector& detector) {
@@ -712,6 +735,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
     };
     std::vector<Constraint> constraints;
     for (Constraint& constraint : proposal.added_constraints()) {
+      if (!ApplyPrior(&constraint)) continue;
       std::vector<const Feature*> between;
       for (const FeatureId id : constraint.features) {
         const Feature* feature = find(id);
@@ -863,6 +887,8 @@ struct EmOrchestrator::Impl final : public GraphListener {
   std::map<std::string, int> structure_by_relation;
   std::map<std::string, int> broken_by_relation;
   int highest_level = 0;
+  // Of global solves; 0: the session's own.
+  double solve_tolerance = 0.0;
   // The graph or a weight changed since the last global solve.
   bool is_dirty = true;
   bool is_usable = true;
@@ -907,6 +933,9 @@ EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
     return is_still ? 0.0 : impl_->session->Cost().total();
   };
   double cost = total_cost();
+  const bool is_coarse = impl_->options.loop_tolerance >
+                         impl_->session->options().function_tolerance;
+  if (is_coarse) impl_->solve_tolerance = impl_->options.loop_tolerance;
   for (int i = 0; goes_on && i < impl_->options.max_iterations; ++i) {
     const bool has_changed = impl_->Iterate(nullptr);
     goes_on = !impl_->is_stopped;
@@ -918,6 +947,13 @@ EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
       has_converged = true;
       goes_on = false;
     }
+  }
+  impl_->solve_tolerance = 0.0;
+  if (is_coarse && !is_still && !impl_->is_stopped) {
+    const auto final_start = std::chrono::steady_clock::now();
+    impl_->is_dirty = true;
+    impl_->Optimize(whole);
+    impl_->EndPhase("final", whole, final_start);
   }
   impl_->stop = nullptr;
   impl_->totals.converged = has_converged;

@@ -28,6 +28,15 @@ Hierarchy MakeHierarchy(
     const std::vector<std::string>& raw_feature_types,
     const std::map<std::string, DetectorParameters>& parameters);
 
+/// What is known of a relation before the building was seen.
+struct RelationPrior {
+  /// False: proposals of it are left out.
+  bool is_expected = true;
+  /// Standard deviations that take the place of the detector's, one a row, in
+  /// the units of the rows; empty: as the detector has it.
+  std::vector<double> sigmas;
+};
+
 /// When structure is broken, proposed again, and when the loop ends.
 struct EmOptions {
   /// Structure constraints with a smaller delta are broken.
@@ -50,6 +59,13 @@ struct EmOptions {
   bool full_weight_test = false;
   /// The loop ends at the latest after so many iterations.
   int max_iterations = 50;
+  /// Relative change of the cost at which solves of the whole graph within the
+  /// loop end, once the measurements alone have been solved for; 0: the
+  /// session's own tolerance. With a larger one a solve with the session's
+  /// follows when the loop has ended. Weights and hypotheses do not wait for
+  /// the last digits, and the more parts a graph has the longer some part of it
+  /// takes to settle.
+  double loop_tolerance = 0.0;
   /// Converged: nothing added, nothing removed, and the relative change of the
   /// total cost is smaller.
   double cost_tolerance = 1e-4;
@@ -64,13 +80,18 @@ struct EmOptions {
   /// side each time would otherwise never be the same hypothesis.
   int max_breaks_per_feature = 10;
   std::uint64_t seed = 1;
+  /// By relation; what is missing is as the detectors propose it. As many
+  /// sigmas as the relation has rows, or none; others are an Error when the
+  /// relation is proposed.
+  std::map<std::string, RelationPrior> relation_priors;
 };
 
 /// One row of em_trace.csv: the state after a phase and the solve that belongs
 /// to it.
 struct EmPhase {
   int iteration = 0;
-  /// "measurements", "optimize", "break", "detect_0", "detect_1", ...
+  /// "measurements", "optimize", "break", "detect_0", "detect_1", ..., and with
+  /// a loop_tolerance "final".
   std::string phase;
   /// Of the whole graph, or in an iteration with a scope of the constraints on
   /// the features that varied.

@@ -279,6 +279,7 @@ struct SolverSession::Impl {
   SolveReport Solve(ceres::Problem* solved,
                     const std::vector<Block*>& variables, int num_residuals,
                     int rows, int columns, int num_threads,
+                    double function_tolerance,
                     std::chrono::steady_clock::time_point start) {
     SolveReport report;
     report.residual_blocks = num_residuals;
@@ -289,7 +290,7 @@ struct SolverSession::Impl {
     } else {
       ceres::Solver::Options solver;
       solver.max_num_iterations = options.max_iterations;
-      solver.function_tolerance = options.function_tolerance;
+      solver.function_tolerance = function_tolerance;
       solver.parameter_tolerance = kParameterTolerance;
       solver.initial_trust_region_radius = options.initial_trust_region_radius;
       solver.max_trust_region_radius = std::max(
@@ -508,7 +509,7 @@ SolverSession::SolverSession(Graph* graph, const Registry& registry,
 
 SolverSession::~SolverSession() { impl_->graph->RemoveListener(this); }
 
-SolveReport SolverSession::SolveGlobal() {
+SolveReport SolverSession::SolveGlobal(double function_tolerance) {
   const auto start = std::chrono::steady_clock::now();
   for (Block& block : impl_->blocks) {
     if (block.residuals > 0) impl_->SetConstant(&block, block.feature->fixed);
@@ -521,10 +522,12 @@ SolveReport SolverSession::SolveGlobal() {
     variables.push_back(&block);
     columns += block.feature->type->size;
   }
-  return impl_->Solve(&impl_->problem, variables,
-                      impl_->problem.NumResidualBlocks(),
-                      impl_->problem.NumResiduals(), columns,
-                      impl_->options.num_threads, start);
+  return impl_->Solve(
+      &impl_->problem, variables, impl_->problem.NumResidualBlocks(),
+      impl_->problem.NumResiduals(), columns, impl_->options.num_threads,
+      function_tolerance > 0.0 ? function_tolerance
+                               : impl_->options.function_tolerance,
+      start);
 }
 
 SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
@@ -586,7 +589,8 @@ SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
     variables.erase(lowest);
   }
   return impl_->Solve(&problem, variables, static_cast<int>(constraints.size()),
-                      rows, columns, /*num_threads=*/1, start);
+                      rows, columns, /*num_threads=*/1,
+                      impl_->options.function_tolerance, start);
 }
 
 double SolverSession::SquaredResidual(const Constraint& constraint) const {

@@ -92,7 +92,8 @@ class SolverSession : public GraphListener {
   /// same (a segment along its wall, a rotation about a held point) stays where
   /// it is, up to rounding. Angles are wrapped to (-pi, pi] after a solve.
   /// Parameters are left as they were when the solve fails (usable is false).
-  SolveReport SolveGlobal();
+  /// `function_tolerance` takes the place of the option where it is positive.
+  SolveReport SolveGlobal(double function_tolerance = 0.0);
 
   /// Optimizes the given features (unknown and fixed ones, and those without a
   /// live constraint, are passed over) with every other feature constant. Costs

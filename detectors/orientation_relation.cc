@@ -14,6 +14,7 @@ namespace {
 
 constexpr char kName[] = "orientation_relation";
 constexpr char kAnglePrefix[] = "angle_";
+constexpr char kAngleSigmaPrefix[] = "angle_sigma_deg_";
 
 }  // namespace
 
@@ -22,11 +23,17 @@ OrientationRelation::OrientationRelation(OrientationRelationOptions options)
   // An angle between undirected lines has no sign: 45 degrees is 135 from the
   // other side.
   std::vector<double> both;
-  for (const double angle : options_.angles) {
-    both.push_back(NormalizeAxial(angle));
-    both.push_back(NormalizeAxial(-angle));
+  std::vector<double> sigmas;
+  for (std::size_t i = 0; i < options_.angles.size(); ++i) {
+    const double own =
+        i < options_.angle_sigmas.size() ? options_.angle_sigmas[i] : 0.0;
+    for (const double sign : {1.0, -1.0}) {
+      both.push_back(NormalizeAxial(sign * options_.angles[i]));
+      sigmas.push_back(own > 0.0 ? own : options_.sigma);
+    }
   }
   options_.angles = std::move(both);
+  options_.angle_sigmas = std::move(sigmas);
 }
 
 const std::string& OrientationRelation::name() const {
@@ -86,8 +93,10 @@ Transaction OrientationRelation::Detect(const Graph& graph,
       constraint.features = {first.id, second.id};
       constraint.expected =
           Eigen::VectorXd::Constant(1, options_.angles[nearest]);
-      constraint.information = Eigen::MatrixXd::Constant(
-          1, 1, 1.0 / (options_.sigma * options_.sigma));
+      const double sigma =
+          options_.angle_sigmas[static_cast<std::size_t>(nearest)];
+      constraint.information =
+          Eigen::MatrixXd::Constant(1, 1, 1.0 / (sigma * sigma));
       constraint.kind = ConstraintClass::kStructure;
       constraint.source = kName;
       transaction.AddConstraint(std::move(constraint));
@@ -111,15 +120,30 @@ DetectorType OrientationRelationType() {
       {"max_relations", static_cast<double>(defaults.max_relations)},
   };
   type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kName, known, given, kAnglePrefix);
+    const ParameterReader reader(kName, known, given,
+                                 {kAnglePrefix, kAngleSigmaPrefix});
     OrientationRelationOptions options;
     options.gate = DegToRad(reader.Get("gate_deg", 0.0, 45.0));
     options.sigma = DegToRad(reader.Get("sigma_deg", 1e-6, 90.0));
     options.max_relations = reader.GetInt("max_relations", 1);
     std::vector<double> angles;
+    std::vector<double> sigmas;
     for (const auto& [name, value] : reader.values()) {
-      if (name.rfind(kAnglePrefix, 0) == 0) {
+      if (name.rfind(kAngleSigmaPrefix, 0) == 0) {
+        const std::string number =
+            name.substr(std::string(kAngleSigmaPrefix).size());
+        if (reader.values().count(kAnglePrefix + number) == 0) {
+          throw PLUMBLINE_ERROR(
+              std::string(kName) + ": " + name + " is of no angle",
+              kAnglePrefix + number);
+        }
+      } else if (name.rfind(kAnglePrefix, 0) == 0) {
         angles.push_back(DegToRad(reader.Get(name, -360.0, 360.0)));
+        const std::string own =
+            kAngleSigmaPrefix + name.substr(std::string(kAnglePrefix).size());
+        sigmas.push_back(reader.values().count(own) > 0
+                             ? DegToRad(reader.Get(own, 1e-6, 90.0))
+                             : 0.0);
       }
     }
     const double resolution = reader.Get("resolution_deg", 0.0, 180.0);
@@ -134,6 +158,7 @@ DetectorType OrientationRelationType() {
       }
     }
     if (!angles.empty()) options.angles = std::move(angles);
+    options.angle_sigmas = std::move(sigmas);
     return std::make_unique<OrientationRelation>(std::move(options));
   };
   return type;

@@ -15,6 +15,9 @@ struct OrientationRelationOptions {
   /// Angles between orientations that are expected in a building, rad. The sign
   /// does not matter, nor do multiples of pi: 0 is "these are the same".
   std::vector<double> angles = {0.0, kPi / 4, kPi / 2, 3 * kPi / 4};
+  /// Tolerances of the angles that have one of their own, rad; of the size of
+  /// `angles` or empty, 0 for `sigma`.
+  std::vector<double> angle_sigmas;
   /// Two orientations are related when their angle is so near to an expected
   /// one, rad.
   double gate = DegToRad(3.0);
@@ -47,7 +50,8 @@ class OrientationRelation : public StructureDetector {
 
 /// "orientation_relation". Parameters in degrees: gate_deg, sigma_deg,
 /// resolution_deg (its multiples are expected; 0: unset) and the list angle_0,
-/// angle_1, ... which is 0, 45, 90, 135 when neither it nor a resolution is
+/// angle_1, ... (with angle_sigma_deg_0, ... where one has a tolerance of its
+/// own) which is 0, 45, 90, 135 when neither it nor a resolution is
 /// given. With both, all of the angles are expected.
 DetectorType OrientationRelationType();
 

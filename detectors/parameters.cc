@@ -1,6 +1,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/detectors/parameters.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -9,7 +10,7 @@ namespace plumbline {
 namespace {
 
 bool IsNumbered(const std::string& name, const std::string& prefix) {
-  return !prefix.empty() && name.size() > prefix.size() &&
+  return name.size() > prefix.size() &&
          name.compare(0, prefix.size(), prefix) == 0 &&
          name.find_first_not_of("0123456789", prefix.size()) ==
              std::string::npos;
@@ -23,18 +24,24 @@ std::string Text(double value) {
 
 }  // namespace
 
-ParameterReader::ParameterReader(std::string detector,
-                                 const DetectorParameters& defaults,
-                                 const DetectorParameters& given,
-                                 const std::string& numbered_prefix)
+ParameterReader::ParameterReader(
+    std::string detector, const DetectorParameters& defaults,
+    const DetectorParameters& given,
+    const std::vector<std::string>& numbered_prefixes)
     : detector_(std::move(detector)), values_(defaults) {
   for (const auto& [name, value] : given) {
-    if (defaults.count(name) == 0 && !IsNumbered(name, numbered_prefix)) {
+    if (defaults.count(name) == 0 &&
+        std::none_of(numbered_prefixes.begin(), numbered_prefixes.end(),
+                     [&given_name = name](const std::string& prefix) {
+                       return IsNumbered(given_name, prefix);
+                     })) {
       std::string known;
       for (const auto& [known_name, unused] : defaults) {
         known += (known.empty() ? "" : ", ") + known_name;
       }
-      if (!numbered_prefix.empty()) known += ", " + numbered_prefix + "0 ...";
+      for (const std::string& prefix : numbered_prefixes) {
+        known += ", " + prefix + "0 ...";
+      }
       throw PLUMBLINE_ERROR(detector_ + " has no parameter \"" + name + "\"",
                             "one of " + known);
     }

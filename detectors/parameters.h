@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <string>
+#include <vector>
 
 namespace plumbline {
 
@@ -12,11 +13,11 @@ namespace plumbline {
 class ParameterReader {
  public:
   /// Throws Error that lists the known names when `given` has one that
-  /// `defaults` has not. Names that begin with `numbered_prefix` (not empty)
-  /// and go on with digits are known as well ("angle_0").
+  /// `defaults` has not. Names that begin with one of `numbered_prefixes` and
+  /// go on with digits are known as well ("angle_0").
   ParameterReader(std::string detector, const DetectorParameters& defaults,
                   const DetectorParameters& given,
-                  const std::string& numbered_prefix = "");
+                  const std::vector<std::string>& numbered_prefixes = {});
 
   /// The value of a parameter. Throws Error when it is not a number in
   /// [minimum, maximum].

@@ -42,6 +42,31 @@ TEST(LinePlotTest, RoundTicks) {
   EXPECT_THAT(RoundTicks(2.0, 2.0, 5), ElementsAre(2.0));
 }
 
+TEST(LinePlotTest, LogTicks) {
+  EXPECT_THAT(LogTicks(0.1, 10.0, 10),
+              Pointwise(DoubleNear(1e-12),
+                        std::vector<double>{0.1, 0.2, 0.5, 1, 2, 5, 10}));
+  // Powers alone when there are many.
+  EXPECT_THAT(LogTicks(3.0, 2e5, 10),
+              Pointwise(DoubleNear(1e-6),
+                        std::vector<double>{10, 100, 1000, 1e4, 1e5}));
+  EXPECT_THAT(LogTicks(2.5, 4.0, 10), ElementsAre());
+  EXPECT_THAT(LogTicks(2.0, 2.0, 5), ElementsAre(2.0));
+}
+
+TEST(LinePlotTest, LogarithmicAxes) {
+  LinePlot plot = TwoPoints();
+  plot.log_x = plot.log_y = true;
+  // Zero has no place there.
+  plot.series[0].x = {0.0, 1.0, 10.0, 100.0};
+  plot.series[0].y = {5.0, 1.0, 10.0, 100.0};
+  // x from 74 to 809, y from 404 to 40 with a margin of 5 % at both ends: the
+  // middle is in the middle.
+  EXPECT_THAT(PlotSvg({plot}),
+              HasSubstr("<polyline points=\"74.00,387.45 441.50,222.00 "
+                        "809.00,56.55 \""));
+}
+
 TEST(LinePlotTest, PutsPointsWhereTheyBelong) {
   const std::string svg = PlotSvg({TwoPoints()});
   EXPECT_THAT(svg, HasSubstr("width=\"900\" height=\"460\""));

@@ -999,6 +999,115 @@ TEST_F(SolveTest, GraphOfRooms) {
   EXPECT_THAT(output, HasSubstr("level 0 (pose, segment): "));
 }
 
+// A prior says which angles hold and how tightly; what it leaves out is not
+// found.
+TEST_F(SolveTest, StructurePrior) {
+  const std::vector<HierarchyCase> cases = HierarchyCases();
+  const auto wing = std::find_if(
+      cases.begin(), cases.end(),
+      [](const HierarchyCase& row) { return row.name.find("Row3") == 0; });
+  ASSERT_NE(wing, cases.end());
+  HierarchyWorld world(registry_, 1);
+  wing->make(&world);
+  Graph graph;
+  world.Build(&graph);
+  std::ostringstream text;
+  WriteG2o(graph, nullptr, text);
+  const std::string input = Write("wing.g2o", text.str());
+  const std::string prior =
+      Write("grid.prior",
+            "# A court at right angles; nothing is known of its wing.\n"
+            "angle 90 0.05\n"
+            "relation segment_orientation 0.25 deg\n");
+  std::string output;
+  ASSERT_EQ(Solve(input, "without", "", &output), 0) << output;
+  ASSERT_EQ(Solve(input, "out", "--structure_prior=" + prior, &output), 0)
+      << output;
+  CheckFiles("out", FilesOfAGraph());
+  const auto constraints = [&](const std::string& out) {
+    return SummaryOf(out)["counts"]["constraints"];
+  };
+  EXPECT_EQ(constraints("without")["orientation_orientation"]["structure"], 3);
+  EXPECT_EQ(constraints("out")["orientation_orientation"]["structure"], 1);
+  EXPECT_EQ(constraints("out")["segment_orientation"]["structure"], 12);
+  EXPECT_EQ(SummaryOf("out")["flags"]["structure_prior"], prior);
+  Graph map;
+  std::istringstream json(Out("out", "map.json"));
+  ReadGraphJson(json, "map.json", registry_, &map);
+  for (const Constraint* constraint : map.Constraints()) {
+    const double sigma =
+        RadToDeg(1.0 / std::sqrt(constraint->information(0, 0)));
+    if (constraint->type->name == "segment_orientation") {
+      EXPECT_NEAR(sigma, 0.25, 1e-9);
+    } else if (constraint->type->name == "orientation_orientation") {
+      EXPECT_NEAR(sigma, 0.05, 1e-9);
+      EXPECT_NEAR(std::abs(constraint->expected[0]), kPi / 2, 1e-9);
+    }
+  }
+  const std::string none =
+      Write("none.prior", "relation segment_orientation no\n");
+  ASSERT_EQ(Solve(input, "none", "--structure_prior=" + none, &output), 0)
+      << output;
+  EXPECT_EQ(SummaryOf("none")["counts"]["features"].count("orientation"), 0u);
+
+  // Errors name the line, and nothing is written.
+  const std::string broken = Write("broken.prior", "angle 90\nangel 0\n");
+  EXPECT_EQ(Solve(input, "broken", "--structure_prior=" + broken, &output), 2);
+  EXPECT_THAT(output, HasSubstr("broken.prior:2: 'angel' is no statement"));
+  EXPECT_EQ(Solve(input, "broken", "--structure_prior=/no/such", &output), 2);
+  EXPECT_THAT(output, HasSubstr("/no/such: cannot be opened"));
+  EXPECT_TRUE(Files("broken").empty());
+}
+
+// Graphs of points that are wrong, each with the line, and graphs in which
+// there is nothing to find.
+TEST_F(SolveTest, BadGraphsOfPoints) {
+  const std::string points =
+      "VERTEX_XY 0 0 0\nVERTEX_XY 1 1 0\nVERTEX_XY 2 2 0.1\n";
+  const std::string tag = "PLUMBLINE_POINT_POINT_DISTANCE ";
+  const std::pair<std::string, const char*> cases[] = {
+      // An id that is nowhere, twice the same, not positive semidefinite.
+      {points + tag + "0 7 1 100\n", "bad.g2o:4: "},
+      {points + "VERTEX_XY 1 5 5\n", "bad.g2o:4: "},
+      {points + tag + "0 1 1 -100\n", "bad.g2o:4: "},
+      {points + tag + "0 1 1 nan\n", "bad.g2o:4: "},
+      {points + tag + "0 1 inf 100\n", "bad.g2o:4: "},
+      {points + tag + "0 1 1\n", "bad.g2o:4: "},
+      {points + tag + "0 1 1 100 100\n", "bad.g2o:4: "},
+      {points + tag + "0 1.5 1 100\n", "bad.g2o:4: "},
+      {points + tag + "1 1 1 100\n", "bad.g2o:4: "},
+      {"VERTEX_XY 0 0 0\nVERTEX_XY 1 nan 0\n", "bad.g2o:2: "},
+      {"VERTEX_XY 0 0 0\nVERTEX_XY 1 0\n", "bad.g2o:2: "},
+      {"VERTEX_XY 0 0 0\nVERTEX_XY 1 1e400 0\n", "bad.g2o:2: "}};
+  std::string output;
+  for (const auto& [graph, where] : cases) {
+    EXPECT_EQ(Solve(Write("bad.g2o", graph), "out", "", &output), 2) << graph;
+    EXPECT_THAT(output, HasSubstr(where)) << graph;
+    EXPECT_THAT(output, HasSubstr("expected")) << graph;
+  }
+  EXPECT_TRUE(Files("out").empty());
+
+  // Unknown tags are counted, and what is known is solved.
+  ASSERT_EQ(
+      Solve(Write("tags.g2o", points + "VERTEX_TREE 9 1\nVERTEX_TREE 8 1\n"),
+            "tags", "", &output),
+      0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("2 lines with the unknown tag VERTEX_TREE"));
+  EXPECT_EQ(SummaryOf("tags")["counts"]["features"]["point"]["0"], 3);
+}
+
+// Nothing at all is no graph.
+TEST_F(SolveTest, NoGraph) {
+  std::string output;
+  for (const char* const text : {"", "\n\n", "# nothing\n"}) {
+    EXPECT_EQ(Solve(Write("none.g2o", text), "out", "", &output), 2) << text;
+    EXPECT_THAT(output, HasSubstr("none.g2o")) << text;
+    EXPECT_THAT(output, HasSubstr("expected")) << text;
+  }
+  EXPECT_TRUE(Files("out").empty());
+}
+
 TEST_F(SolveTest, DegenerateGraphsOfPoints) {
   std::string isolated, one_spot;
   for (int i = 0; i < 30; ++i) {

@@ -792,6 +792,26 @@ TEST_F(EmTest, FixedAndMeasuredVirtualFeaturesStay) {
   EXPECT_EQ(graph_.FindFeature(result.features[2]), nullptr);
 }
 
+// Solves in the loop may end early; the last one does not.
+TEST_F(EmTest, ALooseLoopEndsInATightSolve) {
+  for (const double degrees : {0.0, 0.2, -0.1, 0.15}) AddSegment(degrees);
+  Add(0, "directions", 2, DirectionDetector({0.0}));
+  EmOptions options;
+  options.loop_tolerance = 0.1;
+  EXPECT_TRUE(Make(options).Run().converged);
+  EXPECT_EQ(trace_.front().phase, "measurements");
+  EXPECT_EQ(trace_.back().phase, "final");
+  const double cost = session_->Cost().total();
+  session_->SolveGlobal();
+  EXPECT_NEAR(session_->Cost().total(), cost, 1e-9 * cost);
+  // Only there.
+  trace_.clear();
+  options.loop_tolerance = 0.0;
+  Add(0, "directions", 2, DirectionDetector({0.0}));
+  Make(options).Run();
+  EXPECT_NE(trace_.back().phase, "final");
+}
+
 TEST_F(EmTest, AnEmptyHierarchyConverges) {
   AddSegment(0.0);
   const EmReport report = Make().Run();

@@ -44,6 +44,7 @@ struct Wall {
   double begin;
   double end;
   double noise;
+  int group;
 };
 
 Wall Prepare(const PlaceWall& wall, const PlaceMatchOptions& options) {
@@ -54,6 +55,7 @@ Wall Prepare(const PlaceWall& wall, const PlaceMatchOptions& options) {
   prepared.normal = {-prepared.along.y(), prepared.along.x()};
   prepared.begin = wall.begin;
   prepared.end = wall.end;
+  prepared.group = wall.group;
   const double length = std::max(wall.end - wall.begin, 0.1);
   prepared.noise = options.direction_noise / (length * std::sqrt(length));
   return prepared;
@@ -124,7 +126,7 @@ class Matcher {
 
   PlaceMatch Match() {
     PlaceMatch result;
-    if (candidates_.empty()) return result;
+    if (!has_news_) return result;
     Try(Vector3d::Zero());
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       Try(Solve({candidates_[i]}));
@@ -208,6 +210,8 @@ class Matcher {
         if (std::abs(offset) > across) continue;
         by_second_[j].push_back(static_cast<int>(i));
         candidates_.push_back({static_cast<int>(i), static_cast<int>(j)});
+        has_news_ =
+            has_news_ || wall.group < 0 || wall.group != first_[i].group;
         offsets.push_back(offset);
       }
       // Different lines among them.
@@ -436,6 +440,8 @@ class Matcher {
   std::vector<Wall> first_;
   std::vector<Wall> second_;
   std::vector<Candidate> candidates_;
+  // Some candidates are not known to be one wall.
+  bool has_news_ = false;
   // Of each wall of the second place: half width of its search, number of lines
   // of the first place in it, and the candidates.
   std::vector<double> ranges_;

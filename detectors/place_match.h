@@ -19,6 +19,8 @@ struct PlaceWall {
   /// Visible part, m along the direction from the reference point.
   double begin = 0.0;
   double end = 0.0;
+  /// Walls of one group (0 or more) are one wall already.
+  int group = -1;
 };
 
 /// Gates of matching the walls of two places.
@@ -104,6 +106,9 @@ struct PlaceMatch {
 /// that could be tried: the first line of each direction fixes the displacement
 /// and proves nothing, and the opposite wall of a corridor counts half, as
 /// corridors of one width are common.
+///
+/// Where all walls that could be one are of one group already, there is nothing
+/// to find and no match is returned.
 PlaceMatch MatchPlaces(const std::vector<PlaceWall>& first,
                        const std::vector<PlaceWall>& second,
                        const Eigen::Vector2d& pivot,

@@ -54,7 +54,9 @@ struct Place {
 class Search {
  public:
   Search(const Graph& graph, const SameWallOptions& options)
-      : graph_(graph), options_(options), marginals_(graph) {
+      : graph_(graph),
+        options_(options),
+        marginals_(graph, MarginalsOptions{/*hold_gauge=*/true}) {
     for (const Feature* feature : graph.Features()) {
       if (feature->level != 0 || feature->type->name != "segment") continue;
       index_[feature->id] = static_cast<int>(walls_.size());
@@ -70,11 +72,15 @@ class Search {
     parts_ = std::make_unique<DisjointSets>(
         static_cast<std::size_t>(graph.feature_id_end()));
     ReadConstraints();
+    for (std::size_t i = 0; i < walls_.size(); ++i) {
+      walls_[i].group = static_cast<int>(classes_->Find(i));
+    }
     MakePlaces();
   }
 
   std::vector<Proposal> Run() {
     FindKnown();
+    MeasureAnchors();
     for (std::size_t i = 0; i < places_.size(); ++i) ComparePlace(i);
     return Choose();
   }
@@ -205,6 +211,13 @@ class Search {
     return ways;
   }
 
+  // Of either coordinate, beyond what the graph says, m^2.
+  double AddedVariance(double way) const {
+    const double drift = options_.drift_rate * way;
+    return drift * drift +
+           options_.least_position_sigma * options_.least_position_sigma;
+  }
+
   Matrix3d Prior(const Matrix3d& relative, double heading, double way) const {
     const double c = std::cos(heading);
     const double s = std::sin(heading);
@@ -212,13 +225,60 @@ class Search {
     rotation.topLeftCorner<2, 2>() << c, -s, s, c;
     Matrix3d prior = options_.covariance_scale * options_.covariance_scale *
                      (rotation * relative * rotation.transpose());
-    const double drift = options_.drift_rate * way;
-    const double position = drift * drift + options_.least_position_sigma *
-                                                options_.least_position_sigma;
-    prior(0, 0) += position;
-    prior(1, 1) += position;
+    prior(0, 0) += AddedVariance(way);
+    prior(1, 1) += AddedVariance(way);
     prior(2, 2) += options_.least_angle_sigma * options_.least_angle_sigma;
     return prior;
+  }
+
+  // How well each place is known in the frame of its part of the graph.
+  void MeasureAnchors() {
+    std::vector<FeatureId> anchors;
+    for (const Place& place : places_) {
+      const FeatureId id = walls_[place.anchor].id;
+      if (IsTied(id)) anchors.push_back(id);
+    }
+    marginals_.Compute(anchors);
+    sigmas_.assign(places_.size(), {0.0, 0.0});
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      const FeatureId id = walls_[places_[p].anchor].id;
+      if (!IsTied(id)) continue;
+      const Eigen::MatrixXd covariance = marginals_.Covariance(id);
+      sigmas_[p] = {
+          std::sqrt(std::max(0.0, covariance(0, 0) + covariance(1, 1))),
+          std::sqrt(std::max(0.0, covariance(2, 2)))};
+    }
+  }
+
+  bool IsTied(FeatureId id) const {
+    const auto& constraints = graph_.ConstraintsOf(id);
+    return std::any_of(constraints.begin(), constraints.end(),
+                       [&](ConstraintId constraint) {
+                         return graph_.GetConstraint(constraint).state ==
+                                ConstraintState::kLive;
+                       });
+  }
+
+  // No more than this is unknown of the second place's position seen from the
+  // first, m: the relative position is a sum of what moves the second, what
+  // moves the first, and what turns the first, and the deviation of a sum is
+  // at most the sum of the deviations.
+  double LargestSigma(std::size_t from, std::size_t to) const {
+    const double distance = (walls_[places_[to].anchor].position -
+                             walls_[places_[from].anchor].position)
+                                .norm();
+    return sigmas_[from].first + sigmas_[to].first +
+           distance * sigmas_[from].second;
+  }
+
+  // Whether a place that is known like this may be the other, as far as their
+  // distance tells.
+  bool IsInReach(const Place& own, const Place& other,
+                 double variance_of_position) const {
+    return (other.center - own.center).norm() <=
+           options_.match.gate *
+                   std::sqrt(std::max(variance_of_position, 0.0)) +
+               0.5 * options_.place_radius;
   }
 
   void ComparePlace(std::size_t index) {
@@ -230,7 +290,13 @@ class Search {
     std::vector<FeatureId> anchors;
     for (std::size_t p = 0; p < index; ++p) {
       if (near.count(places_[p].anchor) > 0) continue;
-      if (!std::isfinite(ways[places_[p].anchor])) continue;
+      const double way = ways[places_[p].anchor];
+      if (!std::isfinite(way)) continue;
+      const double sigma = options_.covariance_scale * LargestSigma(index, p);
+      if (!IsInReach(own, places_[p],
+                     sigma * sigma + 2.0 * AddedVariance(way))) {
+        continue;
+      }
       others.push_back(p);
       anchors.push_back(walls_[places_[p].anchor].id);
     }
@@ -249,14 +315,7 @@ class Search {
       const Place& other = places_[others[k]];
       const Matrix3d prior = Prior(covariances[k], walls_[own.anchor].direction,
                                    ways[other.anchor]);
-      const double reach =
-          options_.match.gate *
-          std::sqrt(std::max(prior(0, 0), 0.0) + std::max(prior(1, 1), 0.0));
-      if ((other.center - own.center).norm() >
-          reach + 0.5 * options_.place_radius) {
-        continue;
-      }
-      if (AreAllOne(own, other)) continue;
+      if (!IsInReach(own, other, prior(0, 0) + prior(1, 1))) continue;
       std::vector<PlaceWall> other_walls;
       for (const int i : other.walls) other_walls.push_back(walls_[i]);
       PlaceMatch match =
@@ -285,15 +344,6 @@ class Search {
         Propose(i, j, match, one.match.search, one.match.evidence);
       }
     }
-  }
-
-  // Nothing left to find between the places.
-  bool AreAllOne(const Place& a, const Place& b) {
-    std::set<std::size_t> of_a;
-    for (const int i : a.walls) of_a.insert(classes_->Find(i));
-    return std::all_of(b.walls.begin(), b.walls.end(), [&](int i) {
-      return of_a.count(classes_->Find(i)) > 0;
-    });
   }
 
   void Propose(int i, int j, const WallMatch& match, double search,
@@ -449,6 +499,9 @@ class Search {
   std::unique_ptr<DisjointSets> classes_;
   std::unique_ptr<DisjointSets> parts_;
   std::vector<Place> places_;
+  // By place, of its anchor: standard deviations of the position (both
+  // coordinates together, m) and of the direction (rad).
+  std::vector<std::pair<double, double>> sigmas_;
   std::map<Pair, Proposal> proposals_;
 };
 

@@ -189,6 +189,19 @@ TEST(PlaceMatchTest, PiecesOfALineAreOneLine) {
           .matches.empty());
 }
 
+TEST(PlaceMatchTest, WallsOfOneGroupAreNoNews) {
+  std::vector<PlaceWall> first = Room();
+  std::vector<PlaceWall> second = Room();
+  for (int i = 0; i < 8; ++i) first[i].group = second[i].group = 0;
+  EXPECT_TRUE(Match(first, second, Prior(0.1, 0.1)).matches.empty());
+  // One wall that is not is enough to match them all.
+  second[3].group = 1;
+  EXPECT_EQ(Match(first, second, Prior(0.1, 0.1)).matches.size(), 8u);
+  // Groups that are not known count for nothing.
+  for (int i = 0; i < 8; ++i) first[i].group = second[i].group = -1;
+  EXPECT_EQ(Match(first, second, Prior(0.1, 0.1)).matches.size(), 8u);
+}
+
 TEST(PlaceMatchTest, DegenerateInput) {
   EXPECT_TRUE(Match({}, {}, Prior(1.0, 1.0)).matches.empty());
   EXPECT_TRUE(Match(Room(), {}, Prior(1.0, 1.0)).matches.empty());

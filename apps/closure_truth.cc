@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -51,6 +52,14 @@ std::vector<Face> Faces(const MapTruth& truth) {
   return faces;
 }
 
+// A door and its wall.
+bool AreNear(const Face& a, const Face& b) {
+  return a.along.dot(b.along) > 0.0 &&
+         std::abs(Cross(a.along, b.along)) <=
+             std::sin(DegToRad(kInLineAngleDeg)) &&
+         std::abs(Cross(a.along, b.begin - a.begin)) <= kSameWallOffset;
+}
+
 // Numbers of the lines that faces lie on, by face: that of the line's first
 // face.
 std::vector<int> Lines(const std::vector<Face>& faces) {
@@ -92,7 +101,7 @@ Placed Place(const MapSegment& segment, const std::vector<Face>& faces,
         (segment.begin + (k + 0.5) * placed.length / samples) * along;
     int best = -1;
     bool is_best_facing = false;
-    double least = options.maximum_offset;
+    double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < faces.size(); ++i) {
       const Face& face = faces[i];
       if (std::abs(Cross(face.along, along)) > sine) continue;
@@ -101,8 +110,11 @@ Placed Place(const MapSegment& segment, const std::vector<Face>& faces,
       if (at < -options.end_slack || at > face.length + options.end_slack) {
         continue;
       }
-      const double offset = std::abs(Cross(face.along, relative));
-      if (offset > options.maximum_offset) continue;
+      const double across = std::abs(Cross(face.along, relative));
+      if (across > options.maximum_offset) continue;
+      // What stands out over an end belongs to what is there, if anything.
+      const double offset =
+          std::hypot(across, std::max({0.0, -at, at - face.length}));
       const bool is_facing = face.along.dot(along) < 0.0;
       if (best >= 0 &&
           (is_facing == is_best_facing ? offset >= least : is_best_facing)) {
@@ -121,7 +133,15 @@ Placed Place(const MapSegment& segment, const std::vector<Face>& faces,
       placed.face = line;
     }
   }
-  if (most < options.minimum_overlap * samples) placed.face = -1;
+  // A segment may run over doors and the wall between them.
+  int explained = 0;
+  for (const auto& [line, count] : hits) {
+    if (AreNear(faces[static_cast<std::size_t>(line)],
+                faces[static_cast<std::size_t>(placed.face)])) {
+      explained += count;
+    }
+  }
+  if (explained < options.minimum_overlap * samples) placed.face = -1;
   if (placed.face >= 0) {
     const Face& face = faces[static_cast<std::size_t>(placed.face)];
     const double a =
@@ -132,6 +152,18 @@ Placed Place(const MapSegment& segment, const std::vector<Face>& faces,
     placed.high = std::max(a, b);
   }
   return placed;
+}
+
+enum class Verdict { kRight, kNear, kWrong };
+
+Verdict Judge(const Placed& first, const Placed& second,
+              const std::vector<Face>& faces) {
+  if (first.face < 0 || second.face < 0) return Verdict::kWrong;
+  if (first.face == second.face) return Verdict::kRight;
+  return AreNear(faces[static_cast<std::size_t>(first.face)],
+                 faces[static_cast<std::size_t>(second.face)])
+             ? Verdict::kNear
+             : Verdict::kWrong;
 }
 
 }  // namespace
@@ -154,16 +186,24 @@ ClosureEvaluation EvaluateClosures(const StraightMap& map,
   for (const MapClosure& closure : map.closures) {
     const std::size_t first = index.at(closure.first);
     const std::size_t second = index.at(closure.second);
-    const bool is_right =
-        placed[first].face >= 0 && placed[first].face == placed[second].face;
-    if (closure.is_live) {
-      walls.Join(first, second);
-      ++(is_right ? evaluation.right : evaluation.wrong);
-      if (!is_right) {
+    const Verdict verdict = Judge(placed[first], placed[second], faces);
+    if (!closure.is_live) {
+      ++(verdict == Verdict::kWrong ? evaluation.broken_wrong
+                                    : evaluation.broken_right);
+      continue;
+    }
+    walls.Join(first, second);
+    switch (verdict) {
+      case Verdict::kRight:
+        ++evaluation.right;
+        break;
+      case Verdict::kNear:
+        ++evaluation.near;
+        break;
+      case Verdict::kWrong:
+        ++evaluation.wrong;
         evaluation.wrong_pairs.emplace_back(closure.first, closure.second);
-      }
-    } else {
-      ++(is_right ? evaluation.broken_right : evaluation.broken_wrong);
+        break;
     }
   }
 

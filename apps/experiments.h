@@ -93,7 +93,7 @@ struct ExperimentResult {
   bool interrupted = false;
 };
 
-/// "S1" to "S6", "R1", "R2".
+/// "S1" to "S6", "R1", "R2", "B1".
 const std::vector<std::string>& ExperimentNames();
 
 /// Runs an experiment of method.md, section 8.
@@ -108,6 +108,8 @@ const std::vector<std::string>& ExperimentNames();
 ///       within 0.02 m
 ///   R1, R2  the logs of Killian Court and of the first part of the Intel
 ///       Research Lab, without structure and with
+///   B1  simulated buildings of several shapes (apps/building_trial.h): right
+///       and wrong loop closures, errors of walls
 ///
 /// The registry needs the built-ins. Throws Error for an unknown name and for
 /// options that do not fit.

@@ -148,9 +148,9 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
   const ClosureEvaluation closures =
       EvaluateClosures(map, truth, alignment, options);
   std::printf(
-      "closures: %d right, %d wrong; broken: %d right, %d wrong; revisits "
-      "closed: %d of %d\n",
-      closures.right, closures.wrong, closures.broken_right,
+      "closures: %d right, %d of a door and its wall, %d wrong; broken: %d "
+      "right, %d wrong; revisits closed: %d of %d\n",
+      closures.right, closures.near, closures.wrong, closures.broken_right,
       closures.broken_wrong, closures.closed_revisits, closures.revisits);
 
   Json walls = Json::array();
@@ -184,6 +184,7 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
               {"duplicate_orientations", evaluation.duplicate_orientations},
               {"closures",
                {{"right", closures.right},
+                {"near", closures.near},
                 {"wrong", closures.wrong},
                 {"broken_right", closures.broken_right},
                 {"broken_wrong", closures.broken_wrong},

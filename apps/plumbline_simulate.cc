@@ -23,14 +23,16 @@
 
 namespace {
 
-const plumbline::LaserOptions kLaser;
+const plumbline::LaserModel kLaser;
 const plumbline::OdometryOptions kOdometry;
 const plumbline::DriveOptions kDrive;
 
 }  // namespace
 
 DEFINE_string(world, "",
-              "office, killian_like, a world file, or S1 to S6: graphs.");
+              "office, killian_like, oblique, symmetric, parallel, a world "
+              "file, or S1 to "
+              "S6: graphs.");
 DEFINE_uint64(seed, 1,
               "Draws the dimensions of a built-in world, the sway of the robot "
               "and all noise.");
@@ -129,7 +131,8 @@ World LoadWorld() {
     throw Error(
         "--world", 0,
         "'" + FLAGS_world + "' is no built-in world and no readable file",
-        "office, killian_like, S1 to S6 or a world file");
+        "office, killian_like, oblique, symmetric, parallel, S1 to S6 or a "
+        "world file");
   }
   return ReadWorld(file, FLAGS_world);
 }

@@ -384,7 +384,7 @@ std::vector<double> CastBeams(const WorldSurfaces& surfaces, const Pose2& laser,
 
 Simulation Simulate(const World& world, const SimulatorOptions& options,
                     std::uint64_t seed) {
-  const LaserOptions& laser = options.laser;
+  const LaserModel& laser = options.laser;
   Check(laser.beams == 180 || laser.beams == 181 || laser.beams == 360 ||
             laser.beams == 361,
         "bad number of beams", "180, 181, 360 or 361");
@@ -454,7 +454,7 @@ Simulation Simulate(const World& world, const SimulatorOptions& options,
   return simulation;
 }
 
-void WriteCarmenLog(const Simulation& simulation, const LaserOptions& laser,
+void WriteCarmenLog(const Simulation& simulation, const LaserModel& laser,
                     const std::vector<std::string>& comments,
                     std::ostream& output) {
   output << "# CARMEN log, simulated\n"

@@ -31,7 +31,7 @@ struct DriveOptions {
 };
 
 /// A laser scanner.
-struct LaserOptions {
+struct LaserModel {
   /// 180, 181, 360 or 361: old CARMEN messages carry no angles, and readers
   /// take 1 degree a beam for the first two, half a degree for the others.
   int beams = 180;
@@ -71,7 +71,7 @@ struct OdometryOptions {
 /// All of it.
 struct SimulatorOptions {
   DriveOptions drive;
-  LaserOptions laser;
+  LaserModel laser;
   OdometryOptions odometry;
   /// Called after every scan with the share of the way that is done; false
   /// ends the simulation there. May be empty.
@@ -129,7 +129,7 @@ Simulation Simulate(const World& world, const SimulatorOptions& options,
 /// Writes a CARMEN text log: `comments` as # lines, PARAM lines (maximum range
 /// and offset of the laser), ODOM and FLASER lines. Ranges have 2 digits after
 /// the point, poses and time stamps 6.
-void WriteCarmenLog(const Simulation& simulation, const LaserOptions& laser,
+void WriteCarmenLog(const Simulation& simulation, const LaserModel& laser,
                     const std::vector<std::string>& comments,
                     std::ostream& output);
 

@@ -331,7 +331,7 @@ struct Frame {
 class BuildingMaker {
  public:
   BuildingMaker(const BuildingOptions& options, std::uint64_t seed)
-      : options_(options), random_(seed) {}
+      : options_(options), seed_(seed), random_(seed) {}
 
   World Make() {
     Measure();
@@ -352,13 +352,20 @@ class BuildingMaker {
     return random_.Uniform(interval.low, interval.high);
   }
 
+  // Begins a part that is like others of its kind.
+  void BeginPart() {
+    if (options_.identical_blocks) random_ = SimulationRandom(seed_);
+  }
+
   void Measure() {
     xs_ = {0.0};
     ys_ = {0.0};
     for (int i = 0; i < options_.columns; ++i) {
+      BeginPart();
       xs_.push_back(xs_.back() + Draw(options_.block_length));
     }
     for (int i = 0; i < options_.rows; ++i) {
+      BeginPart();
       ys_.push_back(ys_.back() + Draw(options_.block_height));
     }
     half_ = Draw(options_.corridor_width) / 2;
@@ -460,10 +467,17 @@ class BuildingMaker {
     const double low = -half_ - t_;
     const double depth_south = Draw(options_.room_depth);
     const double depth_north = Draw(options_.room_depth);
-    AddRow({{0.0, 0.0}, {1.0, 0.0}, {0.0, -1.0}}, low, low + t_ / 2,
-           length + half_ + t_ / 2, depth_south, true, true);
-    AddRow({{0.0, height}, {1.0, 0.0}, {0.0, 1.0}}, low, low + t_ / 2,
-           length + half_ + t_ / 2, depth_north, true, true);
+    const Frame south{{0.0, 0.0}, {1.0, 0.0}, {0.0, -1.0}};
+    const Frame north{{0.0, height}, {1.0, 0.0}, {0.0, 1.0}};
+    if (options_.identical_blocks) {
+      AddIdenticalRows(south, depth_south);
+      AddIdenticalRows(north, depth_south);
+    } else {
+      AddRow(south, low, low + t_ / 2, length + half_ + t_ / 2, depth_south,
+             true, true);
+      AddRow(north, low, low + t_ / 2, length + half_ + t_ / 2, depth_north,
+             true, true);
+    }
     for (const double x : {low + t_ / 2, length + half_ + t_ / 2}) {
       AddWall({x, low}, {x, height - low}, t_);
     }
@@ -472,6 +486,18 @@ class BuildingMaker {
     if (east_is_shut) {
       AddVerticalDoors(length + half_ + t_ / 2, low, height - low);
     }
+  }
+
+  // A row of rooms a block, and what is left beside the last corridor.
+  void AddIdenticalRows(const Frame& frame, double depth) {
+    const double shift = -half_ - t_ / 2;
+    for (std::size_t i = 1; i < xs_.size(); ++i) {
+      BeginPart();
+      AddRow(frame, xs_[i - 1] + shift - t_ / 2, xs_[i - 1] + shift,
+             xs_[i] + shift, depth, true, true);
+    }
+    AddRow(frame, xs_.back() + shift, xs_.back() + shift, xs_.back() - shift,
+           depth, true, true);
   }
 
   void AddVerticalDoors(double x, double y0, double y1) {
@@ -487,6 +513,7 @@ class BuildingMaker {
   }
 
   void MakeBlock(int row, int column) {
+    BeginPart();
     const double x0 = xs_[column] + half_ + t_ / 2;
     double x1 = xs_[column + 1] - half_ - t_ / 2;
     const double y0 = ys_[row] + half_ + t_ / 2;
@@ -732,6 +759,7 @@ class BuildingMaker {
   }
 
   const BuildingOptions options_;
+  const std::uint64_t seed_;
   SimulationRandom random_;
   World world_;
   // Centre lines of the vertical and horizontal corridors.
@@ -767,13 +795,70 @@ BuildingOptions KillianLikeOptions() {
   return options;
 }
 
+BuildingOptions ObliqueOptions(std::uint64_t seed) {
+  BuildingOptions options;
+  SimulationRandom random(seed);
+  options.wing_angle_deg = random.Uniform(15.0, 55.0);
+  // The rooms of a steep wing begin late.
+  options.wing_length = 22.0;
+  return options;
+}
+
+BuildingOptions SymmetricOptions() {
+  BuildingOptions options;
+  options.columns = 3;
+  options.rows = 2;
+  options.block_length = {13.0, 16.0};
+  options.visited_share = 0.3;
+  options.hall_length = 0.0;
+  options.wing_length = 0.0;
+  options.furniture = 0;
+  options.corridor_clutter = 0.0;
+  options.identical_blocks = true;
+  return options;
+}
+
+BuildingOptions ParallelOptions() {
+  BuildingOptions options = SymmetricOptions();
+  options.columns = 1;
+  options.rows = 5;
+  options.block_length = {35.0, 45.0};
+  options.block_height = {7.0, 8.0};
+  options.visited_share = 0.0;
+  options.shut_share = 0.8;
+  return options;
+}
+
 World MakeBuilding(const BuildingOptions& options, std::uint64_t seed) {
   return BuildingMaker(options, seed).Make();
 }
 
+namespace {
+
+struct BuiltInWorld {
+  const char* name;
+  BuildingOptions (*options)(std::uint64_t seed);
+};
+
+const std::vector<BuiltInWorld>& Worlds() {
+  static const std::vector<BuiltInWorld>* const worlds =
+      new std::vector<BuiltInWorld>{
+          {"office", [](std::uint64_t) { return BuildingOptions(); }},
+          {"killian_like", [](std::uint64_t) { return KillianLikeOptions(); }},
+          {"oblique", ObliqueOptions},
+          {"symmetric", [](std::uint64_t) { return SymmetricOptions(); }},
+          {"parallel", [](std::uint64_t) { return ParallelOptions(); }}};
+  return *worlds;
+}
+
+}  // namespace
+
 const std::vector<std::string>& BuiltInWorlds() {
-  static const std::vector<std::string>* const names =
-      new std::vector<std::string>{"office", "killian_like"};
+  static const std::vector<std::string>* const names = [] {
+    auto* list = new std::vector<std::string>;
+    for (const BuiltInWorld& world : Worlds()) list->push_back(world.name);
+    return list;
+  }();
   return *names;
 }
 
@@ -781,13 +866,17 @@ World MakeWorld(const std::string& name, std::uint64_t seed, double size) {
   if (!(size > 0.0 && size <= 100.0)) {
     throw PLUMBLINE_ERROR("bad size of a world", "a number in (0, 100]");
   }
-  BuildingOptions options;
-  if (name == "killian_like") {
-    options = KillianLikeOptions();
-  } else if (name != "office") {
-    throw PLUMBLINE_ERROR("unknown world '" + name + "'",
-                          "office or killian_like");
+  const auto found = std::find_if(
+      Worlds().begin(), Worlds().end(),
+      [&](const BuiltInWorld& world) { return name == world.name; });
+  if (found == Worlds().end()) {
+    std::string known;
+    for (const std::string& world : BuiltInWorlds()) {
+      known += (known.empty() ? "" : ", ") + world;
+    }
+    throw PLUMBLINE_ERROR("unknown world '" + name + "'", known);
   }
+  BuildingOptions options = found->options(seed);
   const auto scale = [size](int count) {
     return std::max(1, static_cast<int>(std::lround(count * size)));
   };

@@ -165,11 +165,24 @@ struct BuildingOptions {
   /// corridor (those that would be in the robot's way are left out).
   int furniture = 3;
   double corridor_clutter = 0.6;
+  /// Every block is like every other, with the same rooms open, shut and
+  /// visited, so that one place looks like several: a building that invites
+  /// wrong loop closures. Clutter still differs.
+  bool identical_blocks = false;
 };
 
 /// Options of very long corridors with shut doors, without rooms to enter:
 /// loops of hundreds of metres and a way of more than a kilometre.
 BuildingOptions KillianLikeOptions();
+
+/// An office whose wing stands at 15 to 55 degrees, drawn from the seed.
+BuildingOptions ObliqueOptions(std::uint64_t seed);
+
+/// Three by two identical blocks with rooms and nothing else.
+BuildingOptions SymmetricOptions();
+
+/// Five identical long blocks one above the other: six corridors side by side.
+BuildingOptions ParallelOptions();
 
 /// Builds it; `seed` draws all dimensions. The path covers every corridor and
 /// drives through the loops several times. Throws Error when the options
@@ -179,7 +192,7 @@ World MakeBuilding(const BuildingOptions& options, std::uint64_t seed);
 /// Names that MakeWorld knows.
 const std::vector<std::string>& BuiltInWorlds();
 
-/// A built-in world by name: `office` or `killian_like`. `size` multiplies the
+/// A built-in world by name (BuiltInWorlds). `size` multiplies the
 /// number of blocks both ways (at least one stays). Throws Error on another
 /// name or a size outside (0, 100].
 World MakeWorld(const std::string& name, std::uint64_t seed, double size);

@@ -19,8 +19,11 @@ struct OrientationRelationOptions {
   /// `angles` or empty, 0 for `sigma`.
   std::vector<double> angle_sigmas;
   /// Two orientations are related when their angle is so near to an expected
-  /// one, rad.
-  double gate = DegToRad(3.0);
+  /// one, rad. An orientation stands on many walls and is known to a few tenths
+  /// of a degree before it is related; a relation, once it stands, is tight and
+  /// pulls the orientation off its walls rather than show a residual, so a wing
+  /// that is oblique by a degree must not get one.
+  double gate = DegToRad(0.7);
   /// Tolerance of the relation, rad.
   double sigma = DegToRad(0.02);
   /// An orientation is related to at most so many that stood before it. All

@@ -54,6 +54,33 @@ TEST(ClosureTruthTest, RightAndWrong) {
   EXPECT_EQ(evaluation.wrong_pairs[0].second, 3);
 }
 
+TEST(ClosureTruthTest, ADoorAndItsWallAreNear) {
+  MapTruth truth = TwoWalls();
+  TruthWall door;
+  door.id = 4;
+  door.begin = {6.0, 0.04};
+  door.end = {5.0, 0.04};  // looks up, 0.06 m behind the wall
+  truth.walls.push_back(door);
+  StraightMap map;
+  map.segments = {Segment(1, 0.0, 4.0, 0.1), Segment(2, 5.0, 6.0, 0.04),
+                  Segment(3, 4.0, 0.5, 0.0)};
+  map.closures = {{1, 2, true}, {2, 3, true}};
+  ClosureEvaluation evaluation = EvaluateClosures(map, truth, Pose2::Zero());
+  EXPECT_EQ(evaluation.right, 0);
+  EXPECT_EQ(evaluation.near, 1);
+  // The back of the wall is as close, but looks the other way.
+  EXPECT_EQ(evaluation.wrong, 1);
+  map.closures = {{1, 2, false}};
+  evaluation = EvaluateClosures(map, truth, Pose2::Zero());
+  EXPECT_EQ(evaluation.broken_right, 1);
+  // Deeper than that is another wall.
+  truth.walls.back().begin.y() = truth.walls.back().end.y() = -0.05;
+  map.segments[1] = Segment(2, 5.0, 6.0, -0.05);
+  map.closures = {{1, 2, true}};
+  evaluation = EvaluateClosures(map, truth, Pose2::Zero());
+  EXPECT_EQ(evaluation.wrong, 1);
+}
+
 TEST(ClosureTruthTest, Revisits) {
   StraightMap map;
   map.segments = {Segment(1, 0.0, 4.0, 0.1),  Segment(2, 1.0, 5.0, 0.1),

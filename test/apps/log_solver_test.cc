@@ -1,15 +1,18 @@
 #include <gtest/gtest.h>
 #include <plumbline/apps/log_solver.h>
 #include <plumbline/core/builtins.h>
+#include <plumbline/core/detector.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/same_wall.h>
 #include <plumbline/frontend/carmen_reader.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <set>
 #include <sstream>
 #include <string>
@@ -178,6 +181,117 @@ TEST_F(LogSolverTest, LoopsAreClosed) {
     EXPECT_GE(phase.iteration, last);
     last = phase.iteration;
   }
+}
+
+// Says, once loops are being closed, that the two walls farthest apart that
+// look the same way are one: what same_wall would say if it were fooled.
+class FooledDetector : public StructureDetector {
+ public:
+  static constexpr char kName[] = "fooled";
+
+  const std::string& name() const override {
+    static const std::string name = kName;
+    return name;
+  }
+  Transaction Detect(const Graph& graph, const Registry& registry,
+                     const DetectionScope& scope) const override {
+    Transaction transaction;
+    if (scope.features != nullptr) return transaction;
+    bool is_closing = false;
+    for (const Constraint* constraint : graph.Constraints()) {
+      is_closing = is_closing || constraint->source == "same_wall";
+    }
+    if (!is_closing) return transaction;
+    std::vector<const Feature*> walls;
+    for (const Feature* feature : graph.Features()) {
+      if (feature->type->name == "segment" &&
+          feature->extent_end - feature->extent_begin > 3.0) {
+        walls.push_back(feature);
+      }
+    }
+    const Feature* first = nullptr;
+    const Feature* second = nullptr;
+    double farthest = 0.0;
+    for (const Feature* a : walls) {
+      for (const Feature* b : walls) {
+        const double angle = b->parameters[2] - a->parameters[2];
+        const double dx = b->parameters[0] - a->parameters[0];
+        const double dy = b->parameters[1] - a->parameters[1];
+        const double offset =
+            -std::sin(a->parameters[2]) * dx + std::cos(a->parameters[2]) * dy;
+        if (std::cos(angle) > 0.999 && offset > farthest) {
+          farthest = offset;
+          first = a;
+          second = b;
+        }
+      }
+    }
+    if (first == nullptr) return transaction;
+    for (const ConstraintId id : graph.ConstraintsOf(first->id)) {
+      if (graph.GetConstraint(id).source == kName) return transaction;
+    }
+    Constraint constraint;
+    constraint.type = &registry.GetRelation(kSameWallRelation);
+    constraint.features = {first->id, second->id};
+    constraint.expected = Eigen::VectorXd::Zero(2);
+    constraint.information = 400.0 * Eigen::Matrix2d::Identity();
+    constraint.kind = ConstraintClass::kStructure;
+    constraint.source = kName;
+    transaction.AddConstraint(std::move(constraint));
+    return transaction;
+  }
+};
+
+TEST_F(LogSolverTest, AFalseClosureIsBrokenAndTheMapReturns) {
+  DetectorType type;
+  type.name = FooledDetector::kName;
+  type.description = "takes two walls that are not one for one";
+  type.reads = {"segment"};
+  type.make = [](const DetectorParameters&) {
+    return std::make_unique<FooledDetector>();
+  };
+  registry_.Register(type);
+  const Log log = Office(100000);
+  LogSolverOptions options;
+  options.refine = Refinement::kMap;
+  options.complete_walls = false;
+  options.hierarchy = "orientation_mixture/orientation_relation";
+  LogSolver truthful(registry_, options);
+  const LogSolverResult expected = truthful.Run(log);
+  options.hierarchy = "orientation_mixture,fooled/orientation_relation";
+  LogSolver fooled(registry_, options);
+  const LogSolverResult result = fooled.Run(log);
+
+  int proposed = 0;
+  for (const Constraint* constraint : fooled.graph().Constraints()) {
+    if (constraint->source != FooledDetector::kName) continue;
+    ++proposed;
+    EXPECT_EQ(constraint->state, ConstraintState::kBroken);
+    EXPECT_LT(constraint->delta, 0.3);
+  }
+  EXPECT_GE(proposed, 1);
+  // It was live for a while, and bent the map.
+  double highest = 0.0;
+  double last = 0.0;
+  bool was_live = false;
+  for (const EmPhase& phase : fooled.trace()) {
+    const auto live = phase.structure_by_relation.find(kSameWallRelation);
+    was_live = was_live ||
+               (live != phase.structure_by_relation.end() && live->second > 0);
+    highest = std::max(highest, phase.cost.total());
+    last = phase.cost.total();
+  }
+  EXPECT_TRUE(was_live);
+  EXPECT_GT(highest, 2.0 * last);
+  // The map is what it is without, to less than the noise of a range: what the
+  // closure bent was weighed and broken with it, and found again.
+  ASSERT_EQ(result.trajectory.size(), expected.trajectory.size());
+  for (std::size_t i = 0; i < result.trajectory.size(); ++i) {
+    EXPECT_LT((result.trajectory[i] - expected.trajectory[i]).norm(), 0.01)
+        << i;
+  }
+  EXPECT_EQ(Closures(fooled.graph())[ConstraintState::kLive],
+            Closures(truthful.graph())[ConstraintState::kLive]);
 }
 
 TEST_F(LogSolverTest, StoppedOnTheWay) {

@@ -42,7 +42,7 @@ SimulatorOptions Exact() {
   return options;
 }
 
-std::string LogText(const Simulation& simulation, const LaserOptions& laser) {
+std::string LogText(const Simulation& simulation, const LaserModel& laser) {
   std::ostringstream output;
   WriteCarmenLog(simulation, laser, {}, output);
   return output.str();

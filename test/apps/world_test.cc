@@ -3,6 +3,7 @@
 #include <plumbline/apps/world.h>
 #include <plumbline/core/error.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <string>
@@ -238,6 +239,43 @@ TEST(WorldTest, RefusesWhatItCannotBuild) {
   options = {};
   options.columns = 0;
   EXPECT_THROW(MakeBuilding(options, 1), Error);
+}
+
+TEST(WorldTest, BlocksOfASymmetricBuildingAreAlike) {
+  BuildingOptions options = SymmetricOptions();
+  options.block_length = {14.0, 14.0};
+  options.block_height = {11.0, 11.0};
+  const World world = MakeBuilding(options, 2);
+  const auto is_there = [&world](const Eigen::Vector2d& begin,
+                                 const Eigen::Vector2d& end) {
+    return std::any_of(world.walls.begin(), world.walls.end(),
+                       [&](const WorldWall& wall) {
+                         return (wall.begin - begin).norm() < 1e-9 &&
+                                (wall.end - end).norm() < 1e-9;
+                       });
+  };
+  // Walls well inside the first block are in all others, too.
+  int inside = 0;
+  for (const WorldWall& wall : world.walls) {
+    const Eigen::Vector2d low = wall.begin.cwiseMin(wall.end);
+    const Eigen::Vector2d high = wall.begin.cwiseMax(wall.end);
+    if (low.x() < 0.5 || high.x() > 13.5 || low.y() < 0.5 || high.y() > 10.5) {
+      continue;
+    }
+    ++inside;
+    for (int column = 0; column < 3; ++column) {
+      for (int row = 0; row < 2; ++row) {
+        const Eigen::Vector2d shift(14.0 * column, 11.0 * row);
+        EXPECT_TRUE(is_there(wall.begin + shift, wall.end + shift))
+            << wall.begin.transpose() << " in block " << column << " " << row;
+      }
+    }
+  }
+  EXPECT_GT(inside, 10);
+  // An office has no two blocks alike.
+  options.identical_blocks = false;
+  const World office = MakeBuilding(options, 2);
+  EXPECT_NE(office.walls.size(), world.walls.size());
 }
 
 }  // namespace

@@ -46,7 +46,8 @@ TEST_F(OrientationRelationTest, NearestAllowedAngle) {
   AddOrientation(-78.0);  // 88 degrees from the first, the other way round
   AddOrientation(54.5);   // 44.5 from the first, 132.5 from the second
   AddOrientation(30.0);   // 20 from the first
-  const Transaction transaction = Detect({{"sigma_deg", 0.2}});
+  const Transaction transaction =
+      Detect({{"sigma_deg", 0.2}, {"gate_deg", 3.0}});
   EXPECT_TRUE(transaction.added_features().empty());
   ASSERT_EQ(transaction.added_constraints().size(), 3u);
   const Constraint& right = transaction.added_constraints()[0];
@@ -69,8 +70,8 @@ TEST_F(OrientationRelationTest, NearestAllowedAngle) {
 }
 
 TEST_F(OrientationRelationTest, DuplicatesAreTheSame) {
-  AddOrientation(-89.0);
-  AddOrientation(89.5);
+  AddOrientation(-89.8);
+  AddOrientation(89.7);
   const Transaction transaction = Detect();
   ASSERT_EQ(transaction.added_constraints().size(), 1u);
   EXPECT_EQ(transaction.added_constraints()[0].expected[0], 0.0);
@@ -81,6 +82,16 @@ TEST_F(OrientationRelationTest, Gate) {
   AddOrientation(86.9);
   EXPECT_TRUE(Detect().empty());
   EXPECT_EQ(Detect({{"gate_deg", 3.2}}).added_constraints().size(), 1u);
+}
+
+TEST_F(OrientationRelationTest, AnObliqueWingNearAnExpectedAngleStaysOblique) {
+  AddOrientation(0.0);
+  AddOrientation(90.2);
+  AddOrientation(46.0);
+  const Transaction transaction = Detect();
+  ASSERT_EQ(transaction.added_constraints().size(), 1u);
+  EXPECT_EQ(transaction.added_constraints()[0].features,
+            (std::vector<FeatureId>{0, 1}));
 }
 
 TEST_F(OrientationRelationTest, BrokenOnesAreLeftToTheOrchestrator) {

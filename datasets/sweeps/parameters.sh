@@ -31,7 +31,7 @@ $d:center_cluster.sigma=0.05,0.01,0.02,0.1,0.2;\
 $d:center_cluster.gate=0.4,0.1,0.2,0.8;\
 $d:orientation_mixture.sigma_deg=0.1,0.02,0.05,0.5,1,3;\
 $d:orientation_relation.sigma_deg=0.02,0.1,0.5,2;\
-$d:orientation_relation.gate_deg=3,1,6"
+$d:orientation_relation.gate_deg=0.7,1,3,6"
 experiment() { # ID TRIALS GRID FIGURE
   sweep "$1" --grid="$3" --trials="$2" --figures="$4" -- \
     plumbline_experiments --experiment="$1" --trials=1 --num_threads=1

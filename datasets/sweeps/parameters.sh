@@ -5,7 +5,7 @@
 #   bash datasets/sweeps/parameters.sh BIN OUT [JOBS]
 #
 # BIN is the folder of the binaries, OUT gets a folder a sweep. The logs need
-# PLUMBLINE_DATASETS. About a quarter of an hour of one idle core.
+# PLUMBLINE_DATASETS.
 set -euo pipefail
 
 bin=$(realpath "$1")

@@ -135,7 +135,11 @@ void LogSolver::TraceEm() {
 LogSolverResult LogSolver::Run(
     const Log& log,
     const std::function<void(std::size_t, std::size_t)>& progress,
-    const std::function<bool()>& stop) {
+    const std::function<bool()>& stop,
+    const std::function<void(const char*)>& step) {
+  const auto begin_step = [&step](const char* name) {
+    if (step) step(name);
+  };
   LogSolverResult result;
   OdometryRefiner refiner(options_.odometry);
   const std::unique_ptr<GraphBuilder> builder =
@@ -186,9 +190,11 @@ LogSolverResult LogSolver::Run(
   builder->WriteRobot();
   result.initial_cost = session_->Cost();
   TraceEm();
+  begin_step("structure of the whole map");
   result.em = em_->Run(stop);
   if (options_.structure && options_.global_association &&
       !result.interrupted && !(stop && stop())) {
+    begin_step("closing of loops");
     BeginClosing();
     const EmReport closing = em_->Run(stop);
     result.em.iterations += closing.iterations;
@@ -219,6 +225,7 @@ LogSolverResult LogSolver::Run(
 
   if (options_.complete_walls && options_.refine != Refinement::kNone &&
       !result.interrupted) {
+    begin_step("walls seen by glimpses");
     const double completion_begin = Now();
     Transaction walls = FindGlimpsedWalls(
         graph_, registry_, log.scans, result.trajectory, options_.completion);
@@ -238,6 +245,7 @@ LogSolverResult LogSolver::Run(
   }
 
   if (options_.refine == Refinement::kFull && !result.interrupted) {
+    begin_step("joint adjustment of poses and walls");
     const double adjustment_begin = Now();
     JointAdjustment adjustment(&graph_, session_.get(), registry_, log.scans,
                                refined, builder->records(), keys,

@@ -135,11 +135,13 @@ class LogSolver {
   ~LogSolver();
 
   /// `progress` (may be null) is called with the scans done and in all; `stop`
-  /// (may be null) ends the replay when it returns true.
+  /// (may be null) ends the replay when it returns true; `step` (may be null)
+  /// is told, in a few words, of each step after the last scan as it begins.
   LogSolverResult Run(
       const Log& log,
       const std::function<void(std::size_t, std::size_t)>& progress = nullptr,
-      const std::function<bool()>& stop = nullptr);
+      const std::function<bool()>& stop = nullptr,
+      const std::function<void(const char*)>& step = nullptr);
 
   const Graph& graph() const { return graph_; }
   const SolverSession& session() const { return *session_; }

@@ -20,6 +20,7 @@
 #include <plumbline/frontend/log_reader.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -69,10 +70,10 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin) {
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   outcome->flags = OwnFlags();
   outcome->delta_threshold = FLAGS_delta_threshold;
-  std::vector<std::string> reasons;
+  WrittenOutputs written;
   {
     std::unique_ptr<Progress> progress;
-    reasons = WriteSolveOutputs(
+    written = WriteSolveOutputs(
         *outcome, SelectOutputs(FLAGS_outputs, *outcome->registry), folder,
         NumThreadsFromFlags(), [&](int done, int total) {
           if (progress == nullptr) {
@@ -81,13 +82,40 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin) {
           progress->Update(done);
         });
   }
-  for (const std::string& reason : reasons) Remark("%s", reason.c_str());
+  for (const std::string& reason : written.reasons) {
+    Remark("%s", reason.c_str());
+  }
+  // A map of an earlier run beside this one's figures would be taken for this
+  // run's.
+  for (const std::string& name :
+       RemoveOutputsOfEarlierRun(folder, written.files)) {
+    Detail("removed %s of an earlier run", name.c_str());
+  }
+  outcome->summary.files = std::move(written.files);
   outcome->summary.write_seconds = Now() - begin;
   Detail("written to %s in %.1f s", FLAGS_output_dir.c_str(),
          outcome->summary.write_seconds);
   outcome->summary.total_seconds = Now() - total_begin;
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   WriteSummary(outcome->summary, folder / "summary.json");
+}
+
+// Says which flags that were given do nothing for this kind of input.
+void RemarkOnFlags(const std::string& name, const char* kind,
+                   const char* other_kind,
+                   const std::vector<std::string>& of_the_other) {
+  std::string flags;
+  int count = 0;
+  for (const FlagValue& flag : ChangedFlags()) {
+    if (std::count(of_the_other.begin(), of_the_other.end(), flag.name) == 0) {
+      continue;
+    }
+    flags += (count++ > 0 ? ", --" : "--") + flag.name;
+  }
+  if (count == 0) return;
+  Remark("%s is a %s: %s %s for %s and %s no effect", name.c_str(), kind,
+         flags.c_str(), count > 1 ? "are" : "is", other_kind,
+         count > 1 ? "have" : "has");
 }
 
 // Covariances and ellipses that were asked for.
@@ -152,6 +180,7 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
   const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
+  RemarkOnFlags(input->name(), "log", "graphs", GraphFlags());
 
   const double parse_begin = Now();
   const Log log = [&] {
@@ -193,6 +222,9 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
         [&] {
           if (finishing != nullptr) finishing->Update(++steps);
           return InterruptRequested();
+        },
+        [&](const char* step) {
+          Detail("%s, after %.1f s", step, Now() - begin_solving);
         });
   }
   for (const EmPhase& phase : solver.trace()) TellPhase(phase);
@@ -236,10 +268,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
   LogSolverOptions options = LogSolverOptionsFromFlags(registry);
-  if (options.features != LogSolverOptions().features) {
-    Remark("%s is a graph: --features is for logs and has no effect",
-           input->name().c_str());
-  }
+  RemarkOnFlags(input->name(), "graph", "logs", LogFlags());
 
   const double parse_begin = Now();
   Graph graph;

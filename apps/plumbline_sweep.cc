@@ -379,6 +379,8 @@ int Run(const std::vector<std::string>& command) {
   });
   TellRuns(result);
   WriteOverview(result, folder);
+  // An earlier question's answer would be taken for this one's.
+  fs::remove(folder + "/best.flags");
   if (!FLAGS_minimize.empty() || !FLAGS_maximize.empty()) {
     TellBest(result, folder);
   }

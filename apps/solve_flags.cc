@@ -43,7 +43,9 @@ PLUMBLINE_FLAG_CHOICES(information_frame, "first", "second");
 DEFINE_string(outputs, "default",
               "Files to write beside summary.json: all, default (all but "
               "floorplan.geojson), none, or names separated by commas; a minus "
-              "in front takes one out: -report.html,-occupancy.pgm");
+              "in front takes one out: -report.html,-occupancy.pgm. Files that "
+              "an earlier run wrote into the folder and this one does not are "
+              "removed");
 DEFINE_string(marginals, "none",
               "Features whose covariance goes into map.json: types, numbers of "
               "features, all, separated by commas; none: no covariances");
@@ -211,8 +213,7 @@ std::vector<FlagGroup> SolveFlagGroups() {
   return {
       {"Input and output",
        {"input", "output_dir", "log_reader", "outputs", "grid_resolution"}},
-      {"Graphs",
-       {"initial_guess", "max_solver_iterations", "information_frame"}},
+      {"Graphs", GraphFlags()},
       {"Uncertainty", {"marginals", "marginals_hold_gauge", "ellipse_sigmas"}},
       {"Structure",
        {"structure", "hierarchy", "structure_prior", "detector_parameters",
@@ -233,6 +234,17 @@ std::vector<FlagGroup> SolveFlagGroups() {
       {"Running",
        {"seed", "num_threads", "plugins", "list_plugins", "quiet", "verbose"}},
   };
+}
+
+std::vector<std::string> GraphFlags() {
+  return {"initial_guess", "max_solver_iterations", "information_frame"};
+}
+
+std::vector<std::string> LogFlags() {
+  return {"grid_resolution",     "em_every",    "features",
+          "odometry_refinement", "link_radius", "association_depth",
+          "global_association",  "refine",      "usable_range",
+          "laser_start_angle",   "laser_step",  "laser_max_range"};
 }
 
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {

@@ -35,6 +35,10 @@ namespace plumbline {
 /// The flags of plumbline_solve in groups, for --help.
 std::vector<FlagGroup> SolveFlagGroups();
 
+/// Names of flags that say something for graphs only, and for logs only.
+std::vector<std::string> GraphFlags();
+std::vector<std::string> LogFlags();
+
 /// The one place where flags become options. `registry` gives the detectors
 /// that structure tolerances are handed to. Throws Error for values that do
 /// not fit together or do not parse.

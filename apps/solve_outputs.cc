@@ -12,12 +12,16 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <fstream>
 #include <functional>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -129,10 +133,12 @@ void RunTasks(const std::vector<std::function<void()>>& tasks, int threads,
 
 void RegisterBuiltinOutputWriters(Registry* registry) {
   const auto add = [&](const char* name, const char* description,
-                       bool by_default, bool of_scans, auto write) {
+                       bool by_default, bool of_scans, auto write,
+                       const std::vector<std::string>& further_files = {}) {
     if (registry->Find<OutputWriterType>(name) != nullptr) return;
     OutputWriterType type;
     type.name = name;
+    type.further_files = further_files;
     type.description = description;
     type.by_default = by_default;
     type.of_scans = of_scans;
@@ -191,7 +197,7 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
         WriteFloorPlanGeoJson(Plan(outcome), folder / "floorplan.geojson");
       }));
   add("occupancy.pgm", "a grid for ROS map_server and Nav2, and its .yaml",
-      true, true, WriteOccupancy);
+      true, true, WriteOccupancy, {"occupancy.yaml"});
 }
 
 std::set<std::string> SelectOutputs(const std::string& list,
@@ -231,7 +237,7 @@ std::set<std::string> SelectOutputs(const std::string& list,
   return selected;
 }
 
-std::vector<std::string> WriteSolveOutputs(
+WrittenOutputs WriteSolveOutputs(
     const SolveOutcome& outcome, const std::set<std::string>& names,
     const path& folder, int threads,
     const std::function<void(int, int)>& progress) {
@@ -250,12 +256,47 @@ std::vector<std::string> WriteSolveOutputs(
     });
   }
   RunTasks(tasks, threads, progress);
-  std::vector<std::string> lines;
+  WrittenOutputs written;
   for (std::size_t i = 0; i < selected.size(); ++i) {
-    if (reasons[i].empty()) continue;
-    lines.push_back(selected[i]->name + " not written: " + reasons[i]);
+    if (!reasons[i].empty()) {
+      written.reasons.push_back(selected[i]->name +
+                                " not written: " + reasons[i]);
+      continue;
+    }
+    written.files.push_back(selected[i]->name);
+    written.files.insert(written.files.end(),
+                         selected[i]->further_files.begin(),
+                         selected[i]->further_files.end());
   }
-  return lines;
+  std::sort(written.files.begin(), written.files.end());
+  return written;
+}
+
+std::vector<std::string> RemoveOutputsOfEarlierRun(
+    const path& folder, const std::vector<std::string>& written) {
+  std::vector<std::string> removed;
+  std::ifstream file(folder / "summary.json");
+  const auto json = nlohmann::json::parse(file, nullptr, false);
+  if (!json.is_object()) return removed;
+  const auto files = json.find("files");
+  if (files == json.end() || !files->is_array()) return removed;
+  for (const auto& entry : *files) {
+    if (!entry.is_string()) continue;
+    const std::string name = entry.get<std::string>();
+    // A name in this folder and nothing that leads out of it.
+    if (name.empty() || name == "." || name == ".." ||
+        name.find('/') != std::string::npos || name == "summary.json" ||
+        std::count(written.begin(), written.end(), name) > 0) {
+      continue;
+    }
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(
+            std::filesystem::symlink_status(folder / name, error))) {
+      continue;
+    }
+    if (std::filesystem::remove(folder / name, error)) removed.push_back(name);
+  }
+  return removed;
 }
 
 }  // namespace plumbline

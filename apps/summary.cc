@@ -211,6 +211,7 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
                       {"live", summary.closures.live},
                       {"broken", summary.closures.broken}};
   json["version"] = kVersion;
+  json["files"] = summary.files;
   if (summary.solver) {
     const Summary::Solver& solver = *summary.solver;
     json["solver"] = {

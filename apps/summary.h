@@ -53,6 +53,8 @@ struct Summary {
   std::uint64_t seed = 1;
   /// Those that differ from the defaults: ChangedFlags().
   std::vector<FlagValue> flags;
+  /// Names of the files that the run wrote beside this one.
+  std::vector<std::string> files;
 
   std::int64_t scans = 0;
   /// By type name and level.
@@ -122,7 +124,7 @@ void CountGraph(const Graph& graph, Summary* summary);
 /// structure, broken}}}, cost {initial, measurement, structure, total}, em
 /// {iterations, converged}, time_s {total, parse, frontend, detect, solve,
 /// write}, peak_memory_bytes, orthogonality_deg (null when there is no wall),
-/// closures {proposed, live, broken}, version; for a graph also solver
+/// closures {proposed, live, broken}, version, files; for a graph also solver
 /// {objective (cost.total), iterations, solves, converged, evaluation_s,
 /// linear_solver_s, setup_s, start {poses, landmarks, kept, seconds}}; for a
 /// log also frontend {skipped [{reason, count, first_lines}],

@@ -42,6 +42,8 @@ struct OutputWriterType {
 
   /// The file's name: "map.svg".
   std::string name;
+  /// Names of further files that it writes with it: "occupancy.yaml".
+  std::vector<std::string> further_files;
   /// One line.
   std::string description;
   /// Written unless somebody says otherwise.

@@ -5,7 +5,7 @@
 #   bash datasets/sweeps/parameters.sh BIN OUT [JOBS]
 #
 # BIN is the folder of the binaries, OUT gets a folder a sweep. The logs need
-# PLUMBLINE_DATASETS.
+# PLUMBLINE_DATASETS. Says after each sweep how long it took.
 set -euo pipefail
 
 bin=$(realpath "$1")
@@ -14,8 +14,10 @@ jobs=${3:-1}
 datasets=${PLUMBLINE_DATASETS:-}
 
 sweep() { # NAME FLAGS... -- COMMAND...
+  local start=$SECONDS
   "$bin/plumbline_sweep" --one_at_a_time --jobs="$jobs" --notimes \
     --output_dir="$out/$1" "${@:2}"
+  echo "$1: $((SECONDS - start)) s, $SECONDS s in all"
 }
 
 # Points: seeds from 1 on. The first value of each is the default.
@@ -55,6 +57,7 @@ link_radius=10,4,25;\
 association_depth=3,1,5;\
 $d:orientation_mixture.gate_deg=8,4;\
 $d:same_wall.min_evidence=3,1.5"
+# What matters most, for the logs that take longer.
 few_walls="delta_threshold=0.3,0.1,0.7;\
 structure_sigma_segment_orientation=0.1,0.02,2;\
 link_radius=10,4,25"
@@ -76,6 +79,8 @@ solve() { # NAME LOG GRID FLAGS...
 }
 solve fr079 fr079 "$walls"
 solve intel intel "$few_walls"
+solve mit-killian mit-killian "$few_walls"
 # Structure alone, with nothing behind it that makes up for it.
-solve intel-structure intel "$no_closures" --global_association=false \
-  --refine=map
+alone=(--global_association=false --refine=map)
+solve intel-structure intel "$no_closures" "${alone[@]}"
+solve mit-killian-structure mit-killian "$few_walls" "${alone[@]}"

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <plumbline/apps/relations.h>
+#include <plumbline/apps/solve_outputs.h>
 #include <plumbline/apps/synthetic_worlds.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/graph_json.h>
@@ -511,6 +512,111 @@ TEST_F(SolveTest, FilesThatAreAskedFor) {
   EXPECT_THAT(output, HasSubstr("unknown file 'map.gif': expected names"));
   EXPECT_THAT(output, HasSubstr("floorplan.dxf"));
   EXPECT_TRUE(Files("wrong").empty());
+}
+
+// What an earlier run wrote and this one does not goes; what is not of a run
+// stays.
+TEST_F(SolveTest, FilesOfAnEarlierRun) {
+  const std::string log = Write("office.log", Join(OfficeLines(60)));
+  std::string output;
+  using Names = std::set<std::string>;
+  // Nothing says that this picture is ours.
+  fs::create_directories(folder_ / "out");
+  Write("out/map.png", "somebody's");
+  ASSERT_EQ(Solve(log, "out", "--outputs=none", &output), 0) << output;
+  EXPECT_EQ(Files("out"), (Names{"map.png", "summary.json"}));
+  EXPECT_EQ(Out("out", "map.png"), "somebody's");
+
+  ASSERT_EQ(Solve(log, "out", "--outputs=all", &output), 0) << output;
+  Names all = FilesOfALog();
+  all.insert("floorplan.geojson");
+  Names listed;
+  const auto files = SummaryOf("out")["files"];
+  for (const auto& name : files) listed.insert(name.get<std::string>());
+  listed.insert("summary.json");
+  EXPECT_EQ(listed, all);
+
+  Write("out/notes.txt", "mine");
+  fs::create_directories(folder_ / "out/elsewhere");
+  Write("out/elsewhere/map.png", "mine");
+  // A link in the place of a file is somebody's.
+  fs::remove(folder_ / "out/map.svg");
+  fs::create_symlink("notes.txt", folder_ / "out/map.svg");
+  ASSERT_EQ(
+      Solve(log, "out", "--verbose --outputs=map.json,graph.g2o", &output), 0)
+      << output;
+  EXPECT_EQ(Files("out"), (Names{"elsewhere", "graph.g2o", "map.json",
+                                 "map.svg", "notes.txt", "summary.json"}));
+  EXPECT_EQ(Files("out/elsewhere"), Names{"map.png"});
+  EXPECT_THAT(output, HasSubstr("removed report.html of an earlier run\n"));
+  EXPECT_THAT(output, Not(HasSubstr("removed map.json")));
+
+  // A graph has no path of scans.
+  ASSERT_EQ(Solve(log, "both", "", &output), 0) << output;
+  Write("graph.g2o", Out("both", "graph.g2o"));
+  ASSERT_EQ(Solve((folder_ / "graph.g2o").string(), "both", "", &output), 0)
+      << output;
+  EXPECT_EQ(Files("both"), FilesOfAGraph());
+
+  // A run that fails leaves everything as it was.
+  EXPECT_EQ(Solve("no_such.log", "both", "--outputs=none", &output), 2);
+  EXPECT_EQ(Files("both"), FilesOfAGraph());
+}
+
+// What no run wrote is not removed, whatever stands in the summary.
+TEST(RemoveOutputsTest, NamesThatLeadElsewhere) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "remove_outputs";
+  fs::remove_all(folder);
+  fs::create_directories(folder / "in/map.json");
+  for (const char* name : {"kept", "in/a", "in/b"}) {
+    std::ofstream(folder / name) << name;
+  }
+  for (const std::string text :
+       {"", "{", "[]", "{\"files\": 3}", "{\"files\": {\"a\": \"a\"}}",
+        "{\"files\": [1, null, \"\", \".\", \"..\", \"../kept\", "
+        "\"map.json\", \"b\", \"gone\", \"summary.json\"]}"}) {
+    std::ofstream(folder / "in/summary.json") << text;
+    EXPECT_TRUE(RemoveOutputsOfEarlierRun(folder / "in", {"b"}).empty())
+        << text;
+  }
+  std::ofstream(folder / "in/summary.json") << "{\"files\": [\"b\", \"a\"]}";
+  EXPECT_EQ(RemoveOutputsOfEarlierRun(folder / "in", {"b"}),
+            std::vector<std::string>{"a"});
+  for (const char* name : {"kept", "in/b", "in/map.json", "in/summary.json"}) {
+    EXPECT_TRUE(fs::exists(folder / name)) << name;
+  }
+  EXPECT_FALSE(fs::exists(folder / "in/a"));
+  EXPECT_TRUE(RemoveOutputsOfEarlierRun(folder / "nowhere", {}).empty());
+  fs::remove_all(folder);
+}
+
+// Said, since a reader of the command would think otherwise.
+TEST_F(SolveTest, FlagsOfTheOtherInput) {
+  const std::string log = Write("office.log", Join(OfficeLines(30)));
+  std::string output;
+  ASSERT_EQ(
+      Solve(log, "out", "--initial_guess=chordal --outputs=graph.g2o", &output),
+      0)
+      << output;
+  EXPECT_EQ(output, log +
+                        " is a log: --initial_guess is for graphs and has no "
+                        "effect\n");
+  ASSERT_EQ(
+      Solve(log, "out", "--quiet --initial_guess=chordal --outputs=graph.g2o",
+            &output),
+      0);
+  EXPECT_EQ(output, "");
+  const std::string graph = Write("graph.g2o", Out("out", "graph.g2o"));
+  // A value that is the default's asks for nothing.
+  ASSERT_EQ(Solve(graph, "graph",
+                  "--refine=full --link_radius=5 --laser_step=1 "
+                  "--initial_guess=odometry --outputs=none",
+                  &output),
+            0)
+      << output;
+  EXPECT_THAT(output,
+              HasSubstr(graph + " is a graph: --laser_step, --link_radius are "
+                                "for logs and have no effect\n"));
 }
 
 // A grid that no memory holds is left out, with a message; the rest is there.

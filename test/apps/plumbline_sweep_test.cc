@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <plumbline/frontend/input_stream.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -160,9 +161,11 @@ TEST_F(SweepBinaryTest, ATableOfAllRuns) {
                                               "3 6", "4 5", "4 6"));
   EXPECT_EQ(Read("out/best.flags"), "--x=4\n");
 
-  // Without a command the sweep in the folder goes on.
-  ASSERT_EQ(Run("--minimize=y --output_dir=" + folder_ + "/out", &output), 0);
+  // Without a command the sweep in the folder goes on, and without a question
+  // there is no answer of an earlier one.
+  ASSERT_EQ(Run("--output_dir=" + folder_ + "/out", &output), 0);
   EXPECT_EQ(Notes().size(), 8u);
+  EXPECT_FALSE(fs::exists(folder_ + "/out/best.flags"));
   EXPECT_EQ(Run("--figures=z --output_dir=" + folder_ + "/out", &output), 2);
   EXPECT_THAT(output, HasSubstr("--figures: no run has a figure 'z'"));
   ASSERT_EQ(
@@ -220,6 +223,51 @@ TEST_F(SweepBinaryTest, KilledInTheMiddleAndResumedGivesTheSameTable) {
   // Only the two that were at work, and one that had its record to write, may
   // have been begun twice.
   EXPECT_LE(Notes().size(), 18u + 3u);
+}
+
+// With the program that sweeps are for, killed while it is at work.
+TEST_F(SweepBinaryTest, KilledWhileSolvingAndResumedGivesTheSameTable) {
+  InputStream input(std::string(PLUMBLINE_SOURCE_DIR) +
+                    "/datasets/office.clf.gz");
+  const std::string log = input.ReadRest();
+  std::ofstream(folder_ + "/office.clf", std::ios::binary)
+      << log.substr(0, log.find('\n', log.size() / 8) + 1);
+  const auto flags = [&](const std::string& name) {
+    return std::vector<std::string>{"--grid=delta_threshold=0.05:0.1:0.55",
+                                    "--jobs=1",
+                                    "--notimes",
+                                    "--output_dir=" + folder_ + "/" + name,
+                                    "--",
+                                    "plumbline_solve",
+                                    "--input=" + folder_ + "/office.clf",
+                                    "--outputs=trajectory.tum",
+                                    "--num_threads=1"};
+  };
+  int status = 0;
+  ASSERT_GT(waitpid(Start(flags("whole")), &status, 0), 0);
+  ASSERT_EQ(status, 0);
+
+  const pid_t victim = Start(flags("killed"));
+  const std::string runs = folder_ + "/killed/runs/";
+  // Its third run has begun.
+  ASSERT_TRUE(WaitFor(
+      [&] { return fs::exists(runs + "delta_threshold=0.25,seed=1"); }));
+  kill(victim, SIGKILL);
+  waitpid(victim, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(Records("killed"), 2);
+  ASSERT_GT(waitpid(Start(flags("killed")), &status, 0), 0);
+  ASSERT_EQ(status, 0);
+  const std::string table = Read("whole/sweep.csv");
+  EXPECT_EQ(Read("killed/sweep.csv"), table);
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 7);
+  EXPECT_THAT(table,
+              HasSubstr("\n\"delta_threshold=0.55,seed=1\",0.55,1,done"));
+  for (const std::string name : {"whole", "killed"}) {
+    EXPECT_FALSE(
+        Read(name + "/runs/delta_threshold=0.25,seed=1/trajectory.tum").empty())
+        << name;
+  }
 }
 
 TEST_F(SweepBinaryTest, CtrlCLeavesATableOfWhatIsDone) {

@@ -185,7 +185,7 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   EXPECT_EQ(keys, (std::vector<std::string>{
                       "input", "seed", "flags", "counts", "cost", "em",
                       "time_s", "peak_memory_bytes", "orthogonality_deg",
-                      "closures", "version", "frontend"}));
+                      "closures", "version", "files", "frontend"}));
   EXPECT_EQ(json["input"], "a\xEF\xBF\xBD.clf");
   EXPECT_EQ(json["seed"], 18446744073709551615u);
   EXPECT_EQ(json["flags"].dump(),

@@ -167,6 +167,14 @@ class TerminalTest : public ::testing::Test {
     process->CloseInput();
   }
 
+  std::set<std::string> FilesOfTheRun() const {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      names.insert(entry.path().filename().string());
+    }
+    return names;
+  }
+
   nlohmann::json Summary() const {
     std::ifstream file(folder_ / "summary.json");
     return nlohmann::json::parse(file);
@@ -263,8 +271,50 @@ TEST_F(TerminalTest, VerboseTellsSteps) {
   EXPECT_THAT(process.output(), HasSubstr("read 1408 scans in "));
   EXPECT_THAT(process.output(), HasSubstr("\n500 of 1408 scans in "));
   EXPECT_THAT(process.output(), HasSubstr(" detect_0: cost "));
+  std::size_t last = 0;
+  for (const char* step :
+       {"\n1408 of 1408 scans in ", "\nstructure of the whole map, after ",
+        "\nclosing of loops, after ", "\nwalls seen by glimpses, after ",
+        "\njoint adjustment of poses and walls, after "}) {
+    const std::size_t place = process.output().find(step);
+    ASSERT_NE(place, std::string::npos) << step;
+    EXPECT_GT(place, last) << step;
+    last = place;
+  }
   EXPECT_THAT(process.output(), HasSubstr("\nwritten to "));
   EXPECT_THAT(process.output(), Not(HasSubstr("\r")));
+}
+
+const std::set<std::string> kFilesOfALog = {
+    "em_trace.csv",   "floorplan.dxf", "floorplan.svg", "graph.g2o",
+    "map.json",       "map.png",       "map.svg",       "occupancy.pgm",
+    "occupancy.yaml", "report.html",   "summary.json",  "trajectory.tum"};
+
+// All scans are there, and the map as far as it is adjusted.
+TEST_F(TerminalTest, InterruptedJointAdjustment) {
+  Process process(solve_, Flags({"--verbose"}), /*on_terminal=*/false);
+  process.Write(log_);
+  process.CloseInput();
+  ASSERT_TRUE(process.WaitFor("\njoint adjustment of poses and walls"))
+      << process.output();
+  process.Signal(SIGINT);
+  EXPECT_EQ(process.Wait(), 130);
+  EXPECT_THAT(process.output(),
+              HasSubstr("interrupted: what was done so far is written\n"));
+  EXPECT_EQ(FilesOfTheRun(), kFilesOfALog);
+  EXPECT_EQ(Summary()["counts"]["scans"], 1408);
+  EXPECT_EQ(Summary()["em"]["converged"], false);
+  const std::vector<TimedPose> trajectory =
+      ReadTum((folder_ / "trajectory.tum").string());
+  ASSERT_EQ(trajectory.size(), 1408u);
+  // Between two scans the robot goes a few centimetres: no pose was left where
+  // the adjustment had not come to.
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    EXPECT_LT((trajectory[i].pose.head<2>() - trajectory[i - 1].pose.head<2>())
+                  .norm(),
+              0.5)
+        << i;
+  }
 }
 
 class InterruptTest : public TerminalTest,
@@ -285,15 +335,7 @@ TEST_P(InterruptTest, WritesWhatThereIs) {
   EXPECT_LE(scans, 1408);
   EXPECT_EQ(ReadTum((folder_ / "trajectory.tum").string()).size(),
             static_cast<std::size_t>(scans));
-  std::set<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder_)) {
-    names.insert(entry.path().filename().string());
-  }
-  EXPECT_EQ(names, (std::set<std::string>{
-                       "em_trace.csv", "floorplan.dxf", "floorplan.svg",
-                       "graph.g2o", "map.json", "map.png", "map.svg",
-                       "occupancy.pgm", "occupancy.yaml", "report.html",
-                       "summary.json", "trajectory.tum"}));
+  EXPECT_EQ(FilesOfTheRun(), kFilesOfALog);
 }
 
 INSTANTIATE_TEST_SUITE_P(Signals, InterruptTest,

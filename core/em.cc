@@ -460,7 +460,11 @@ struct EmOrchestrator::Impl final : public GraphListener {
     const auto start = std::chrono::steady_clock::now();
     if (scope.features == nullptr) {
       if (is_dirty) {
-        is_usable = session->SolveGlobal(solve_tolerance).usable;
+        is_usable =
+            (is_coarse ? session->SolveGlobal(options.loop_tolerance,
+                                              options.loop_trust_region_radius)
+                       : session->SolveGlobal())
+                .usable;
         is_dirty = false;
         for (int level = 0; level <= highest_level; ++level) {
           for (const FeatureId id : graph->VirtualFeatures(level)) {
@@ -751,41 +755,54 @@ struct EmOrchestrator::Impl final : public GraphListener {
       constraints.push_back(std::move(constraint));
     }
 
+    // Features without enough support go with their constraints, and so do
+    // those that lose theirs by it.
     std::vector<bool> is_kept(features.size(), true);
-    for (bool has_changed = true; has_changed;) {
-      has_changed = false;
-      for (std::size_t i = 0; i < features.size(); ++i) {
-        if (!is_kept[i] || features[i].fixed) continue;
-        const FeatureId id = Transaction::ProvisionalId(i);
-        const auto is_on = [id](const Constraint& constraint) {
-          return std::count(constraint.features.begin(),
-                            constraint.features.end(), id) > 0;
-        };
-        const Constraint* last = nullptr;
-        int live = 0;
-        std::vector<const Constraint*> support;
-        for (const Constraint& constraint : constraints) {
-          if (!is_on(constraint)) continue;
-          ++live;
-          last = &constraint;
-          if (std::any_of(constraint.features.begin(),
-                          constraint.features.end(), [&](FeatureId other) {
-                            const Feature* feature = find(other);
-                            return feature != nullptr &&
-                                   feature->level < features[i].level;
-                          })) {
-            support.push_back(&constraint);
-          }
+    std::vector<bool> is_out(constraints.size(), false);
+    std::vector<std::vector<std::size_t>> constraints_on(features.size());
+    for (std::size_t c = 0; c < constraints.size(); ++c) {
+      for (const FeatureId id : constraints[c].features) {
+        if (!Transaction::IsProvisional(id)) continue;
+        const std::size_t index = Transaction::ProvisionalIndex(id);
+        if (index < features.size()) constraints_on[index].push_back(c);
+      }
+    }
+    std::set<std::size_t> unchecked;
+    for (std::size_t i = 0; i < features.size(); ++i) unchecked.insert(i);
+    while (!unchecked.empty()) {
+      const std::size_t i = *unchecked.begin();
+      unchecked.erase(unchecked.begin());
+      if (!is_kept[i] || features[i].fixed) continue;
+      const FeatureId id = Transaction::ProvisionalId(i);
+      const Constraint* last = nullptr;
+      int live = 0;
+      std::vector<const Constraint*> support;
+      for (const std::size_t c : constraints_on[i]) {
+        if (is_out[c]) continue;
+        const Constraint& constraint = constraints[c];
+        ++live;
+        last = &constraint;
+        if (std::any_of(constraint.features.begin(), constraint.features.end(),
+                        [&](FeatureId other) {
+                          const Feature* feature = find(other);
+                          return feature != nullptr &&
+                                 feature->level < features[i].level;
+                        })) {
+          support.push_back(&constraint);
         }
-        if (IsEnough(detector, support) &&
-            !(live == 1 && silent_alone.count(AloneKey(*last, id)) > 0)) {
-          continue;
+      }
+      if (IsEnough(detector, support) &&
+          !(live == 1 && silent_alone.count(AloneKey(*last, id)) > 0)) {
+        continue;
+      }
+      is_kept[i] = false;
+      for (const std::size_t c : constraints_on[i]) {
+        is_out[c] = true;
+        for (const FeatureId other : constraints[c].features) {
+          if (!Transaction::IsProvisional(other)) continue;
+          const std::size_t index = Transaction::ProvisionalIndex(other);
+          if (index < features.size()) unchecked.insert(index);
         }
-        is_kept[i] = false;
-        has_changed = true;
-        constraints.erase(
-            std::remove_if(constraints.begin(), constraints.end(), is_on),
-            constraints.end());
       }
     }
 
@@ -796,7 +813,9 @@ struct EmOrchestrator::Impl final : public GraphListener {
       new_ids[Transaction::ProvisionalId(i)] =
           accepted.AddFeature(std::move(features[i]));
     }
-    for (Constraint& constraint : constraints) {
+    for (std::size_t c = 0; c < constraints.size(); ++c) {
+      if (is_out[c]) continue;
+      Constraint& constraint = constraints[c];
       for (FeatureId& id : constraint.features) {
         const auto found = new_ids.find(id);
         if (found != new_ids.end()) id = found->second;
@@ -887,8 +906,8 @@ struct EmOrchestrator::Impl final : public GraphListener {
   std::map<std::string, int> structure_by_relation;
   std::map<std::string, int> broken_by_relation;
   int highest_level = 0;
-  // Of global solves; 0: the session's own.
-  double solve_tolerance = 0.0;
+  // Global solves are to loop_tolerance.
+  bool is_coarse = false;
   // The graph or a weight changed since the last global solve.
   bool is_dirty = true;
   bool is_usable = true;
@@ -935,7 +954,11 @@ EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
   double cost = total_cost();
   const bool is_coarse = impl_->options.loop_tolerance >
                          impl_->session->options().function_tolerance;
-  if (is_coarse) impl_->solve_tolerance = impl_->options.loop_tolerance;
+  impl_->is_coarse = is_coarse;
+  // Solves that end at a change of the tolerance leave that much undone.
+  const double cost_tolerance =
+      impl_->options.cost_tolerance +
+      (is_coarse ? 2.0 * impl_->options.loop_tolerance : 0.0);
   for (int i = 0; goes_on && i < impl_->options.max_iterations; ++i) {
     const bool has_changed = impl_->Iterate(nullptr);
     goes_on = !impl_->is_stopped;
@@ -943,12 +966,12 @@ EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
     cost = total_cost();
     if (goes_on && !has_changed && impl_->is_usable &&
         std::abs(cost - last_cost) <=
-            impl_->options.cost_tolerance * std::max(cost, last_cost)) {
+            cost_tolerance * std::max(cost, last_cost)) {
       has_converged = true;
       goes_on = false;
     }
   }
-  impl_->solve_tolerance = 0.0;
+  impl_->is_coarse = false;
   if (is_coarse && !is_still && !impl_->is_stopped) {
     const auto final_start = std::chrono::steady_clock::now();
     impl_->is_dirty = true;

@@ -66,6 +66,12 @@ struct EmOptions {
   /// the last digits, and the more parts a graph has the longer some part of it
   /// takes to settle.
   double loop_tolerance = 0.0;
+  /// Initial radius of the trust region of those solves (SessionOptions; only
+  /// with a loop_tolerance). The radius is one for the whole graph: with steps
+  /// that are nearly Gauss-Newton's, one floppy place in which they go wrong
+  /// has a step rejected everywhere, and the larger a graph the more often
+  /// there is one.
+  double loop_trust_region_radius = 1e7;
   /// Converged: nothing added, nothing removed, and the relative change of the
   /// total cost is smaller.
   double cost_tolerance = 1e-4;

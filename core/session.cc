@@ -103,6 +103,32 @@ TypeInfo MakeTypeInfo(const FeatureType& type) {
   return info;
 }
 
+// Ends a coarse solve: at a step that brought less than the tolerance, or was
+// rejected and had promised no more. Ceres' own test looks at the size of the
+// change alone, and takes a rejected step in which a rise in one part of the
+// graph makes up for the fall in the rest for convergence.
+class CoarseEnd final : public ceres::IterationCallback {
+ public:
+  explicit CoarseEnd(double function_tolerance)
+      : function_tolerance_(function_tolerance) {}
+
+  ceres::CallbackReturnType operator()(
+      const ceres::IterationSummary& step) override {
+    if (step.iteration == 0 || !step.step_is_valid) {
+      return ceres::SOLVER_CONTINUE;
+    }
+    const double gain = step.step_is_successful || step.relative_decrease == 0.0
+                            ? step.cost_change
+                            : step.cost_change / step.relative_decrease;
+    return gain <= function_tolerance_ * step.cost
+               ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+               : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  double function_tolerance_;
+};
+
 struct Block {
   Feature* feature = nullptr;
   TypeInfo* type = nullptr;
@@ -279,7 +305,8 @@ struct SolverSession::Impl {
   SolveReport Solve(ceres::Problem* solved,
                     const std::vector<Block*>& variables, int num_residuals,
                     int rows, int columns, int num_threads,
-                    double function_tolerance,
+                    double function_tolerance, double trust_region_radius,
+                    bool is_coarse,
                     std::chrono::steady_clock::time_point start) {
     SolveReport report;
     report.residual_blocks = num_residuals;
@@ -292,9 +319,9 @@ struct SolverSession::Impl {
       solver.max_num_iterations = options.max_iterations;
       solver.function_tolerance = function_tolerance;
       solver.parameter_tolerance = kParameterTolerance;
-      solver.initial_trust_region_radius = options.initial_trust_region_radius;
-      solver.max_trust_region_radius = std::max(
-          solver.max_trust_region_radius, options.initial_trust_region_radius);
+      solver.initial_trust_region_radius = trust_region_radius;
+      solver.max_trust_region_radius =
+          std::max(solver.max_trust_region_radius, trust_region_radius);
       solver.max_num_consecutive_invalid_steps = kMaxInvalidSteps;
       solver.num_threads = num_threads;
       solver.logging_type = ceres::SILENT;
@@ -306,10 +333,16 @@ struct SolverSession::Impl {
         solver.sparse_linear_algebra_library_type = SparseLibrary();
       }
       const SerialOpenMp serial;
+      CoarseEnd coarse_end(function_tolerance);
+      if (is_coarse) {
+        solver.function_tolerance = 0.0;
+        solver.callbacks.push_back(&coarse_end);
+      }
       ceres::Solver::Summary summary;
       ceres::Solve(solver, solved, &summary);
       report.usable = summary.IsSolutionUsable();
-      report.converged = summary.termination_type == ceres::CONVERGENCE;
+      report.converged = summary.termination_type == ceres::CONVERGENCE ||
+                         summary.termination_type == ceres::USER_SUCCESS;
       report.iterations = summary.num_linear_solves;
       report.initial_cost = summary.initial_cost;
       report.final_cost = summary.final_cost;
@@ -333,6 +366,25 @@ struct SolverSession::Impl {
                           report.linear_solver_seconds);
     AddToTotals(report);
     return report;
+  }
+
+  SolveReport SolveGlobal(double function_tolerance, double trust_region_radius,
+                          bool is_coarse) {
+    const auto start = std::chrono::steady_clock::now();
+    for (Block& block : blocks) {
+      if (block.residuals > 0) SetConstant(&block, block.feature->fixed);
+    }
+    for (Block* block : GaugeBlocks()) SetConstant(block, true);
+    std::vector<Block*> variables;
+    int columns = 0;
+    for (Block& block : blocks) {
+      if (block.residuals == 0 || block.constant) continue;
+      variables.push_back(&block);
+      columns += block.feature->type->size;
+    }
+    return Solve(&problem, variables, problem.NumResidualBlocks(),
+                 problem.NumResiduals(), columns, options.num_threads,
+                 function_tolerance, trust_region_radius, is_coarse, start);
   }
 
   void AddToTotals(const SolveReport& report) {
@@ -509,25 +561,16 @@ SolverSession::SolverSession(Graph* graph, const Registry& registry,
 
 SolverSession::~SolverSession() { impl_->graph->RemoveListener(this); }
 
-SolveReport SolverSession::SolveGlobal(double function_tolerance) {
-  const auto start = std::chrono::steady_clock::now();
-  for (Block& block : impl_->blocks) {
-    if (block.residuals > 0) impl_->SetConstant(&block, block.feature->fixed);
-  }
-  for (Block* block : impl_->GaugeBlocks()) impl_->SetConstant(block, true);
-  std::vector<Block*> variables;
-  int columns = 0;
-  for (Block& block : impl_->blocks) {
-    if (block.residuals == 0 || block.constant) continue;
-    variables.push_back(&block);
-    columns += block.feature->type->size;
-  }
-  return impl_->Solve(
-      &impl_->problem, variables, impl_->problem.NumResidualBlocks(),
-      impl_->problem.NumResiduals(), columns, impl_->options.num_threads,
-      function_tolerance > 0.0 ? function_tolerance
-                               : impl_->options.function_tolerance,
-      start);
+SolveReport SolverSession::SolveGlobal() {
+  return impl_->SolveGlobal(impl_->options.function_tolerance,
+                            impl_->options.initial_trust_region_radius,
+                            /*is_coarse=*/false);
+}
+
+SolveReport SolverSession::SolveGlobal(double function_tolerance,
+                                       double initial_trust_region_radius) {
+  return impl_->SolveGlobal(function_tolerance, initial_trust_region_radius,
+                            /*is_coarse=*/true);
 }
 
 SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
@@ -590,7 +633,9 @@ SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
   }
   return impl_->Solve(&problem, variables, static_cast<int>(constraints.size()),
                       rows, columns, /*num_threads=*/1,
-                      impl_->options.function_tolerance, start);
+                      impl_->options.function_tolerance,
+                      impl_->options.initial_trust_region_radius,
+                      /*is_coarse=*/false, start);
 }
 
 double SolverSession::SquaredResidual(const Constraint& constraint) const {

@@ -92,8 +92,15 @@ class SolverSession : public GraphListener {
   /// same (a segment along its wall, a rotation about a held point) stays where
   /// it is, up to rounding. Angles are wrapped to (-pi, pi] after a solve.
   /// Parameters are left as they were when the solve fails (usable is false).
-  /// `function_tolerance` takes the place of the option where it is positive.
-  SolveReport SolveGlobal(double function_tolerance = 0.0);
+  SolveReport SolveGlobal();
+
+  /// The same to another relative change of the cost and from another radius of
+  /// the trust region: a coarse solve on the way to something else. It ends
+  /// with a step that brings less, or is rejected and promised no more. A rise
+  /// in one part of the graph that makes up for the fall in the rest does not
+  /// end it.
+  SolveReport SolveGlobal(double function_tolerance,
+                          double initial_trust_region_radius);
 
   /// Optimizes the given features (unknown and fixed ones, and those without a
   /// live constraint, are passed over) with every other feature constant. Costs

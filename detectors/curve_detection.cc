@@ -166,9 +166,10 @@ class CurveDetection {
   }
 
   double GapLimit(const FoundCurve& found) const {
+    const CurveRuler ruler(found.curve);
     std::vector<double> along;
     for (const int i : found.support) {
-      along.push_back(found.curve.Along(points_.position(i)));
+      along.push_back(ruler.Along(points_.position(i)));
     }
     std::sort(along.begin(), along.end());
     std::vector<double> gaps;
@@ -226,10 +227,11 @@ class CurveDetection {
   // Whether the support of a curve lies on the other as well as it should on
   // its own.
   bool IsSame(const Entry& entry, const Entry& other) const {
+    const CurveRuler ruler(other.found.curve);
     double sum = 0.0;
     for (const int i : entry.found.support) {
       const double distance =
-          std::abs(other.found.curve.SignedDistance(points_.position(i)));
+          std::abs(ruler.SignedDistance(points_.position(i)));
       if (distance > options_.gate) return false;
       sum += distance * distance;
     }
@@ -269,6 +271,7 @@ class CurveDetection {
     FoundCurve& found = entry.found;
     const std::size_t before = found.support.size();
     const double limit = GapLimit(found);
+    const CurveRuler ruler(found.curve);
     ++stamp_;
     struct Step {
       int point;
@@ -289,7 +292,7 @@ class CurveDetection {
         const auto k = static_cast<std::size_t>(i);
         if (support_stamp_[k] == stamp_) continue;
         const double distance =
-            std::abs(found.curve.SignedDistance(points_.position(i)));
+            std::abs(ruler.SignedDistance(points_.position(i)));
         if (distance <= JoinGate(found.curve, i) &&
             (points_.position(i) - points_.position(step.from)).norm() <=
                 limit) {
@@ -322,9 +325,10 @@ class CurveDetection {
     }
     for (const Entry& entry : entries_) {
       const FoundCurve& found = entry.found;
+      const CurveRuler ruler(found.curve);
       double sum = 0.0;
       for (const int i : found.support) {
-        const double distance = found.curve.SignedDistance(points_.position(i));
+        const double distance = ruler.SignedDistance(points_.position(i));
         sum += distance * distance;
       }
       const double near = std::max(
@@ -343,8 +347,7 @@ class CurveDetection {
         for (const int i : points_.neighbors(queue[k])) {
           if (!steps.emplace(i, next).second) continue;
           queue.push_back(i);
-          if (std::abs(found.curve.SignedDistance(points_.position(i))) <=
-              near) {
+          if (std::abs(ruler.SignedDistance(points_.position(i))) <= near) {
             is_claimed[static_cast<std::size_t>(i)] = true;
           }
         }

@@ -315,10 +315,11 @@ class CurveSearcher {
                  curve.radius > options_.max_radius) {
         continue;
       }
+      const CurveRuler ruler(curve);
       double gain = 0.0;
       for (const int i : neighborhood) {
         const double ratio =
-            curve.SignedDistance(points_.position(i)) / tolerance;
+            ruler.SignedDistance(points_.position(i)) / tolerance;
         gain += std::max(0.0, 1.0 - ratio * ratio);
       }
       if (gain > best_gain) {
@@ -360,8 +361,9 @@ class CurveSearcher {
   bool Extend(Hypothesis* hypothesis) {
     const PlanarCurve& curve = hypothesis->curve;
     const double tolerance = hypothesis->tolerance;
+    const CurveRuler ruler(curve);
     const auto is_inlier = [&](int i) {
-      return std::abs(curve.SignedDistance(points_.position(i))) <= tolerance;
+      return std::abs(ruler.SignedDistance(points_.position(i))) <= tolerance;
     };
     const std::vector<int> starts = std::move(hypothesis->inliers);
     hypothesis->inliers.clear();
@@ -412,10 +414,11 @@ class CurveSearcher {
 
   // Leaves the longest part of a line.
   void CutAtGaps(Hypothesis* hypothesis) const {
+    const CurveRuler ruler(hypothesis->curve);
     std::vector<std::pair<double, int>> order;
     std::vector<double> along;
     for (const int i : hypothesis->inliers) {
-      order.emplace_back(hypothesis->curve.Along(points_.position(i)), i);
+      order.emplace_back(ruler.Along(points_.position(i)), i);
     }
     std::sort(order.begin(), order.end());
     for (const auto& entry : order) along.push_back(entry.first);
@@ -443,9 +446,10 @@ class CurveSearcher {
   // nothing about it.
   void SortOut(Hypothesis* hypothesis) {
     const PlanarCurve& curve = hypothesis->curve;
+    const CurveRuler ruler(curve);
     double begin = std::numeric_limits<double>::infinity(), end = -begin;
     for (const int i : hypothesis->inliers) {
-      const double along = curve.Along(points_.position(i));
+      const double along = ruler.Along(points_.position(i));
       begin = std::min(begin, along);
       end = std::max(end, along);
     }
@@ -453,11 +457,11 @@ class CurveSearcher {
         std::max(options_.tolerance, 2.0 * hypothesis->tolerance);
     const auto is_beyond = [&](int i) {
       if (curve.kind == CurveKind::kCircle) return false;
-      const double along = curve.Along(points_.position(i));
+      const double along = ruler.Along(points_.position(i));
       return along < begin || along > end;
     };
     const auto is_far = [&](int i) {
-      return std::abs(curve.SignedDistance(points_.position(i))) > near;
+      return std::abs(ruler.SignedDistance(points_.position(i))) > near;
     };
     std::vector<int>& bystanders = hypothesis->bystanders;
     bystanders.erase(
@@ -530,11 +534,12 @@ class CurveSearcher {
     };
     constexpr double kNone = -std::numeric_limits<double>::infinity();
     const PlanarCurve& curve = hypothesis.curve;
+    const CurveRuler ruler(curve);
     const double e = hypothesis.tolerance;
     std::vector<std::pair<double, int>> places;
     for (const int i : hypothesis.inliers) {
       if (is_available(i)) {
-        places.emplace_back(curve.Along(points_.position(i)), i);
+        places.emplace_back(ruler.Along(points_.position(i)), i);
       }
     }
     if (places.size() < MinPoints(curve.kind)) return kNone;
@@ -755,9 +760,10 @@ class CurveSearcher {
 
   double SquaredSum(const PlanarCurve& curve,
                     const std::vector<int>& indices) const {
+    const CurveRuler ruler(curve);
     double sum = 0.0;
     for (const int i : indices) {
-      const double distance = curve.SignedDistance(points_.position(i));
+      const double distance = ruler.SignedDistance(points_.position(i));
       sum += distance * distance;
     }
     return sum;

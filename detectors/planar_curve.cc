@@ -70,15 +70,11 @@ bool TaubinCircle(const std::vector<Eigen::Vector2d>& points,
 }  // namespace
 
 double PlanarCurve::SignedDistance(const Eigen::Vector2d& point) const {
-  const Eigen::Vector2d p = point - position;
-  if (kind == CurveKind::kCircle) return p.norm() - radius;
-  return p.y() * std::cos(direction) - p.x() * std::sin(direction);
+  return CurveRuler(*this).SignedDistance(point);
 }
 
 double PlanarCurve::Along(const Eigen::Vector2d& point) const {
-  const Eigen::Vector2d p = point - position;
-  if (kind == CurveKind::kCircle) return radius * std::atan2(p.y(), p.x());
-  return p.x() * std::cos(direction) + p.y() * std::sin(direction);
+  return CurveRuler(*this).Along(point);
 }
 
 bool FitLine(const std::vector<Eigen::Vector2d>& points, PlanarCurve* line) {
@@ -156,9 +152,10 @@ bool CircleThrough(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
 double RootMeanSquareDistance(const PlanarCurve& curve,
                               const std::vector<Eigen::Vector2d>& points) {
   if (points.empty()) return 0.0;
+  const CurveRuler ruler(curve);
   double sum = 0.0;
   for (const Eigen::Vector2d& point : points) {
-    const double distance = curve.SignedDistance(point);
+    const double distance = ruler.SignedDistance(point);
     sum += distance * distance;
   }
   return std::sqrt(sum / static_cast<double>(points.size()));

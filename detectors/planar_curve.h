@@ -2,6 +2,7 @@
 #define PLUMBLINE_DETECTORS_PLANAR_CURVE_H_
 
 #include <Eigen/Core>
+#include <cmath>
 #include <vector>
 
 namespace plumbline {
@@ -25,6 +26,41 @@ struct PlanarCurve {
   /// Where the foot of the point on the curve lies: m along a line from
   /// `position`; angle about a circle's centre in (-pi, pi] times the radius.
   double Along(const Eigen::Vector2d& point) const;
+};
+
+/// Measures many points against one curve: PlanarCurve works out the direction
+/// of a line anew for each.
+class CurveRuler {
+ public:
+  /// Of the curve as it is now.
+  explicit CurveRuler(const PlanarCurve& curve)
+      : kind_(curve.kind),
+        position_(curve.position),
+        radius_(curve.radius),
+        cos_(curve.kind == CurveKind::kLine ? std::cos(curve.direction) : 0.0),
+        sin_(curve.kind == CurveKind::kLine ? std::sin(curve.direction) : 0.0) {
+  }
+
+  /// PlanarCurve::SignedDistance.
+  double SignedDistance(const Eigen::Vector2d& point) const {
+    const Eigen::Vector2d p = point - position_;
+    if (kind_ == CurveKind::kCircle) return p.norm() - radius_;
+    return p.y() * cos_ - p.x() * sin_;
+  }
+
+  /// PlanarCurve::Along.
+  double Along(const Eigen::Vector2d& point) const {
+    const Eigen::Vector2d p = point - position_;
+    if (kind_ == CurveKind::kCircle) return radius_ * std::atan2(p.y(), p.x());
+    return p.x() * cos_ + p.y() * sin_;
+  }
+
+ private:
+  CurveKind kind_;
+  Eigen::Vector2d position_;
+  double radius_;
+  double cos_;
+  double sin_;
 };
 
 /// The line through the points with the smallest sum of squared orthogonal

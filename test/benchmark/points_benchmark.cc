@@ -1,7 +1,9 @@
 // Structure of points against their number: buildings like that of experiment
 // S1, side by side. Prints a line a world and writes a figure.
 //
-//     points_benchmark [--figure=FILE.svg] [POINTS ...]
+//     points_benchmark [--figure=FILE.svg] [--phases] [POINTS ...]
+//
+// With --phases also a line for each phase of EM.
 
 #include <plumbline/apps/line_plot.h>
 #include <plumbline/apps/synthetic_worlds.h>
@@ -144,7 +146,29 @@ struct Row {
   double solve_seconds = 0.0;
 };
 
-Row Measure(int points, const Registry& registry) {
+// Prints what each phase of EM took.
+class PhasePrinter {
+ public:
+  explicit PhasePrinter(const SolverSession& session) : session_(session) {}
+
+  void operator()(const EmPhase& phase) {
+    const int steps = session_.totals().iterations;
+    std::printf(
+        "  %3d %-12s %8.2f s %4d steps, structure %7d live %5d broken,"
+        " cost %.1f\n",
+        phase.iteration, phase.phase.c_str(), phase.seconds, steps - steps_,
+        phase.structure_constraints, phase.broken_constraints,
+        phase.cost.total());
+    std::fflush(stdout);
+    steps_ = steps;
+  }
+
+ private:
+  const SolverSession& session_;
+  int steps_ = 0;
+};
+
+Row Measure(int points, bool has_phases, const Registry& registry) {
   City city(std::max(1, static_cast<int>(std::lround(points / 572.0))),
             registry);
   Row row;
@@ -160,6 +184,7 @@ Row Measure(int points, const Registry& registry) {
         city.graph(), &session, registry,
         MakeHierarchy(DefaultHierarchy({"point"}), registry, {"point"}, {}),
         options);
+    if (has_phases) em.SetTrace(PhasePrinter(session));
     report = em.Run();
     steps = session.totals().iterations;
   });
@@ -182,12 +207,15 @@ Row Measure(int points, const Registry& registry) {
 
 int Run(int argc, char** argv) {
   std::string figure;
+  bool has_phases = false;
   std::vector<int> sizes;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     const std::string flag = "--figure=";
     if (argument.rfind(flag, 0) == 0) {
       figure = argument.substr(flag.size());
+    } else if (argument == "--phases") {
+      has_phases = true;
     } else {
       sizes.push_back(std::stoi(argument));
     }
@@ -201,7 +229,9 @@ int Run(int argc, char** argv) {
               "found", "rounds", "ended", "steps", "cpu s", "detect s",
               "solve s", "us/nlogn");
   std::vector<Row> rows;
-  for (const int size : sizes) rows.push_back(Measure(size, registry));
+  for (const int size : sizes) {
+    rows.push_back(Measure(size, has_phases, registry));
+  }
   if (figure.empty()) return 0;
 
   LinePlot plot;

@@ -155,6 +155,39 @@ TEST_F(SessionTest, OneStep) {
   EXPECT_EQ(Value(a, 0), 1.0);
 }
 
+// The first step takes a point between two anchors, which its distances put a
+// metre to the side, far past its place and settles another point: as much rise
+// of the cost as fall. The step is rejected, and the change of the cost is
+// below any tolerance.
+TEST_F(SessionTest, ACoarseSolveGoesOnWhenRiseAndFallCancel) {
+  const FeatureId left = Add("point", {-1.0, 0.0}, true);
+  const FeatureId right = Add("point", {1.0, 0.0}, true);
+  const double offset = 0.05;
+  const FeatureId between = Add("point", {0.0, offset});
+  for (const FeatureId anchor : {left, right}) {
+    Add(MakeConstraint("point_point_distance", {anchor, between},
+                       Eigen::VectorXd::Constant(1, std::sqrt(2.0)),
+                       Eigen::MatrixXd::Identity(1, 1)));
+  }
+  const double distance = std::hypot(1.0, offset);
+  const double error = std::sqrt(2.0) - distance;
+  const double reached = offset + error * distance / offset;
+  const double error_there = std::sqrt(2.0) - std::hypot(1.0, reached);
+  const double rise = error_there * error_there - error * error;
+
+  const FeatureId direction = Add("orientation", {0.0}, true);
+  const FeatureId turned = Add("orientation", {0.0});
+  const double turn = 0.1;
+  // 1/2 information turn^2 is what is to be gained there.
+  Add(Turn(direction, turned, turn, 2.0 * rise / (turn * turn)));
+
+  const SolveReport report = MakeSession()->SolveGlobal(1e-4, 1e9);
+  EXPECT_NEAR(report.initial_cost, error * error + rise, 1e-6);
+  EXPECT_LT(report.final_cost, 0.02);
+  EXPECT_NEAR(graph_.GetFeature(turned).parameters[0], turn, 1e-3);
+  EXPECT_NEAR(graph_.GetFeature(between).parameters[1], 1.0, 0.1);
+}
+
 TEST_F(SessionTest, WeightedMean) {
   const FeatureId a = Add("orientation", {0.0}, true);
   const FeatureId b = Add("orientation", {0.5});

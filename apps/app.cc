@@ -3,6 +3,7 @@
 #include <plumbline/apps/app.h>
 #include <plumbline/apps/help.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/number_text.h>
 
 #include <algorithm>
 #include <cmath>
@@ -110,7 +111,15 @@ std::vector<gflags::CommandLineFlagInfo> OwnFlagInfos() {
 }
 
 FlagValue ToFlagValue(const gflags::CommandLineFlagInfo& info) {
-  return {info.name, info.current_value, info.default_value, info.type};
+  // gflags writes 0.3 as 0.29999999999999999.
+  const auto text = [&info](const std::string& value) {
+    if (info.type != "double") return value;
+    std::string shortest;
+    AppendNumber(std::strtod(value.c_str(), nullptr), &shortest);
+    return shortest;
+  };
+  return {info.name, text(info.current_value), text(info.default_value),
+          info.type};
 }
 
 [[noreturn]] void ExitWithUsageError(const AppInfo& info,

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -17,6 +18,9 @@ constexpr int kOtherColor = 8;
 constexpr int kSolidColor = 253;
 constexpr int kColumnColor = 40;
 constexpr int kPathColor = 9;
+// A3, m.
+constexpr double kPaperLongSide = 0.42;
+constexpr double kPaperShortSide = 0.297;
 // Hundredths of a millimetre on paper.
 constexpr int kWallWeight = 35;
 constexpr int kThinWeight = 13;
@@ -172,6 +176,16 @@ void WriteHeader(const Vector2d& low, const Vector2d& high, Writer* writer) {
   writer->Int(70, 2);  // decimal
   writer->Text(9, "$LUPREC");
   writer->Int(70, 3);
+  // The paper, in the drawing's unit, lying or standing as the plan does: a
+  // program that prints the drawing would otherwise take its own number of
+  // millimetres for metres.
+  Vector2d paper(kPaperLongSide, kPaperShortSide);
+  const Vector2d size = high - low;
+  if (size[1] > size[0]) std::swap(paper[0], paper[1]);
+  writer->Text(9, "$PLIMMIN");
+  writer->Point(10, Vector2d::Zero());
+  writer->Text(9, "$PLIMMAX");
+  writer->Point(10, paper);
   writer->Text(9, "$EXTMIN");
   writer->Point3(10, low);
   writer->Text(9, "$EXTMAX");

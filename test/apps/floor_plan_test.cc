@@ -365,6 +365,11 @@ class DxfReader : public DL_CreationAdapter {
     variables[key] = value;
   }
   using DL_CreationAdapter::setVariableInt;
+  void setVariableVector(const std::string& key, double x, double y, double,
+                         int) override {
+    vectors[key] = {x, y};
+  }
+  using DL_CreationAdapter::setVariableVector;
 
   std::map<std::string, int> layers;
   std::map<std::string, std::vector<std::vector<double>>> lines, circles,
@@ -372,7 +377,21 @@ class DxfReader : public DL_CreationAdapter {
   std::map<std::string, int> polylines;
   int vertices = 0;
   std::map<std::string, int> variables;
+  std::map<std::string, std::vector<double>> vectors;
 };
+
+TEST_F(FloorPlanTest, PaperOfTheDxfStandsAsThePlanDoes) {
+  FloorPlan plan;
+  plan.walls.resize(1);
+  plan.walls[0].end = {3.0, 4.0};
+  std::ostringstream text;
+  WriteFloorPlanDxf(plan, text);
+  std::istringstream input(text.str());
+  DxfReader reader;
+  DL_Dxf dxf;
+  ASSERT_TRUE(dxf.in(input, &reader));
+  EXPECT_EQ(reader.vectors["$PLIMMAX"], (std::vector<double>{0.297, 0.42}));
+}
 
 TEST_F(FloorPlanTest, DxflibReadsTheDxf) {
   const FloorPlan plan = Sample();
@@ -381,6 +400,9 @@ TEST_F(FloorPlanTest, DxflibReadsTheDxf) {
   DL_Dxf dxf;
   ASSERT_TRUE(dxf.in(text, &reader));
   EXPECT_EQ(reader.variables["$INSUNITS"], 6);
+  // A3, lying, in metres.
+  EXPECT_EQ(reader.vectors["$PLIMMIN"], (std::vector<double>{0, 0}));
+  EXPECT_EQ(reader.vectors["$PLIMMAX"], (std::vector<double>{0.42, 0.297}));
   ASSERT_EQ(reader.layers.count("WALLS-1-0.0DEG"), 1u);
   EXPECT_EQ(reader.layers["WALLS-1-0.0DEG"], 0);
   EXPECT_EQ(reader.layers["ROBOT-PATH"], 1);  // frozen

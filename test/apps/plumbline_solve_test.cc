@@ -508,6 +508,8 @@ TEST_F(SolveTest, FilesThatAreAskedFor) {
   expected = FilesOfALog();
   expected.insert("floorplan.geojson");
   EXPECT_EQ(Files("all"), expected);
+  EXPECT_THAT(Out("all", "report.html"),
+              HasSubstr(R"("name":"delta_threshold","value":"0.3")"));
   EXPECT_EQ(Solve(log, "wrong", "--outputs=map.png,map.gif", &output), 2);
   EXPECT_THAT(output, HasSubstr("unknown file 'map.gif': expected names"));
   EXPECT_THAT(output, HasSubstr("floorplan.dxf"));

@@ -320,6 +320,7 @@ TEST_F(ReportInBrowserTest, LoadsAndAnswersTheMouse) {
   graph_.GetConstraint(4).delta = 0.001;
   Report report = MakeReport();
   report.title = "<b>bold</b>";
+  report.trace.back().phase.cost.measurement = 123456.789;
   Open(report);
   EXPECT_THAT(browser_->complaints(), IsEmpty());
   EXPECT_EQ(browser_->Evaluate("document.getElementById('title').textContent"),
@@ -400,6 +401,21 @@ TEST_F(ReportInBrowserTest, LoadsAndAnswersTheMouse) {
               3)
         << id;
   }
+  // No label reaches out of its drawing, no number is broken over two lines.
+  EXPECT_EQ(browser_->Evaluate(
+                "[...document.querySelectorAll('svg text')].filter(text => { "
+                "const a = text.getBoundingClientRect(), b = "
+                "text.closest('svg').getBoundingClientRect(); return a.left < "
+                "b.left - 1 || a.right > b.right + 1; }).map(text => "
+                "text.textContent).join('; ')"),
+            "");
+  EXPECT_EQ(browser_->Evaluate(
+                "[...document.querySelectorAll('td.number')].filter(cell => { "
+                "const range = document.createRange(); "
+                "range.selectNodeContents(cell); return "
+                "range.getClientRects().length > 1; }).map(cell => "
+                "cell.textContent).join('; ')"),
+            "");
   // Every way to colour.
   for (const char* mode : {"delta", "scans", "direction"}) {
     browser_->Evaluate(

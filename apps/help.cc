@@ -192,7 +192,12 @@ std::string Upper(std::string text) {
 }
 
 std::string FirstSentence(const std::string& text) {
-  const std::size_t end = text.find_first_of(".:;");
+  std::size_t end = text.find_first_of(".:;");
+  // The point in a file's name ends nothing.
+  while (end != std::string::npos && end + 1 < text.size() &&
+         text[end + 1] != ' ') {
+    end = text.find_first_of(".:;", end + 1);
+  }
   std::string first = text.substr(0, end);
   if (!first.empty() && first[0] >= 'A' && first[0] <= 'Z') {
     first[0] = static_cast<char>(first[0] - 'A' + 'a');

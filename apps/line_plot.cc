@@ -21,8 +21,11 @@ constexpr int kLeft = 74;
 constexpr int kRight = 24;
 constexpr int kTop = 40;
 constexpr int kBottom = 56;
-// Words under the axis are written upwards and need more space.
-constexpr int kBottomWithWords = 140;
+// About what a letter under the axis takes, and the space between two words.
+constexpr double kLetter = 6.6;
+constexpr double kBetweenWords = 8.0;
+// Of words that are written upwards; longer ones run into the axis' label.
+constexpr int kMostRoomForWords = 90;
 constexpr int kLegendRow = 20;
 
 std::string Number(double value, const char* format = "%.2f") {
@@ -88,9 +91,20 @@ class PlotWriter {
     left_ = kLeft;
     right_ = plot.width - kRight - static_cast<int>(LegendWidth(plot));
     top_ = top + kTop;
-    bottom_ =
-        top + plot.height - (plot.x_ticks.empty() ? kBottom : kBottomWithWords);
+    under_axis_ = kBottom;
+    if (!WordsFitBesideEachOther()) {
+      double longest = 0.0;
+      for (const auto& [x, word] : plot.x_ticks) {
+        longest = std::max(longest, kLetter * static_cast<double>(word.size()));
+      }
+      // In place of one row of them.
+      under_axis_ +=
+          std::clamp(static_cast<int>(longest) - 8, 0, kMostRoomForWords);
+    }
+    bottom_ = top + plot.height - under_axis_;
   }
+
+  int under_axis() const { return under_axis_; }
 
   void Write() {
     Text((left_ + right_) / 2.0, top_ - 16, "middle", 15, plot_.title, true);
@@ -156,6 +170,24 @@ class PlotWriter {
     output_ << '>' << EscapeXml(text) << "</text>\n";
   }
 
+  bool IsOnAxis(double x) const {
+    return OnX(x) >= x_.low && OnX(x) <= x_.high;
+  }
+
+  bool WordsFitBesideEachOther() const {
+    std::vector<std::pair<double, double>> ends;
+    for (const auto& [x, word] : plot_.x_ticks) {
+      if (!IsOnAxis(x)) continue;
+      const double half = 0.5 * kLetter * static_cast<double>(word.size());
+      ends.emplace_back(X(x) - half, X(x) + half);
+    }
+    std::sort(ends.begin(), ends.end());
+    for (std::size_t i = 1; i < ends.size(); ++i) {
+      if (ends[i].first < ends[i - 1].second + kBetweenWords) return false;
+    }
+    return true;
+  }
+
   void WriteAxes() {
     for (const double y : Ticks(y_, plot_.log_y, 8)) {
       Line(left_, Y(y), right_, Y(y), "stroke=\"#dddddd\"");
@@ -167,17 +199,21 @@ class PlotWriter {
         Text(X(x), bottom_ + 19, "middle", 12, Label(x));
       }
     }
+    const bool is_level = WordsFitBesideEachOther();
     for (const auto& [x, word] : plot_.x_ticks) {
-      if (!(OnX(x) >= x_.low && OnX(x) <= x_.high)) continue;
+      if (!IsOnAxis(x)) continue;
       Line(X(x), bottom_, X(x), bottom_ + 5, "stroke=\"black\"");
-      Text(X(x) + 4, bottom_ + 10, "end", 11, word, false, -90.0);
+      if (is_level) {
+        Text(X(x), bottom_ + 19, "middle", 12, word);
+      } else {
+        Text(X(x) + 4, bottom_ + 10, "end", 11, word, false, -90.0);
+      }
     }
     output_ << "<rect x=\"" << left_ << "\" y=\"" << top_ << "\" width=\""
             << right_ - left_ << "\" height=\"" << bottom_ - top_
             << "\" fill=\"none\" stroke=\"black\"/>\n";
-    const int label_y =
-        bottom_ + (plot_.x_ticks.empty() ? kBottom : kBottomWithWords) - 14;
-    Text((left_ + right_) / 2.0, label_y, "middle", 13, plot_.x_label);
+    Text((left_ + right_) / 2.0, bottom_ + under_axis_ - 14, "middle", 13,
+         plot_.x_label);
     Text(18, (top_ + bottom_) / 2.0, "middle", 13, plot_.y_label, false, -90.0);
   }
 
@@ -250,6 +286,7 @@ class PlotWriter {
   int right_ = 0;
   int top_ = 0;
   int bottom_ = 0;
+  int under_axis_ = kBottom;
 };
 
 }  // namespace
@@ -292,6 +329,11 @@ std::vector<double> LogTicks(double low, double high, int count) {
   }
   return static_cast<int>(ticks.size()) <= count || powers.empty() ? ticks
                                                                    : powers;
+}
+
+int RoomUnderAxis(const LinePlot& plot) {
+  std::ostringstream nowhere;
+  return PlotWriter(plot, 0, &nowhere).under_axis();
 }
 
 std::string PlotSvg(const std::vector<LinePlot>& plots, int columns) {

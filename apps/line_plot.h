@@ -33,7 +33,7 @@ struct LinePlot {
   bool log_y = false;
   std::vector<PlotSeries> series;
   /// Words under the x axis in the place of numbers, where they belong; written
-  /// upwards. Empty: numbers.
+  /// upwards when they have no room beside each other. Empty: numbers.
   std::vector<std::pair<double, std::string>> x_ticks;
   /// px, with the legend to the right of the axes.
   int width = 900;
@@ -47,6 +47,9 @@ std::vector<double> RoundTicks(double low, double high, int count);
 /// 1, 2 and 5 times powers of ten from `low` to `high` (both > 0); powers of
 /// ten alone when those are more than `count`.
 std::vector<double> LogTicks(double low, double high, int count);
+
+/// What a plot needs of its height under the x axis, px.
+int RoomUnderAxis(const LinePlot& plot);
 
 /// The plots as one SVG document, in rows of so many, below each other. The
 /// same plots give the same bytes. Throws Error when a series has sizes that

@@ -30,9 +30,8 @@ const plumbline::DriveOptions kDrive;
 }  // namespace
 
 DEFINE_string(world, "",
-              "office, killian_like, oblique, symmetric, parallel, a world "
-              "file, or S1 to "
-              "S6: graphs.");
+              "Building: office, killian_like, oblique, symmetric, parallel, "
+              "or a world file. Graph: S1 to S6.");
 DEFINE_uint64(seed, 1,
               "Draws the dimensions of a built-in world, the sway of the robot "
               "and all noise.");

@@ -18,6 +18,8 @@ namespace plumbline {
 namespace {
 
 constexpr int kPlotWidth = 460;  // px
+// Without what stands under the x axis.
+constexpr int kPlotHeight = 204;
 constexpr int kPlotColumns = 2;
 
 // Means and their intervals are asked for again and again.
@@ -127,7 +129,6 @@ LinePlot MakeLinePlot(const Overview& overview, std::size_t axis,
   plot.x_label = values.flag;
   plot.x_ticks = positions.ticks;
   plot.width = kPlotWidth;
-  plot.height = positions.ticks.empty() ? 260 : 344;
   PlotSeries series;
   const bool has_band = overview.result.definition.trials > 1;
   series.markers = true;
@@ -141,6 +142,8 @@ LinePlot MakeLinePlot(const Overview& overview, std::size_t axis,
     series.high.push_back(mean.high);
   }
   plot.series.push_back(std::move(series));
+  // All axes of a page are of one height, whatever stands under them.
+  plot.height = kPlotHeight + RoomUnderAxis(plot);
   return plot;
 }
 

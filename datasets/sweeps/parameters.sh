@@ -67,20 +67,22 @@ structure_sigma_orientation_orientation=0.02,0.1,0.5;\
 link_radius=10,4,25;\
 association_depth=3,1,5;\
 $d:orientation_mixture.gate_deg=8,4"
-solve() { # NAME LOG GRID FLAGS...
+solve() { # NAME LOG FIGURE GRID FLAGS...
   if [[ -z $datasets ]]; then
     echo "PLUMBLINE_DATASETS is not set: $1 is skipped" >&2
     return
   fi
-  sweep "$1" --grid="$3" --figures=evaluation.relations.translation_m.mean \
+  sweep "$1" --grid="$4" --figures="$3" \
     --evaluate="plumbline_evaluate --relations='$datasets/$2.relations'" -- \
     plumbline_solve --input="$datasets/$2.clf.bz2" --num_threads=1 \
-    --outputs=trajectory.tum "${@:4}"
+    --outputs=trajectory.tum "${@:5}"
 }
-solve fr079 fr079 "$walls"
-solve intel intel "$few_walls"
-solve mit-killian mit-killian "$few_walls"
+error=evaluation.relations.translation_m.mean
+# The error hardly moves there.
+solve fr079 fr079 orthogonality_deg "$walls"
+solve intel intel $error "$few_walls"
+solve mit-killian mit-killian $error "$few_walls"
 # Structure alone, with nothing behind it that makes up for it.
 alone=(--global_association=false --refine=map)
-solve intel-structure intel "$no_closures" "${alone[@]}"
-solve mit-killian-structure mit-killian "$few_walls" "${alone[@]}"
+solve intel-structure intel $error "$no_closures" "${alone[@]}"
+solve mit-killian-structure mit-killian $error "$few_walls" "${alone[@]}"

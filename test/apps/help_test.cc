@@ -119,6 +119,11 @@ TEST(HelpTest, ManPage) {
        {"SYNOPSIS", "DESCRIPTION", "OPTIONS", "EXIT STATUS", "EXAMPLE"}) {
     EXPECT_THAT(page, HasSubstr(std::string("\n.SH ") + section + "\n"));
   }
+  // Up to the end of a sentence, not of a word.
+  AppInfo info = TestInfo();
+  info.summary = "Writes a summary.json for you: fine. And more.";
+  EXPECT_THAT(ManPage(info, TestFlags()),
+              HasSubstr("plumbline_test \\- writes a summary.json for you\n"));
   // No line is taken for a command that is none.
   for (const std::string& line : Lines(page)) {
     if (line[0] != '.') continue;

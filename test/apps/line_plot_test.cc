@@ -94,6 +94,26 @@ TEST(LinePlotTest, WordsInPlaceOfNumbers) {
   EXPECT_THAT(svg, Not(HasSubstr("beyond")));
 }
 
+// Beside each other where they have room; only otherwise is there more space
+// under the axis.
+TEST(LinePlotTest, WordsStandUprightWhereTheyHaveRoom) {
+  LinePlot plot = TwoPoints();
+  const int room = RoomUnderAxis(plot);
+  plot.x_ticks = {{0.0, "0.02"}, {0.5, "0.1"}, {1.0, "2"}};
+  EXPECT_EQ(RoomUnderAxis(plot), room);
+  EXPECT_THAT(PlotSvg({plot}), Not(HasSubstr("rotate(-90 445")));
+  EXPECT_THAT(PlotSvg({plot}), HasSubstr("text-anchor=\"middle\">0.1</text>"));
+  // 735 px of axis: a hundredth of it is not enough for three letters.
+  plot.x_ticks = {{0.0, "0.02"}, {0.5, "0.1"}, {0.51, "0.2"}};
+  EXPECT_EQ(RoomUnderAxis(plot), room + 18);
+  EXPECT_THAT(PlotSvg({plot}), HasSubstr("rotate(-90 445.50"));
+  plot.x_ticks.emplace_back(0.52, std::string(100, 'w'));
+  EXPECT_EQ(RoomUnderAxis(plot), room + 90);
+  // What is not on the axis takes none.
+  plot.x_ticks = {{0.0, "0.02"}, {7.0, std::string(100, 'w')}, {7.0, "w"}};
+  EXPECT_EQ(RoomUnderAxis(plot), room);
+}
+
 TEST(LinePlotTest, BandsDashesAndMarkers) {
   LinePlot plot = TwoPoints();
   plot.series[0].low = {0.0, 0.9};

@@ -103,8 +103,8 @@ TypeInfo MakeTypeInfo(const FeatureType& type) {
   return info;
 }
 
-// Ends a coarse solve: at a step that brought less than the tolerance, or was
-// rejected and had promised no more. Ceres' own test looks at the size of the
+// Ends a coarse solve: when less than the tolerance is left, or a step was
+// rejected that had promised no more. Ceres' own test looks at the size of the
 // change alone, and takes a rejected step in which a rise in one part of the
 // graph makes up for the fall in the rest for convergence.
 class CoarseEnd final : public ceres::IterationCallback {
@@ -117,10 +117,16 @@ class CoarseEnd final : public ceres::IterationCallback {
     if (step.iteration == 0 || !step.step_is_valid) {
       return ceres::SOLVER_CONTINUE;
     }
-    const double gain = step.step_is_successful || step.relative_decrease == 0.0
-                            ? step.cost_change
-                            : step.cost_change / step.relative_decrease;
-    return gain <= function_tolerance_ * step.cost
+    // What is left to be gained is about what a step promised and did not keep,
+    // and no more than what it brought.
+    const double promised = step.relative_decrease == 0.0
+                                ? step.cost_change
+                                : step.cost_change / step.relative_decrease;
+    const double left =
+        step.step_is_successful
+            ? std::min(step.cost_change, std::abs(promised - step.cost_change))
+            : promised;
+    return left <= function_tolerance_ * step.cost
                ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
                : ceres::SOLVER_CONTINUE;
   }

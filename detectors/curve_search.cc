@@ -27,6 +27,8 @@ constexpr std::size_t kNeighborhood = 24;
 constexpr std::size_t kMaxNeighborhood = 200;
 constexpr double kNeighborhoodReach = 5.0;
 constexpr int kLineDraws = 24;
+// Points that are shuffled together.
+constexpr std::size_t kShuffled = 1024;
 constexpr int kCircleDraws = 48;
 constexpr int kMaxRefits = 8;
 // Points that so many hypotheses explain are not grown from any more.
@@ -240,8 +242,14 @@ class CurveSearcher {
     for (int i = 0; i < points_.size(); ++i) {
       if (IsFree(i)) seeds.push_back(i);
     }
-    for (std::size_t i = seeds.size(); i > 1; --i) {
-      std::swap(seeds[i - 1], seeds[static_cast<std::size_t>(Draw(i))]);
+    // Shuffled, but those far apart not with each other: points that are near
+    // have near numbers mostly, and lie near each other in memory.
+    for (std::size_t begin = 0; begin < seeds.size(); begin += kShuffled) {
+      for (std::size_t i = std::min(kShuffled, seeds.size() - begin); i > 1;
+           --i) {
+        std::swap(seeds[begin + i - 1],
+                  seeds[begin + static_cast<std::size_t>(Draw(i))]);
+      }
     }
     std::vector<int> neighborhood;
     for (int start = 0; start < kStarts; ++start) {

@@ -2,14 +2,21 @@
 #define PLUMBLINE_FRONTEND_GRAPH_BUILDER_H_
 
 #include <plumbline/core/feature.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/localization.h>
 #include <plumbline/frontend/point_association.h>
+#include <plumbline/frontend/robot_links.h>
 #include <plumbline/frontend/scan_points.h>
 #include <plumbline/frontend/segment_extraction.h>
 
 #include <Eigen/Core>
+#include <Eigen/LU>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -59,6 +66,8 @@ struct KeyScanRecord {
 class GraphBuilder {
  public:
   virtual ~GraphBuilder() = default;
+  GraphBuilder(const GraphBuilder&) = delete;
+  GraphBuilder& operator=(const GraphBuilder&) = delete;
 
   /// Registered name of the raw features' type: level 0 of the hierarchy.
   virtual std::string feature_type() const = 0;
@@ -70,19 +79,70 @@ class GraphBuilder {
   /// solve carries the robot along with what it is linked to.
   virtual void WriteRobot() = 0;
   /// Takes the robot's pose back from the graph after a solve.
-  virtual void ReadRobot() = 0;
+  void ReadRobot() { robot_.Read(); }
+
+  /// The robot's pose, map frame.
+  const Pose2& robot() const { return robot_.pose(); }
   /// The robot's feature in the graph; kNoId before the first WriteRobot.
-  virtual FeatureId robot_id() const = 0;
+  FeatureId robot_id() const { return robot_.id(); }
 
   /// Features that the robot is linked to and those they are bound to, up to
   /// `depth` constraints from the robot, and the robot, ascending.
-  virtual std::vector<FeatureId> Neighborhood(int depth) const = 0;
+  std::vector<FeatureId> Neighborhood(int depth) const {
+    return robot_.Neighborhood(depth);
+  }
 
   /// What was kept of key scans, in the order of the log.
-  virtual const std::vector<KeyScanRecord>& records() const = 0;
+  const std::vector<KeyScanRecord>& records() const { return records_; }
   /// Observations that matched a feature, and features made, so far.
-  virtual std::int64_t num_matches() const = 0;
-  virtual std::int64_t num_created() const = 0;
+  std::int64_t num_matches() const { return num_matches_; }
+  std::int64_t num_created() const { return num_created_; }
+
+ protected:
+  /// The graph and registry must outlive the builder.
+  GraphBuilder(Graph* graph, const Registry& registry)
+      : graph_(graph), registry_(registry), robot_(graph) {}
+
+  /// Begins a key scan: the first starts at `start`, for others the robot goes
+  /// by `motion` and its links to features that are farther away than
+  /// `link_radius` by `distance` (RobotLinks::Cut) are cut.
+  KeyScanRecord BeginScan(
+      int scan, const UncertainPose2& motion, const Pose2& start,
+      double link_radius,
+      const std::function<double(const Feature&)>& distance);
+
+  /// Corrects the robot by what was recognized, if anything was.
+  /// `associate(pose)` gives the associations at a pose, which must have the
+  /// index `candidate` into `candidates`; `localize(prior, associations)` the
+  /// pose that they speak for, with the prior's information.
+  template <typename Candidate, typename Association, typename Associate,
+            typename Localize>
+  void CorrectRobot(const std::vector<Candidate>& candidates,
+                    const Associate& associate, const Localize& localize,
+                    std::vector<Association>* associations) {
+    if (associations->empty()) return;
+    const Eigen::Matrix3d prior = robot_.Tightest().inverse();
+    Localization localized = localize(prior, *associations);
+    // Again from the corrected pose: what was at the edge of the gates may be
+    // in now, or out.
+    std::vector<Association> again = associate(localized.pose);
+    if (!again.empty()) {
+      *associations = std::move(again);
+      localized = localize(prior, *associations);
+    }
+    std::vector<FeatureId> seen;
+    for (const Association& association : *associations) {
+      seen.push_back(candidates[association.candidate].feature);
+    }
+    robot_.Correct(localized.pose, localized.observation_information, seen);
+  }
+
+  Graph* graph_;
+  const Registry& registry_;
+  RobotLinks robot_;
+  std::vector<KeyScanRecord> records_;
+  std::int64_t num_matches_ = 0;
+  std::int64_t num_created_ = 0;
 };
 
 }  // namespace plumbline

@@ -61,7 +61,7 @@ double DistanceTo(const Feature& feature, const Eigen::Vector2d& point) {
 
 MapBuilder::MapBuilder(Graph* graph, const Registry& registry,
                        const MapBuilderOptions& options)
-    : graph_(graph), registry_(registry), options_(options), robot_(graph) {}
+    : GraphBuilder(graph, registry), options_(options) {}
 
 void MapBuilder::AddScan(const KeyScan& scan) {
   AddKeyScan(scan.index, scan.motion,
@@ -73,17 +73,11 @@ void MapBuilder::AddScan(const KeyScan& scan) {
 void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
                             const std::vector<SegmentObservation>& observations,
                             const Pose2& start) {
-  KeyScanRecord record;
-  record.scan = scan;
-  if (records_.empty()) {
-    robot_.set_pose(start);
-  } else {
-    record.motion = motion;
-    robot_.Predict(motion);
-    robot_.Cut(options_.link_radius, [this](const Feature& feature) {
-      return DistanceTo(feature, robot_.pose().head<2>());
-    });
-  }
+  KeyScanRecord record =
+      BeginScan(scan, motion, start, options_.link_radius,
+                [this](const Feature& feature) {
+                  return DistanceTo(feature, robot_.pose().head<2>());
+                });
 
   // What may be seen: features near in the graph and within sight.
   std::vector<AssociationCandidate> candidates;
@@ -103,32 +97,18 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
     candidates.push_back(candidate);
   }
 
-  std::vector<Association> associations =
-      Associate(robot_.pose(), observations, candidates, options_.association);
-  if (!associations.empty()) {
-    const Eigen::Matrix3d prior = robot_.Tightest().inverse();
-    // Again from the corrected pose: what was at the edge of the gates may be
-    // in now, or out.
-    for (int round = 0; round < 2; ++round) {
-      const Localization localized =
-          LocalizeRobot(robot_.pose(), prior, observations, candidates,
-                        associations, options_.association);
-      if (round == 0) {
-        std::vector<Association> again = Associate(
-            localized.pose, observations, candidates, options_.association);
-        if (!again.empty()) {
-          associations = std::move(again);
-          continue;
-        }
-      }
-      std::vector<FeatureId> seen;
-      for (const Association& association : associations) {
-        seen.push_back(candidates[association.candidate].feature);
-      }
-      robot_.Correct(localized.pose, localized.observation_information, seen);
-      break;
-    }
-  }
+  const auto associate = [&](const Pose2& pose) {
+    return Associate(pose, observations, candidates, options_.association);
+  };
+  std::vector<Association> associations = associate(robot_.pose());
+  CorrectRobot(
+      candidates, associate,
+      [&](const Eigen::Matrix3d& prior,
+          const std::vector<Association>& recognized) {
+        return LocalizeRobot(robot_.pose(), prior, observations, candidates,
+                             recognized, options_.association);
+      },
+      &associations);
 
   std::vector<bool> used(observations.size(), false);
   for (const Association& association : associations) {

@@ -6,11 +6,9 @@
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/association.h>
 #include <plumbline/frontend/graph_builder.h>
-#include <plumbline/frontend/robot_links.h>
 #include <plumbline/frontend/segment_extraction.h>
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -65,19 +63,6 @@ class MapBuilder final : public GraphBuilder {
                   const Pose2& start);
 
   void WriteRobot() override;
-  void ReadRobot() override { robot_.Read(); }
-  std::vector<FeatureId> Neighborhood(int depth) const override {
-    return robot_.Neighborhood(depth);
-  }
-
-  /// The robot's pose, map frame.
-  const Pose2& robot() const { return robot_.pose(); }
-  FeatureId robot_id() const override { return robot_.id(); }
-  const std::vector<KeyScanRecord>& records() const override {
-    return records_;
-  }
-  std::int64_t num_matches() const override { return num_matches_; }
-  std::int64_t num_created() const override { return num_created_; }
 
  private:
   void SecondLook(const std::vector<FeatureMatch>& matches);
@@ -90,13 +75,7 @@ class MapBuilder final : public GraphBuilder {
   void Grow(const std::vector<SegmentObservation>& observations,
             const std::vector<bool>& used, KeyScanRecord* record);
 
-  Graph* graph_;
-  const Registry& registry_;
   MapBuilderOptions options_;
-  RobotLinks robot_;
-  std::vector<KeyScanRecord> records_;
-  std::int64_t num_matches_ = 0;
-  std::int64_t num_created_ = 0;
 };
 
 }  // namespace plumbline

@@ -78,7 +78,7 @@ std::vector<std::size_t> ChooseLinks(const Eigen::Vector2d& point,
 
 PointMapBuilder::PointMapBuilder(Graph* graph, const Registry& registry,
                                  const PointMapBuilderOptions& options)
-    : graph_(graph), registry_(registry), options_(options), robot_(graph) {
+    : GraphBuilder(graph, registry), options_(options) {
   if (!(options_.spacing > 0.0)) {
     throw PLUMBLINE_ERROR(
         "spacing of points is " + std::to_string(options_.spacing) + " m",
@@ -127,58 +127,39 @@ void PointMapBuilder::AddKeyScan(
     int scan, const UncertainPose2& motion,
     const std::vector<SegmentObservation>& surfaces,
     const Eigen::Vector2d& laser, const Pose2& start) {
-  KeyScanRecord record;
-  record.scan = scan;
-  if (records_.empty()) {
-    robot_.set_pose(start);
-  } else {
-    record.motion = motion;
-    robot_.Predict(motion);
-    robot_.Cut(options_.link_radius, [this](const Feature& feature) {
-      return (PositionOf(feature) - robot_.pose().head<2>()).norm();
-    });
-  }
+  KeyScanRecord record =
+      BeginScan(scan, motion, start, options_.link_radius,
+                [this](const Feature& feature) {
+                  return (PositionOf(feature) - robot_.pose().head<2>()).norm();
+                });
 
   const std::vector<PointCandidate> candidates = Candidates();
-  std::vector<PointAssociation> associations = AssociatePoints(
-      robot_.pose(), surfaces, candidates, options_.association);
-  if (!associations.empty()) {
-    const Eigen::Matrix3d prior = robot_.Tightest().inverse();
-    const double variance =
-        options_.association.feature_sigma * options_.association.feature_sigma;
-    // Again from the corrected pose: what was at the edge of the gates may be
-    // in now, or out.
-    for (int round = 0; round < 2; ++round) {
-      const Localization localized = LocalizeRobot(
-          robot_.pose(), prior, associations.size(),
-          [&](const Pose2& pose, std::size_t i) {
-            const PointObservation& observation = associations[i].observation;
-            const Eigen::Vector2d seen = TransformPoint(
-                Inverse(pose), candidates[associations[i].candidate].position);
-            LinearizedObservation linearized;
-            linearized.error = seen - observation.position;
-            linearized.jacobian = RobotJacobian(pose, seen);
-            Eigen::Matrix2d covariance = observation.covariance;
-            covariance.diagonal().array() += variance;
-            linearized.weight = observation.share * covariance.inverse();
-            return linearized;
-          });
-      if (round == 0) {
-        std::vector<PointAssociation> again = AssociatePoints(
-            localized.pose, surfaces, candidates, options_.association);
-        if (!again.empty()) {
-          associations = std::move(again);
-          continue;
-        }
-      }
-      std::vector<FeatureId> seen;
-      for (const PointAssociation& association : associations) {
-        seen.push_back(candidates[association.candidate].feature);
-      }
-      robot_.Correct(localized.pose, localized.observation_information, seen);
-      break;
-    }
-  }
+  const auto associate = [&](const Pose2& pose) {
+    return AssociatePoints(pose, surfaces, candidates, options_.association);
+  };
+  std::vector<PointAssociation> associations = associate(robot_.pose());
+  const double variance =
+      options_.association.feature_sigma * options_.association.feature_sigma;
+  CorrectRobot(
+      candidates, associate,
+      [&](const Eigen::Matrix3d& prior,
+          const std::vector<PointAssociation>& recognized) {
+        return LocalizeRobot(
+            robot_.pose(), prior, recognized.size(),
+            [&](const Pose2& pose, std::size_t i) {
+              const PointObservation& observation = recognized[i].observation;
+              const Eigen::Vector2d seen = TransformPoint(
+                  Inverse(pose), candidates[recognized[i].candidate].position);
+              LinearizedObservation linearized;
+              linearized.error = seen - observation.position;
+              linearized.jacobian = RobotJacobian(pose, seen);
+              Eigen::Matrix2d covariance = observation.covariance;
+              covariance.diagonal().array() += variance;
+              linearized.weight = observation.share * covariance.inverse();
+              return linearized;
+            });
+      },
+      &associations);
 
   for (const PointAssociation& association : associations) {
     PointMatch match;

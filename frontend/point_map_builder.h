@@ -5,12 +5,10 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/point_association.h>
-#include <plumbline/frontend/robot_links.h>
 #include <plumbline/frontend/segment_extraction.h>
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <cstdint>
 #include <map>
 #include <string>
 #include <utility>
@@ -78,19 +76,6 @@ class PointMapBuilder final : public GraphBuilder {
                   const Eigen::Vector2d& laser, const Pose2& start);
 
   void WriteRobot() override;
-  void ReadRobot() override { robot_.Read(); }
-  std::vector<FeatureId> Neighborhood(int depth) const override {
-    return robot_.Neighborhood(depth);
-  }
-
-  /// The robot's pose, map frame.
-  const Pose2& robot() const { return robot_.pose(); }
-  FeatureId robot_id() const override { return robot_.id(); }
-  const std::vector<KeyScanRecord>& records() const override {
-    return records_;
-  }
-  std::int64_t num_matches() const override { return num_matches_; }
-  std::int64_t num_created() const override { return num_created_; }
 
  private:
   // A point that this scan makes.
@@ -109,16 +94,10 @@ class PointMapBuilder final : public GraphBuilder {
       const Eigen::Vector2d& laser) const;
   void Grow(const std::vector<NewPoint>& points, KeyScanRecord* record);
 
-  Graph* graph_;
-  const Registry& registry_;
   PointMapBuilderOptions options_;
-  RobotLinks robot_;
   // Direction of the surface that each point was last seen on, map frame, by
   // feature.
   std::map<FeatureId, double> directions_;
-  std::vector<KeyScanRecord> records_;
-  std::int64_t num_matches_ = 0;
-  std::int64_t num_created_ = 0;
 };
 
 }  // namespace plumbline

@@ -17,6 +17,8 @@ constexpr int kTop = 48;
 constexpr int kBottom = 24;
 constexpr int kCellHeight = 34;
 constexpr int kLetter = 7;  // px of width, about
+constexpr int kTitleLetter = 9;
+constexpr int kTitleLeft = 18;
 constexpr int kScaleWidth = 110;
 constexpr int kScaleSteps = 24;
 
@@ -59,12 +61,18 @@ Layout MakeLayout(const HeatMap& map) {
   for (const std::string& column : map.columns) {
     layout.cell_width = std::max(layout.cell_width, TextWidth(column) + 12);
   }
+  for (const std::vector<double>& row : map.values) {
+    for (const double value : row) {
+      layout.cell_width =
+          std::max(layout.cell_width, TextWidth(Label(value)) + 12);
+    }
+  }
   layout.top = kTop + 24;
   const int columns = static_cast<int>(map.columns.size());
   const int rows = static_cast<int>(map.rows.size());
-  layout.width =
-      std::max(layout.left + columns * layout.cell_width + kScaleWidth,
-               TextWidth(map.title) + 40);
+  layout.width = std::max(
+      layout.left + columns * layout.cell_width + kScaleWidth,
+      kTitleLetter * static_cast<int>(map.title.size()) + 2 * kTitleLeft);
   layout.height = layout.top + std::max(rows * kCellHeight, 120) + kBottom;
   return layout;
 }
@@ -111,7 +119,8 @@ void WriteMap(const HeatMap& map, const Layout& layout, int offset,
   const int columns = static_cast<int>(map.columns.size());
   const int rows = static_cast<int>(map.rows.size());
   const int right = layout.left + columns * layout.cell_width;
-  Text((layout.left + right) / 2.0, offset + 20, "middle",
+  // From the left, since it may be wider than the table.
+  Text(kTitleLeft, offset + 20, "start",
        "font-size=\"15\" font-weight=\"bold\"", map.title, output);
   Text((layout.left + right) / 2.0, offset + 42, "middle", "font-size=\"13\"",
        map.x_label, output);

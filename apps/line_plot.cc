@@ -27,6 +27,8 @@ constexpr double kBetweenWords = 8.0;
 // Of words that are written upwards; longer ones run into the axis' label.
 constexpr int kMostRoomForWords = 90;
 constexpr int kLegendRow = 20;
+constexpr int kTitleSize = 15;
+constexpr int kLeastTitleSize = 8;
 
 std::string Number(double value, const char* format = "%.2f") {
   char text[64];
@@ -107,7 +109,8 @@ class PlotWriter {
   int under_axis() const { return under_axis_; }
 
   void Write() {
-    Text((left_ + right_) / 2.0, top_ - 16, "middle", 15, plot_.title, true);
+    Text(plot_.width / 2.0, top_ - 16, "middle", TitleSize(), plot_.title,
+         true);
     WriteAxes();
     int next_color = 0;
     std::vector<int> colors;
@@ -168,6 +171,15 @@ class PlotWriter {
               << Number(x) << ' ' << Number(y) << ")\"";
     }
     output_ << '>' << EscapeXml(text) << "</text>\n";
+  }
+
+  // Smaller where the title would be wider than the plot: a bold letter is
+  // about 0.6 of its size wide.
+  int TitleSize() const {
+    if (plot_.title.empty()) return kTitleSize;
+    const double most =
+        plot_.width / (0.6 * static_cast<double>(plot_.title.size()));
+    return std::clamp(static_cast<int>(most), kLeastTitleSize, kTitleSize);
   }
 
   bool IsOnAxis(double x) const {

@@ -80,9 +80,9 @@ DEFINE_string(minimize, "",
               "sweep.csv, as in evaluation.relations.translation_m.mean");
 DEFINE_string(maximize, "", "The same, the most of it being best");
 DEFINE_string(figures, "",
-              "Figures to draw, separated by commas: columns of sweep.csv; "
-              "empty: the one to minimize or maximize and some others that "
-              "differ between runs");
+              "Figures to draw, separated by commas: columns of sweep.csv, in "
+              "double quotes where a name holds commas; empty: the one to "
+              "minimize or maximize and some others that differ between runs");
 DEFINE_bool(times, true,
             "Columns of measured time and memory; without them the same sweep "
             "gives the same bytes of sweep.csv");
@@ -302,9 +302,7 @@ void WriteOverview(const SweepResult& result, const std::string& folder) {
   OverviewOptions options;
   options.minimize = FLAGS_maximize.empty();
   options.objective = options.minimize ? FLAGS_minimize : FLAGS_maximize;
-  std::istringstream names(FLAGS_figures);
-  std::string name;
-  while (std::getline(names, name, ',')) options.figures.push_back(name);
+  options.figures = SplitNames(FLAGS_figures);
   if (options.figures.empty()) {
     options.figures = ChooseFigures(result, options.objective, kFigures);
   }

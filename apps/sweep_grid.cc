@@ -159,6 +159,25 @@ std::vector<SweepAxis> ParseGrid(const std::string& text) {
   return axes;
 }
 
+std::vector<std::string> SplitNames(const std::string& text) {
+  std::vector<std::string> names(1);
+  bool is_quoted = false;
+  for (const char c : text) {
+    if (c == '"') {
+      is_quoted = !is_quoted;
+    } else if (c == ',' && !is_quoted) {
+      names.emplace_back();
+    } else {
+      names.back() += c;
+    }
+  }
+  if (is_quoted) {
+    throw Error("'" + text + "'", 0, "a quote does not end", "another \"");
+  }
+  names.erase(std::remove(names.begin(), names.end(), ""), names.end());
+  return names;
+}
+
 std::vector<std::string> SplitWords(const std::string& text) {
   std::vector<std::string> words;
   std::string word;

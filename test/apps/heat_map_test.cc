@@ -41,6 +41,21 @@ TEST(HeatMapTest, WideRangesAreLogarithmic) {
   EXPECT_FALSE(IsLogarithmic({}));
 }
 
+// What is longer than the table is wide, or than a cell, is not cut off.
+TEST(HeatMapTest, LongTextsHaveRoom) {
+  HeatMap map = MakeMap();
+  map.columns = {"c0"};
+  map.values = {{1.0}, {2.0}};
+  map.title = std::string(50, 'w');
+  std::string svg = HeatMapSvg({map});
+  EXPECT_THAT(svg, HasSubstr("<text x=\"18\" y=\"20\" text-anchor=\"start\""));
+  EXPECT_THAT(svg, HasSubstr("<svg xmlns=\"http://www.w3.org/2000/svg\" "
+                             "width=\"486\""));
+  EXPECT_THAT(svg, HasSubstr("width=\"70\" height=\"34\""));
+  map.values = {{-0.00012346}, {2.0}};
+  EXPECT_THAT(HeatMapSvg({map}), HasSubstr("width=\"82\" height=\"34\""));
+}
+
 TEST(HeatMapTest, CellsHaveTheirColorsAndNumbers) {
   HeatMap map = MakeMap();
   const std::string svg = HeatMapSvg({map});

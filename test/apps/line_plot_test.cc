@@ -114,6 +114,17 @@ TEST(LinePlotTest, WordsStandUprightWhereTheyHaveRoom) {
   EXPECT_EQ(RoomUnderAxis(plot), room);
 }
 
+TEST(LinePlotTest, LongTitlesAreSmaller) {
+  LinePlot plot = TwoPoints();
+  plot.width = 450;
+  plot.title = std::string(50, 'w');
+  EXPECT_THAT(PlotSvg({plot}), HasSubstr("<text x=\"225.00\" y=\"24.00\" "
+                                         "font-size=\"15\""));
+  plot.title = std::string(75, 'w');
+  EXPECT_THAT(PlotSvg({plot}), HasSubstr("<text x=\"225.00\" y=\"24.00\" "
+                                         "font-size=\"10\""));
+}
+
 TEST(LinePlotTest, BandsDashesAndMarkers) {
   LinePlot plot = TwoPoints();
   plot.series[0].low = {0.0, 0.9};

@@ -85,6 +85,14 @@ TEST(SweepGridTest, RefusesWhatIsNoGrid) {
   }
 }
 
+TEST(SweepGridTest, NamesMayHoldCommas) {
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(SplitNames(""), Names());
+  EXPECT_EQ(SplitNames("a,b c,,d"), (Names{"a", "b c", "d"}));
+  EXPECT_EQ(SplitNames("\"a, 0.1 m.right\",b"), (Names{"a, 0.1 m.right", "b"}));
+  EXPECT_THROW(SplitNames("a,\"b"), Error);
+}
+
 TEST(SweepGridTest, WordsAreCutAsAShellDoes) {
   EXPECT_THAT(SplitWords("  a  b\tc\n"), ElementsAre("a", "b", "c"));
   EXPECT_THAT(SplitWords("--x='a b' \"c 'd'\"e '' \\  f\\\"g"),

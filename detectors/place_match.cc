@@ -268,7 +268,6 @@ class Matcher {
     Explanation explanation;
     std::vector<Line> lines;
     double conflicts = 0.0;
-    double misfit = 0.0;
     for (std::size_t j = 0; j < second_.size(); ++j) {
       if (by_second_[j].empty()) continue;
       const Wall moved = Move(second_[j], pivot_, displacement);
@@ -304,8 +303,6 @@ class Matcher {
         }
       }
       explanation.best.push_back({closest->first, closest->second});
-      const double left = 2.0 * closest->offset / options_.tolerance;
-      misfit += std::min(1.0, overlap / kFullLength) * left * left;
       AddToLines(static_cast<int>(j), overlap, &lines);
     }
     double worth =

@@ -91,16 +91,15 @@ struct PlaceMatch {
 /// together (least squares with the prior). Its worth in nats:
 ///
 ///     sum over matched lines of  w log(range / (k tolerance))
-///       - sum over matched walls of  w r^2 / 2  - conflicts - d^2 / 2
+///       - conflicts - d^2 / 2
 ///
 /// where a line is made of all matched walls in line, w <= 1 grows with its
 /// length, the fraction is the inverse of the chance that a line somewhere in
 /// the search range hits one of the k lines there (an a-contrario model:
-/// Desolneux, Moisan and Morel 2000), r is the offset that is left in units of
-/// half the tolerance, and d is the Mahalanobis distance of the displacement. A
-/// match is kept when no displacement of nearly the same worth puts its wall
-/// elsewhere: along a corridor that says nothing about the way along it, only
-/// what is across is kept.
+/// Desolneux, Moisan and Morel 2000), and d is the Mahalanobis distance of the
+/// displacement. A match is kept when no displacement of nearly the same worth
+/// puts its wall elsewhere: along a corridor that says nothing about the way
+/// along it, only what is across is kept.
 ///
 /// In a wide search the evidence must also outweigh the number of displacements
 /// that could be tried: the first line of each direction fixes the displacement

@@ -30,6 +30,9 @@ constexpr char kName[] = "same_wall";
 // Wider searches wait until the narrowest are done; this much wider is the
 // same.
 constexpr double kSameWidth = 1.5;
+// Walls whose directions differ by more hold a place together in both
+// directions, rad.
+constexpr double kCrossing = DegToRad(20.0);
 
 using Pair = std::pair<int, int>;
 
@@ -75,6 +78,7 @@ class Search {
     for (std::size_t i = 0; i < walls_.size(); ++i) {
       walls_[i].group = static_cast<int>(classes_->Find(i));
     }
+    MakeWays();
     MakePlaces();
   }
 
@@ -111,6 +115,7 @@ class Search {
       } else if (constraint->type->name == kSameWallRelation) {
         if (constraint->state == ConstraintState::kLive) {
           classes_->Join(i, j);
+          closures_.push_back({i, j});
         } else {
           broken_.insert(Ordered(i, j));
         }
@@ -187,8 +192,43 @@ class Search {
     }
   }
 
+  // Whether the surroundings of two walls that are one have another wall in
+  // common, across them: then nothing is free to move between the two visits.
+  bool HoldsTwoDirections(const Pair& closure) const {
+    std::multimap<std::size_t, int> crossing;
+    for (const auto& entry : Within(closure.first, options_.place_links)) {
+      const double turn =
+          walls_[entry.first].direction - walls_[closure.first].direction;
+      if (std::abs(std::sin(turn)) > std::sin(kCrossing)) {
+        crossing.emplace(classes_->Find(entry.first), entry.first);
+      }
+    }
+    for (const auto& entry : Within(closure.second, options_.place_links)) {
+      const auto same = crossing.equal_range(classes_->Find(entry.first));
+      if (std::any_of(same.first, same.second, [&](const auto& wall) {
+            return wall.second != entry.first;
+          })) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void MakeWays() {
+    ways_ = links_;
+    for (const Pair& closure : closures_) {
+      if (!HoldsTwoDirections(closure)) continue;
+      const double way =
+          (walls_[closure.first].position - walls_[closure.second].position)
+              .norm();
+      ways_[closure.first].push_back({closure.second, way});
+      ways_[closure.second].push_back({closure.first, way});
+    }
+  }
+
   // Way along measurement links from a wall to every other, m. Closures that
-  // hold two directions are links too.
+  // hold two directions are links too: the way round a loop that is closed adds
+  // nothing to what its ends do not know of each other.
   std::vector<double> WaysFrom(int wall) const {
     std::vector<double> ways(walls_.size(),
                              std::numeric_limits<double>::infinity());
@@ -200,7 +240,7 @@ class Search {
       const Entry entry = queue.top();
       queue.pop();
       if (entry.first > ways[entry.second]) continue;
-      for (const auto& link : links_[entry.second]) {
+      for (const auto& link : ways_[entry.second]) {
         const double way = entry.first + link.second;
         if (way < ways[link.first]) {
           ways[link.first] = way;
@@ -494,6 +534,9 @@ class Search {
   std::map<FeatureId, int> index_;
   // Of each wall the walls that measurements tie it to and how far they are.
   std::vector<std::vector<std::pair<int, double>>> links_;
+  // The same with the closures that lead from one place to another.
+  std::vector<std::vector<std::pair<int, double>>> ways_;
+  std::vector<Pair> closures_;
   std::set<Pair> broken_;
   // Walls that closures make one, and features that anything connects, by id.
   std::unique_ptr<DisjointSets> classes_;

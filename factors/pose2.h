@@ -43,14 +43,38 @@ inline Pose2 Between(const Pose2& p1, const Pose2& p2) {
                NormalizeAngle(p2[2] - p1[2]));
 }
 
+/// Takes points and directions from the frame `pose` to the frame in which
+/// `pose` is given; for many of them, as its sine and cosine are taken once.
+class PoseTransform {
+ public:
+  explicit PoseTransform(const Pose2& pose)
+      : position_(pose[0], pose[1]),
+        cosine_(std::cos(pose[2])),
+        sine_(std::sin(pose[2])) {}
+
+  /// A point, m.
+  Eigen::Vector2d Point(const Eigen::Vector2d& point) const {
+    return {position_[0] + cosine_ * point[0] - sine_ * point[1],
+            position_[1] + sine_ * point[0] + cosine_ * point[1]};
+  }
+
+  /// A direction: a vector of any length, only turned.
+  Eigen::Vector2d Direction(const Eigen::Vector2d& direction) const {
+    return {cosine_ * direction[0] - sine_ * direction[1],
+            sine_ * direction[0] + cosine_ * direction[1]};
+  }
+
+ private:
+  Eigen::Vector2d position_;
+  double cosine_;
+  double sine_;
+};
+
 /// The point `point` (m), given in the frame `pose`, in the frame in which
 /// `pose` is given.
 inline Eigen::Vector2d TransformPoint(const Pose2& pose,
                                       const Eigen::Vector2d& point) {
-  const double c = std::cos(pose[2]);
-  const double s = std::sin(pose[2]);
-  return {pose[0] + c * point[0] - s * point[1],
-          pose[1] + s * point[0] + c * point[1]};
+  return PoseTransform(pose).Point(point);
 }
 
 /// Jacobian (3x3) of Compose(p1, p2) with respect to p1.

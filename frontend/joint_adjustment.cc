@@ -25,14 +25,10 @@ Pose2 PoseOf(const Feature& feature) {
 
 void AddReturns(const std::vector<ScanPoint>& points, const Pose2& pose,
                 std::vector<ScanPoint>* returns) {
-  const double c = std::cos(pose[2]);
-  const double s = std::sin(pose[2]);
-  for (ScanPoint point : points) {
+  const PoseTransform transform(pose);
+  for (const ScanPoint& point : points) {
     if (point.normal.squaredNorm() == 0.0) continue;
-    point.position = TransformPoint(pose, point.position);
-    point.normal = {c * point.normal.x() - s * point.normal.y(),
-                    s * point.normal.x() + c * point.normal.y()};
-    returns->push_back(point);
+    returns->push_back(Moved(point, transform));
   }
 }
 

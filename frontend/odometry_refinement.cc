@@ -31,14 +31,9 @@ void OdometryRefiner::RebuildReference() {
         2.0 * options_.points.usable_range) {
       continue;
     }
-    const double c = std::cos(key.pose[2]);
-    const double s = std::sin(key.pose[2]);
+    const PoseTransform transform(key.pose);
     for (const ScanPoint& point : key.points) {
-      ScanPoint transformed = point;
-      transformed.position = TransformPoint(key.pose, point.position);
-      transformed.normal = {c * point.normal.x() - s * point.normal.y(),
-                            s * point.normal.x() + c * point.normal.y()};
-      reference.push_back(transformed);
+      reference.push_back(Moved(point, transform));
     }
   }
   matcher_.SetReference(std::move(reference));

@@ -85,31 +85,58 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points) {
 int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
                                   const Eigen::Vector2d& normal,
                                   double radius) const {
+  if (reference_.empty()) return -1;
   const Eigen::Vector2d local = point - origin_;
-  const int column_begin = std::max(
-      0, static_cast<int>(std::floor((local.x() - radius) / bucket_size_)));
-  const int column_end = std::min(
-      bucket_columns_ - 1,
-      static_cast<int>(std::floor((local.x() + radius) / bucket_size_)));
-  const int row_begin = std::max(
-      0, static_cast<int>(std::floor((local.y() - radius) / bucket_size_)));
-  const int row_end = std::min(
-      bucket_rows_ - 1,
-      static_cast<int>(std::floor((local.y() + radius) / bucket_size_)));
   const bool has_normal = normal.squaredNorm() > 0.0;
   int best = -1;
   double best_distance = radius * radius;
-  for (int row = row_begin; row <= row_end; ++row) {
+  // Of two at the same distance the first of the reference, whatever the order
+  // of the search.
+  const auto look = [&](int row, int column_begin, int column_end) {
+    column_begin = std::max(0, column_begin);
+    column_end = std::min(bucket_columns_ - 1, column_end);
+    if (column_begin > column_end) return;
     const int base = row * bucket_columns_;
-    if (column_begin > column_end) break;
     const int end = bucket_begin_[base + column_end + 1];
     for (int i = bucket_begin_[base + column_begin]; i < end; ++i) {
       const ScanPoint& candidate = reference_[i];
       const double distance = (candidate.position - point).squaredNorm();
-      if (distance >= best_distance) continue;
+      if (distance > best_distance ||
+          (distance == best_distance && (best < 0 || i >= best))) {
+        continue;
+      }
       if (has_normal && candidate.normal.dot(normal) < 0.7) continue;
       best_distance = distance;
       best = i;
+    }
+  };
+  const auto cell = [&](double value) {
+    return static_cast<int>(std::floor(value / bucket_size_));
+  };
+  // The point's own bucket first: what it holds narrows the rest.
+  const int own_row = cell(local.y());
+  const int own_column = cell(local.x());
+  if (own_row >= 0 && own_row < bucket_rows_) {
+    look(own_row, own_column, own_column);
+  }
+  // Rows outwards from there.
+  const int row_begin = std::max(0, cell(local.y() - radius));
+  const int row_end = std::min(bucket_rows_ - 1, cell(local.y() + radius));
+  const auto look_at_row = [&](int row) {
+    const double low = row * bucket_size_ - local.y();
+    const double across = std::max({low, -low - bucket_size_, 0.0});
+    const double left = best_distance - across * across;
+    if (left < 0.0) return;
+    const double half = std::sqrt(left);
+    look(row, cell(local.x() - half), cell(local.x() + half));
+  };
+  for (int step = 0; own_row - step >= row_begin || own_row + step <= row_end;
+       ++step) {
+    if (own_row - step >= row_begin && own_row - step <= row_end) {
+      look_at_row(own_row - step);
+    }
+    if (step > 0 && own_row + step >= row_begin && own_row + step <= row_end) {
+      look_at_row(own_row + step);
     }
   }
   return best;
@@ -195,16 +222,14 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
 
 double ScanMatcher::Overlap(const std::vector<ScanPoint>& scan,
                             const Pose2& pose) const {
-  const double c = std::cos(pose[2]);
-  const double s = std::sin(pose[2]);
+  const PoseTransform transform(pose);
   int tried = 0;
   int found = 0;
   for (const ScanPoint& point : scan) {
     if (point.normal.squaredNorm() == 0.0) continue;
     ++tried;
-    const Eigen::Vector2d normal(c * point.normal.x() - s * point.normal.y(),
-                                 s * point.normal.x() + c * point.normal.y());
-    if (NearestReference(TransformPoint(pose, point.position), normal,
+    if (NearestReference(transform.Point(point.position),
+                         transform.Direction(point.normal),
                          options_.initial_radius) >= 0) {
       ++found;
     }

@@ -22,6 +22,7 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
                        std::vector<ScanPoint>* points) {
   points->clear();
   const int beams = static_cast<int>(scan.ranges.size());
+  const PoseTransform from_laser(scan.laser_offset);
   for (int i = 0; i < beams; ++i) {
     const double range = scan.ranges[i];
     if (!(range >= options.minimum_range) || range > options.usable_range) {
@@ -29,8 +30,7 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
     }
     const double angle = scan.start_angle + i * scan.angle_step;
     ScanPoint point;
-    point.position = TransformPoint(
-        scan.laser_offset,
+    point.position = from_laser.Point(
         Eigen::Vector2d(range * std::cos(angle), range * std::sin(angle)));
     point.normal.setZero();
     point.range = range;

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_FRONTEND_SCAN_POINTS_H_
 #define PLUMBLINE_FRONTEND_SCAN_POINTS_H_
 
+#include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/scan.h>
 
 #include <Eigen/Core>
@@ -38,6 +39,15 @@ struct ScanPoint {
   /// Index of the beam.
   int beam;
 };
+
+/// A return with its position and normal taken from the frame of a pose to the
+/// one in which that pose is given.
+inline ScanPoint Moved(const ScanPoint& point, const PoseTransform& transform) {
+  ScanPoint moved = point;
+  moved.position = transform.Point(point.position);
+  moved.normal = transform.Direction(point.normal);
+  return moved;
+}
 
 /// The returns of a scan in the order of beams, with the normals of the
 /// surfaces that they lie on (total least squares over neighbouring returns).

@@ -23,14 +23,9 @@ std::vector<ScanPoint> Reference(const Submap& submap,
   std::vector<ScanPoint> reference;
   for (int k = submap.begin; k < submap.end; ++k) {
     const Pose2 pose = Between(poses[submap.middle()], poses[k]);
-    const double c = std::cos(pose[2]);
-    const double s = std::sin(pose[2]);
+    const PoseTransform transform(pose);
     for (const ScanPoint& point : places[k].reference) {
-      ScanPoint moved = point;
-      moved.position = TransformPoint(pose, point.position);
-      moved.normal = {c * point.normal.x() - s * point.normal.y(),
-                      s * point.normal.x() + c * point.normal.y()};
-      reference.push_back(moved);
+      reference.push_back(Moved(point, transform));
     }
   }
   return reference;

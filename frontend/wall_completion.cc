@@ -21,8 +21,13 @@ std::int64_t CellKey(std::int64_t column, std::int64_t row) {
 struct Wall {
   FeatureId id;
   Pose2 pose;
+  Eigen::Vector2d direction;
   double begin, end;
 };
+
+Wall MakeWall(FeatureId id, const Pose2& pose, double begin, double end) {
+  return {id, pose, {std::cos(pose[2]), std::sin(pose[2])}, begin, end};
+}
 
 // Walls by the index cells that they pass through.
 class WallIndex {
@@ -30,13 +35,10 @@ class WallIndex {
   WallIndex(const Graph& graph, double reach) : reach_(reach) {
     for (const Feature* feature : graph.Features()) {
       if (feature->type->name != "segment" || feature->is_virtual) continue;
-      Wall wall;
-      wall.id = feature->id;
-      wall.pose = Pose2(feature->parameters[0], feature->parameters[1],
-                        feature->parameters[2]);
-      wall.begin = feature->extent_begin;
-      wall.end = feature->extent_end;
-      Insert(wall);
+      Insert(MakeWall(feature->id,
+                      Pose2(feature->parameters[0], feature->parameters[1],
+                            feature->parameters[2]),
+                      feature->extent_begin, feature->extent_end));
     }
     num_known_ = walls_.size();
   }
@@ -44,24 +46,20 @@ class WallIndex {
   void Insert(const Wall& wall) {
     walls_.push_back(wall);
     const int i = static_cast<int>(walls_.size()) - 1;
-    {
-      const double c = std::cos(wall.pose[2]);
-      const double s = std::sin(wall.pose[2]);
-      const double begin = wall.begin - reach_;
-      const double end = wall.end + reach_;
-      const int steps =
-          static_cast<int>(std::ceil((end - begin) / (0.5 * kIndexCell)));
-      for (int k = 0; k <= steps; ++k) {
-        const double t = begin + (end - begin) * k / std::max(1, steps);
-        const auto column = static_cast<std::int64_t>(
-            std::floor((wall.pose[0] + t * c) / kIndexCell));
-        const auto row = static_cast<std::int64_t>(
-            std::floor((wall.pose[1] + t * s) / kIndexCell));
-        for (int dy = -1; dy <= 1; ++dy) {
-          for (int dx = -1; dx <= 1; ++dx) {
-            std::vector<int>& cell = cells_[CellKey(column + dx, row + dy)];
-            if (cell.empty() || cell.back() != i) cell.push_back(i);
-          }
+    const double begin = wall.begin - reach_;
+    const double end = wall.end + reach_;
+    const int steps =
+        static_cast<int>(std::ceil((end - begin) / (0.5 * kIndexCell)));
+    for (int k = 0; k <= steps; ++k) {
+      const double t = begin + (end - begin) * k / std::max(1, steps);
+      const auto column = static_cast<std::int64_t>(
+          std::floor((wall.pose[0] + t * wall.direction.x()) / kIndexCell));
+      const auto row = static_cast<std::int64_t>(
+          std::floor((wall.pose[1] + t * wall.direction.y()) / kIndexCell));
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          std::vector<int>& cell = cells_[CellKey(column + dx, row + dy)];
+          if (cell.empty() || cell.back() != i) cell.push_back(i);
         }
       }
     }
@@ -74,8 +72,8 @@ class WallIndex {
     if (found == cells_.end()) return false;
     for (int index : found->second) {
       const Wall& wall = walls_[index];
-      const double c = std::cos(wall.pose[2]);
-      const double s = std::sin(wall.pose[2]);
+      const double c = wall.direction.x();
+      const double s = wall.direction.y();
       const double dx = point.x() - wall.pose[0];
       const double dy = point.y() - wall.pose[1];
       if (std::abs(-s * dx + c * dy) > offset) continue;
@@ -107,7 +105,7 @@ struct Cell {
   double straightness = 0.0;
   bool used = false;
 
-  Eigen::Vector2d mean() const { return sum / returns; }
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
 };
 
 // Total least squares line through cells, each with the weight of its returns.
@@ -236,7 +234,8 @@ class Completion {
   void FillBuckets() {
     bucket_size_ = std::max(options_.normal_radius, options_.max_gap);
     for (std::size_t i = 0; i < cells_.size(); ++i) {
-      const Eigen::Vector2d p = cells_[i].mean() / bucket_size_;
+      cells_[i].mean = cells_[i].sum / cells_[i].returns;
+      const Eigen::Vector2d p = cells_[i].mean / bucket_size_;
       buckets_[CellKey(static_cast<std::int64_t>(std::floor(p.x())),
                        static_cast<std::int64_t>(std::floor(p.y())))]
           .push_back(static_cast<int>(i));
@@ -255,8 +254,7 @@ class Completion {
         const auto found = buckets_.find(CellKey(column + dx, row + dy));
         if (found == buckets_.end()) continue;
         for (int index : found->second) {
-          if ((cells_[index].mean() - center).squaredNorm() <=
-              radius * radius) {
+          if ((cells_[index].mean - center).squaredNorm() <= radius * radius) {
             function(index);
           }
         }
@@ -268,9 +266,9 @@ class Completion {
     for (Cell& cell : cells_) {
       Fit fit;
       int count = 0;
-      const Eigen::Vector2d origin = cell.mean();
+      const Eigen::Vector2d origin = cell.mean;
       ForNeighbors(origin, options_.normal_radius, [&](int index) {
-        fit.Add(cells_[index].mean() - origin, 1.0);
+        fit.Add(cells_[index].mean - origin, 1.0);
         ++count;
       });
       if (count < 4) continue;
@@ -290,7 +288,7 @@ class Completion {
     in.resize(cells_.size(), 0);
     in[seed] = 1;
     Fit fit;
-    const Eigen::Vector2d origin = cells_[seed].mean();
+    const Eigen::Vector2d origin = cells_[seed].mean;
     fit.Add(Eigen::Vector2d::Zero(), 1.0);
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     Eigen::Vector2d direction = cells_[seed].direction;
@@ -298,7 +296,7 @@ class Completion {
     const double cos_turn = std::cos(options_.max_turn);
     const double reach_across = 2.5 * scatter_;
     for (std::size_t k = 0; k < members.size(); ++k) {
-      const Eigen::Vector2d center = cells_[members[k]].mean();
+      const Eigen::Vector2d center = cells_[members[k]].mean;
       ForNeighbors(center, options_.max_gap, [&](int index) {
         Cell& other = cells_[index];
         if (in[index] || other.used) return;
@@ -308,7 +306,7 @@ class Completion {
             std::abs(other.direction.dot(direction)) < cos_turn) {
           return;
         }
-        const Eigen::Vector2d d = other.mean() - origin - mean;
+        const Eigen::Vector2d d = other.mean - origin - mean;
         if (std::abs(direction.x() * d.y() - direction.y() * d.x()) >
             reach_across) {
           return;
@@ -316,7 +314,7 @@ class Completion {
         in[index] = 1;
         marked.push_back(index);
         members.push_back(index);
-        fit.Add(other.mean() - origin, 1.0);
+        fit.Add(other.mean - origin, 1.0);
       });
       if (members.size() >= 6) fit.Solve(&mean, &direction, &across, &along);
     }
@@ -328,12 +326,12 @@ class Completion {
     int returns = 0;
     std::vector<int> on;
     for (int index : members) {
-      const Eigen::Vector2d d = cells_[index].mean() - origin - mean;
+      const Eigen::Vector2d d = cells_[index].mean - origin - mean;
       if (std::abs(direction.x() * d.y() - direction.y() * d.x()) >
           reach_across) {
         continue;
       }
-      final_fit.Add(cells_[index].mean() - origin, cells_[index].returns);
+      final_fit.Add(cells_[index].mean - origin, cells_[index].returns);
       returns += cells_[index].returns;
       on.push_back(index);
     }
@@ -343,7 +341,7 @@ class Completion {
     std::vector<double> places;
     Eigen::Vector2d view = Eigen::Vector2d::Zero();
     for (int index : on) {
-      places.push_back(direction.dot(cells_[index].mean() - origin - mean));
+      places.push_back(direction.dot(cells_[index].mean - origin - mean));
       view += cells_[index].view;
     }
     std::sort(places.begin(), places.end());
@@ -388,7 +386,7 @@ class Completion {
       const Eigen::Vector2d center =
           point + (begin + std::min(end - begin, k * step)) * direction;
       ForNeighbors(center, bucket_size_, [&](int index) {
-        const Eigen::Vector2d d = cells_[index].mean() - point;
+        const Eigen::Vector2d d = cells_[index].mean - point;
         const double along = direction.dot(d);
         if (std::abs(direction.x() * d.y() - direction.y() * d.x()) <=
                 options_.explained_offset &&
@@ -440,7 +438,7 @@ class Completion {
       constraint.source = "wall_completion";
       transaction_.AddConstraint(std::move(constraint));
     }
-    index_.Insert({id, pose, -0.5 * length, 0.5 * length});
+    index_.Insert(MakeWall(id, pose, -0.5 * length, 0.5 * length));
   }
 
   const Registry& registry_;

@@ -93,20 +93,17 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
                               options.loss_scale * options.loss_scale);
   std::vector<std::vector<WallVote>> votes(places.size());
   ParallelFor(places.size(), options.num_threads, [&](std::size_t k) {
-    const Pose2& pose = poses[k];
-    const double c = std::cos(pose[2]);
-    const double s = std::sin(pose[2]);
+    const PoseTransform transform(poses[k]);
     const double share =
         options.independence / (options.point_sigma * options.point_sigma *
                                 std::max(1, places[k].num_scans));
     std::map<FeatureId, WallVote> of_wall;
     for (const ScanPoint& point : places[k].returns) {
       if (point.normal.squaredNorm() == 0.0) continue;
-      const Eigen::Vector2d position = TransformPoint(pose, point.position);
+      const Eigen::Vector2d position = transform.Point(point.position);
       const std::vector<int>* near = grid.Near(position);
       if (near == nullptr) continue;
-      const Eigen::Vector2d normal(c * point.normal.x() - s * point.normal.y(),
-                                   s * point.normal.x() + c * point.normal.y());
+      const Eigen::Vector2d normal = transform.Direction(point.normal);
       double best = options.max_offset;
       FeatureId hit = kNoId;
       for (const int index : *near) {

@@ -327,6 +327,39 @@ TEST_F(SameWallTest, AFalseClosureByHandIsBrokenAndTheMapReturns) {
   ExpectState(before, 2e-3);
 }
 
+TEST_F(SameWallTest, AClosedLoopIsNoLongWay) {
+  // The search is wide after a way of 80 m and narrow after one of a few, and
+  // no evidence is enough in a wide one.
+  const DetectorParameters parameters = {
+      {"drift_rate", 0.02}, {"known_sigma", 0.0}, {"min_evidence", 1e9}};
+  const int once = static_cast<int>(Round(20.0, 4).size());
+  const int side = static_cast<int>(Round(20.0, 1).size());
+  Walk(Round(20.0, 6), Pose2::Zero(), Pose2::Zero());
+  const auto close = [&](int wall) {
+    Constraint closure;
+    closure.type = &registry_.GetRelation(kSameWallRelation);
+    closure.features = {seen_[wall], seen_[wall + once]};
+    closure.expected = Eigen::VectorXd::Zero(2);
+    closure.information = 400.0 * Eigen::MatrixXd::Identity(2, 2);
+    closure.kind = ConstraintClass::kStructure;
+    closure.source = "by hand";
+    Transaction transaction;
+    transaction.AddConstraint(closure);
+    graph_.Apply(std::move(transaction));
+  };
+  EXPECT_TRUE(Detect(parameters).empty());
+  // One direction leaves the way along the corridor open.
+  close(side - 1);
+  EXPECT_TRUE(Detect(parameters).empty());
+  close(side);
+  const Transaction found = Detect(parameters);
+  EXPECT_GT(found.added_constraints().size(), 5u);
+  for (const Constraint& constraint : found.added_constraints()) {
+    EXPECT_TRUE(IsOneWall(constraint.features[0], constraint.features[1]))
+        << constraint.features[0] << " " << constraint.features[1];
+  }
+}
+
 TEST_F(SameWallTest, TheFacesOfAWallAreNotOne) {
   // Round a thin wall and back on its other side.
   std::vector<Face> faces;

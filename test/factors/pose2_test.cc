@@ -41,6 +41,15 @@ TEST(Pose2Test, BetweenByHand) {
              Pose2(2.0, 1.0, kPi / 2), 1e-15);
 }
 
+TEST(Pose2Test, TransformsPointsAndDirectionsByHand) {
+  const PoseTransform transform(Pose2(1.0, 2.0, M_PI / 2));
+  EXPECT_NEAR((transform.Point({3.0, 4.0}) - Eigen::Vector2d(-3.0, 5.0)).norm(),
+              0.0, 1e-15);
+  EXPECT_NEAR(
+      (transform.Direction({3.0, 4.0}) - Eigen::Vector2d(-4.0, 3.0)).norm(),
+      0.0, 1e-15);
+}
+
 TEST(Pose2Test, HeadingsAreWrapped) {
   EXPECT_DOUBLE_EQ(Compose(Pose2(0, 0, 3.0), Pose2(0, 0, 1.0))[2],
                    4.0 - 2.0 * kPi);

@@ -3,7 +3,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include "frontend/synthetic_world.h"
@@ -245,6 +247,67 @@ TEST(ScanMatcherTest, TurnedWorldTurnsTheResult) {
   const Pose2 back = Compose(Inverse(turn), match.pose);
   EXPECT_LT(PositionError(back, truth), 0.005);
   EXPECT_LT(HeadingError(back, truth), DegToRad(0.1));
+}
+
+TEST(ScanMatcherTest, OverlapByTryingEveryReferencePoint) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> place(-2.0, 2.0);
+  std::uniform_real_distribution<double> heading(-M_PI, M_PI);
+  const auto cloud = [&](int count, double spread) {
+    std::vector<ScanPoint> points(count, ScanPoint());
+    for (ScanPoint& point : points) {
+      const double angle = heading(random);
+      point.position = {spread * place(random), spread * place(random)};
+      point.normal = {std::cos(angle), std::sin(angle)};
+    }
+    return points;
+  };
+  const ScanMatcherOptions options = Options();
+  for (int round = 0; round < 50; ++round) {
+    const std::vector<ScanPoint> reference = cloud(1 + 2 * round, 1.0);
+    // Also beyond the reference's bounds.
+    const std::vector<ScanPoint> scan = cloud(100, 1.6);
+    const Pose2 pose(place(random), place(random), heading(random));
+    ScanMatcher matcher(options);
+    matcher.SetReference(reference);
+    int found = 0;
+    for (const ScanPoint& point : Transformed(scan, pose)) {
+      found += std::any_of(reference.begin(), reference.end(),
+                           [&](const ScanPoint& other) {
+                             return (other.position - point.position).norm() <
+                                        options.initial_radius &&
+                                    other.normal.dot(point.normal) >= 0.7;
+                           });
+    }
+    EXPECT_DOUBLE_EQ(matcher.Overlap(scan, pose), found / 100.0) << round;
+  }
+}
+
+TEST(ScanMatcherTest, RefineTakesTheNearestReferencePoint) {
+  // Lines of points one behind the other, at distances that fall into the same
+  // and into other buckets: one step of least squares without a prior goes
+  // onto the nearest.
+  for (const double nearest : {0.01, 0.07, 0.13, 0.21, 0.3, 0.38}) {
+    std::vector<ScanPoint> reference, scan;
+    for (int i = 0; i < 40; ++i) {
+      ScanPoint point = {};
+      point.position = {0.1 * i, 0.0};
+      point.normal = {0.0, 1.0};
+      scan.push_back(point);
+      for (const double offset : {nearest, nearest + 0.5, -nearest - 0.005}) {
+        point.position.y() = offset;
+        reference.push_back(point);
+      }
+    }
+    ScanMatcherOptions options = Options();
+    options.max_iterations = 1;
+    ScanMatcher matcher(options);
+    matcher.SetReference(reference);
+    const MatchResult result =
+        matcher.Refine(scan, Pose2::Zero(), MatchPrior());
+    EXPECT_EQ(result.inliers, 40);
+    EXPECT_NEAR(result.pose[1], nearest, 1e-6) << nearest;
+  }
 }
 
 TEST(ScanMatcherTest, EmptyReferenceLeavesTheGuess) {

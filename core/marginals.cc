@@ -353,11 +353,13 @@ struct Marginals::Impl {
   // and what nobody wants, is not computed: substitution goes up the
   // elimination tree from the sources and comes down to what is wanted, which
   // in a thin graph is a small part of the factor.
-  Eigen::MatrixXd SolveAt(const Eigen::MatrixXd& right,
-                          const std::vector<const Entry*>& sources,
-                          const std::vector<const Entry*>& wanted) const {
+  // `Right` has a fixed number of columns where the caller knows it.
+  template <typename Right>
+  Right SolveAt(const Right& right, const std::vector<const Entry*>& sources,
+                const std::vector<const Entry*>& wanted) const {
+    constexpr int kColumns = Right::ColsAtCompileTime;
     using RowMajor =
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+        Eigen::Matrix<double, Eigen::Dynamic, kColumns, Eigen::RowMajor>;
     const auto& factor = ldlt.matrixL().nestedExpression();
     const Eigen::VectorXd& pivots = ldlt.vectorD();
     const auto& position = ldlt.permutationP().indices();
@@ -396,7 +398,7 @@ struct Marginals::Impl {
         x.row(j) -= values[p] * x.row(rows[p]);
       }
     }
-    Eigen::MatrixXd solved = Eigen::MatrixXd::Zero(columns, right.cols());
+    Right solved = Right::Zero(columns, right.cols());
     for (const auto* list : {&sources, &wanted}) {
       for (const Entry* entry : *list) {
         for (int r = 0; entry->column >= 0 && r < entry->tangent_size; ++r) {
@@ -593,10 +595,11 @@ std::vector<Eigen::Matrix3d> Marginals::RelativeCovariances(
   for (const FeatureId id : to) impl_->CheckRelative(from, id);
   impl_->ComputeBlocks(to);
   const Impl::Entry& a = impl_->Get(from);
-  Eigen::MatrixXd columns;
+  using ThreeColumns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+  ThreeColumns columns;
   Eigen::Matrix3d own = Eigen::Matrix3d::Zero();
   if (a.column >= 0) {
-    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(impl_->columns, 3);
+    ThreeColumns right = ThreeColumns::Zero(impl_->columns, 3);
     right.middleRows(a.column, a.tangent_size) = a.lift.transpose();
     std::vector<const Impl::Entry*> wanted = {&a};
     for (const FeatureId id : to) wanted.push_back(&impl_->Get(id));

@@ -11,7 +11,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <queue>
 #include <set>
 #include <utility>
 #include <vector>
@@ -51,6 +50,11 @@ struct Place {
   int anchor = -1;
   Vector2d center = Vector2d::Zero();
   std::vector<int> walls;
+};
+
+struct Way {
+  int to = -1;
+  double length = 0.0;  // m
 };
 
 // Everything that a call to Detect knows.
@@ -215,36 +219,50 @@ class Search {
   }
 
   void MakeWays() {
-    ways_ = links_;
+    std::vector<Pair> shortcuts;
     for (const Pair& closure : closures_) {
       if (!HoldsTwoDirections(closure)) continue;
-      const double way =
-          (walls_[closure.first].position - walls_[closure.second].position)
-              .norm();
-      ways_[closure.first].push_back({closure.second, way});
-      ways_[closure.second].push_back({closure.first, way});
+      shortcuts.push_back(closure);
+      shortcuts.push_back({closure.second, closure.first});
+    }
+    std::sort(shortcuts.begin(), shortcuts.end());
+    auto shortcut = shortcuts.begin();
+    ways_begin_ = {0};
+    for (int i = 0; i < static_cast<int>(walls_.size()); ++i) {
+      for (const auto& link : links_[i]) {
+        ways_.push_back({link.first, link.second});
+      }
+      for (; shortcut != shortcuts.end() && shortcut->first == i; ++shortcut) {
+        const int j = shortcut->second;
+        ways_.push_back({j, (walls_[i].position - walls_[j].position).norm()});
+      }
+      ways_begin_.push_back(static_cast<int>(ways_.size()));
     }
   }
 
   // Way along measurement links from a wall to every other, m. Closures that
   // hold two directions are links too: the way round a loop that is closed adds
   // nothing to what its ends do not know of each other.
-  std::vector<double> WaysFrom(int wall) const {
+  std::vector<double> WaysFrom(int wall) {
     std::vector<double> ways(walls_.size(),
                              std::numeric_limits<double>::infinity());
-    using Entry = std::pair<double, int>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
+    const auto is_farther = [](const Way& a, const Way& b) {
+      return a.length > b.length;
+    };
     ways[wall] = 0.0;
-    queue.push({0.0, wall});
-    while (!queue.empty()) {
-      const Entry entry = queue.top();
-      queue.pop();
-      if (entry.first > ways[entry.second]) continue;
-      for (const auto& link : ways_[entry.second]) {
-        const double way = entry.first + link.second;
-        if (way < ways[link.first]) {
-          ways[link.first] = way;
-          queue.push({way, link.first});
+    queue_.assign(1, {wall, 0.0});
+    while (!queue_.empty()) {
+      std::pop_heap(queue_.begin(), queue_.end(), is_farther);
+      const Way nearest = queue_.back();
+      queue_.pop_back();
+      if (nearest.length > ways[nearest.to]) continue;
+      for (int k = ways_begin_[nearest.to]; k < ways_begin_[nearest.to + 1];
+           ++k) {
+        const Way way = {ways_[k].to, nearest.length + ways_[k].length};
+        if (way.length < ways[way.to]) {
+          ways[way.to] = way.length;
+          queue_.push_back(way);
+          std::push_heap(queue_.begin(), queue_.end(), is_farther);
         }
       }
     }
@@ -271,32 +289,33 @@ class Search {
     return prior;
   }
 
-  // How well each place is known in the frame of its part of the graph.
+  // How well each place that there is a way from to another is known in the
+  // frame of its part of the graph.
   void MeasureAnchors() {
-    std::vector<FeatureId> anchors;
-    for (const Place& place : places_) {
-      const FeatureId id = walls_[place.anchor].id;
-      if (IsTied(id)) anchors.push_back(id);
+    DisjointSets reached(walls_.size());
+    for (std::size_t i = 0; i < walls_.size(); ++i) {
+      for (int k = ways_begin_[i]; k < ways_begin_[i + 1]; ++k) {
+        reached.Join(i, static_cast<std::size_t>(ways_[k].to));
+      }
     }
-    marginals_.Compute(anchors);
+    std::vector<int> places_in(walls_.size(), 0);
+    for (const Place& place : places_) ++places_in[reached.Find(place.anchor)];
+    std::vector<FeatureId> anchors(places_.size(), kNoId);
+    std::vector<FeatureId> wanted;
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (places_in[reached.Find(places_[p].anchor)] < 2) continue;
+      anchors[p] = walls_[places_[p].anchor].id;
+      wanted.push_back(anchors[p]);
+    }
+    marginals_.Compute(wanted);
     sigmas_.assign(places_.size(), {0.0, 0.0});
     for (std::size_t p = 0; p < places_.size(); ++p) {
-      const FeatureId id = walls_[places_[p].anchor].id;
-      if (!IsTied(id)) continue;
-      const Eigen::MatrixXd covariance = marginals_.Covariance(id);
+      if (anchors[p] == kNoId) continue;
+      const Eigen::MatrixXd covariance = marginals_.Covariance(anchors[p]);
       sigmas_[p] = {
           std::sqrt(std::max(0.0, covariance(0, 0) + covariance(1, 1))),
           std::sqrt(std::max(0.0, covariance(2, 2)))};
     }
-  }
-
-  bool IsTied(FeatureId id) const {
-    const auto& constraints = graph_.ConstraintsOf(id);
-    return std::any_of(constraints.begin(), constraints.end(),
-                       [&](ConstraintId constraint) {
-                         return graph_.GetConstraint(constraint).state ==
-                                ConstraintState::kLive;
-                       });
   }
 
   // No more than this is unknown of the second place's position seen from the
@@ -534,8 +553,11 @@ class Search {
   std::map<FeatureId, int> index_;
   // Of each wall the walls that measurements tie it to and how far they are.
   std::vector<std::vector<std::pair<int, double>>> links_;
-  // The same with the closures that lead from one place to another.
-  std::vector<std::vector<std::pair<int, double>>> ways_;
+  // The same with the closures that lead from one place to another, one wall's
+  // after the other's.
+  std::vector<Way> ways_;
+  std::vector<int> ways_begin_;
+  std::vector<Way> queue_;
   std::vector<Pair> closures_;
   std::set<Pair> broken_;
   // Walls that closures make one, and features that anything connects, by id.

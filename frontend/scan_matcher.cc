@@ -13,6 +13,9 @@ namespace {
 // the grids, m.
 constexpr double kReferenceReach = 120.0;
 
+// No grid goes so far; fits an integer.
+constexpr double kFarthestBucket = 1e9;
+
 // Distance at which a return's likelihood in the search has fallen to
 // exp(-1/2), in cells.
 constexpr double kFieldSigmaCells = 1.0;
@@ -93,7 +96,6 @@ int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
   // Of two at the same distance the first of the reference, whatever the order
   // of the search.
   const auto look = [&](int row, int column_begin, int column_end) {
-    column_begin = std::max(0, column_begin);
     column_end = std::min(bucket_columns_ - 1, column_end);
     if (column_begin > column_end) return;
     const int base = row * bucket_columns_;
@@ -110,15 +112,16 @@ int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
       best = i;
     }
   };
+  // Of coordinates left of the first bucket the first.
+  const double buckets_per_metre = 1.0 / bucket_size_;
   const auto cell = [&](double value) {
-    return static_cast<int>(std::floor(value / bucket_size_));
+    return static_cast<int>(
+        std::clamp(value * buckets_per_metre, 0.0, kFarthestBucket));
   };
   // The point's own bucket first: what it holds narrows the rest.
   const int own_row = cell(local.y());
   const int own_column = cell(local.x());
-  if (own_row >= 0 && own_row < bucket_rows_) {
-    look(own_row, own_column, own_column);
-  }
+  if (own_row < bucket_rows_) look(own_row, own_column, own_column);
   // Rows outwards from there.
   const int row_begin = std::max(0, cell(local.y() - radius));
   const int row_end = std::min(bucket_rows_ - 1, cell(local.y() + radius));

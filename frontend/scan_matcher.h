@@ -88,13 +88,14 @@ class ScanMatcher {
                double* score) const;
 
  private:
+  // Index of the nearest reference point whose normal agrees, -1 for none.
   int NearestReference(const Eigen::Vector2d& point,
                        const Eigen::Vector2d& normal, double radius) const;
 
   ScanMatcherOptions options_;
   std::vector<ScanPoint> reference_;
   // Buckets of reference points, by counting sort over cells.
-  double bucket_size_ = 0.2;
+  double bucket_size_ = 0.1;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   int bucket_columns_ = 0;
   int bucket_rows_ = 0;

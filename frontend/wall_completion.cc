@@ -44,6 +44,7 @@ class WallIndex {
   }
 
   void Insert(const Wall& wall) {
+    has_last_ = false;
     walls_.push_back(wall);
     const int i = static_cast<int>(walls_.size()) - 1;
     const double begin = wall.begin - reach_;
@@ -65,12 +66,19 @@ class WallIndex {
     }
   }
 
-  bool Explains(const Eigen::Vector2d& point, double offset, double gap) const {
-    const auto found = cells_.find(
+  bool Explains(const Eigen::Vector2d& point, double offset, double gap) {
+    const std::int64_t key =
         CellKey(static_cast<std::int64_t>(std::floor(point.x() / kIndexCell)),
-                static_cast<std::int64_t>(std::floor(point.y() / kIndexCell))));
-    if (found == cells_.end()) return false;
-    for (int index : found->second) {
+                static_cast<std::int64_t>(std::floor(point.y() / kIndexCell)));
+    // Neighbouring returns mostly fall into one cell.
+    if (!has_last_ || key != last_key_) {
+      const auto found = cells_.find(key);
+      last_ = found == cells_.end() ? nullptr : &found->second;
+      last_key_ = key;
+      has_last_ = true;
+    }
+    if (last_ == nullptr) return false;
+    for (int index : *last_) {
       const Wall& wall = walls_[index];
       const double c = wall.direction.x();
       const double s = wall.direction.y();
@@ -92,6 +100,10 @@ class WallIndex {
   std::size_t num_known_ = 0;
   std::vector<Wall> walls_;
   std::unordered_map<std::int64_t, std::vector<int>> cells_;
+  // The cell asked for last.
+  bool has_last_ = false;
+  std::int64_t last_key_ = 0;
+  const std::vector<int>* last_ = nullptr;
 };
 
 // Returns gathered in one cell.
@@ -217,8 +229,8 @@ class Completion {
             std::floor(point.x() / options_.cell_size));
         const auto row = static_cast<std::int64_t>(
             std::floor(point.y() / options_.cell_size));
-        const auto inserted = cell_of_.emplace(CellKey(column, row),
-                                               static_cast<int>(cells_.size()));
+        const auto inserted = cell_of_.try_emplace(
+            CellKey(column, row), static_cast<int>(cells_.size()));
         if (inserted.second) {
           cells_.emplace_back();
         }
@@ -238,7 +250,7 @@ class Completion {
       const Eigen::Vector2d p = cells_[i].mean / bucket_size_;
       buckets_[CellKey(static_cast<std::int64_t>(std::floor(p.x())),
                        static_cast<std::int64_t>(std::floor(p.y())))]
-          .push_back(static_cast<int>(i));
+          .push_back({cells_[i].mean, static_cast<int>(i)});
     }
   }
 
@@ -253,8 +265,8 @@ class Completion {
       for (int dx = -1; dx <= 1; ++dx) {
         const auto found = buckets_.find(CellKey(column + dx, row + dy));
         if (found == buckets_.end()) continue;
-        for (int index : found->second) {
-          if ((cells_[index].mean - center).squaredNorm() <= radius * radius) {
+        for (const auto& [mean, index] : found->second) {
+          if ((mean - center).squaredNorm() <= radius * radius) {
             function(index);
           }
         }
@@ -448,7 +460,9 @@ class Completion {
   std::unordered_map<std::int64_t, int> cell_of_;
   double scatter_ = 0.0;
   double bucket_size_ = 0.0;
-  std::unordered_map<std::int64_t, std::vector<int>> buckets_;
+  // Means of cells and their indices.
+  std::unordered_map<std::int64_t, std::vector<std::pair<Eigen::Vector2d, int>>>
+      buckets_;
   std::vector<char> in_;
   Transaction transaction_;
 };

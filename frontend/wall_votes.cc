@@ -60,21 +60,22 @@ class WallGrid {
     }
   }
 
-  const std::vector<int>* Near(const Eigen::Vector2d& point) const {
-    const auto found = cells_.find(Key(point));
+  using Cell = std::pair<std::int64_t, std::int64_t>;
+
+  static Cell Key(const Eigen::Vector2d& point) {
+    return {static_cast<std::int64_t>(std::floor(point.x() / kCell)),
+            static_cast<std::int64_t>(std::floor(point.y() / kCell))};
+  }
+  // Null where no wall is.
+  const std::vector<int>* In(const Cell& cell) const {
+    const auto found = cells_.find(cell);
     return found == cells_.end() ? nullptr : &found->second;
   }
   const Wall& wall(int index) const { return walls_[index]; }
 
  private:
-  static std::pair<std::int64_t, std::int64_t> Key(
-      const Eigen::Vector2d& point) {
-    return {static_cast<std::int64_t>(std::floor(point.x() / kCell)),
-            static_cast<std::int64_t>(std::floor(point.y() / kCell))};
-  }
-
   std::vector<Wall> walls_;
-  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<int>> cells_;
+  std::map<Cell, std::vector<int>> cells_;
 };
 
 }  // namespace
@@ -98,10 +99,17 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
         options.independence / (options.point_sigma * options.point_sigma *
                                 std::max(1, places[k].num_scans));
     std::map<FeatureId, WallVote> of_wall;
+    // Neighbouring returns mostly fall into one cell.
+    WallGrid::Cell cell = WallGrid::Key(poses[k].head<2>());
+    const std::vector<int>* near = grid.In(cell);
     for (const ScanPoint& point : places[k].returns) {
       if (point.normal.squaredNorm() == 0.0) continue;
       const Eigen::Vector2d position = transform.Point(point.position);
-      const std::vector<int>* near = grid.Near(position);
+      const WallGrid::Cell own = WallGrid::Key(position);
+      if (own != cell) {
+        cell = own;
+        near = grid.In(cell);
+      }
       if (near == nullptr) continue;
       const Eigen::Vector2d normal = transform.Direction(point.normal);
       double best = options.max_offset;

@@ -47,6 +47,7 @@ inline Pose2 Between(const Pose2& p1, const Pose2& p2) {
 /// `pose` is given; for many of them, as its sine and cosine are taken once.
 class PoseTransform {
  public:
+  /// Of the frame with this origin (m) and heading (rad).
   explicit PoseTransform(const Pose2& pose)
       : position_(pose[0], pose[1]),
         cosine_(std::cos(pose[2])),

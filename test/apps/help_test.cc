@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/shell.h"
+
 namespace plumbline {
 namespace {
 
@@ -30,14 +32,8 @@ std::vector<std::string> Lines(const std::string& text) {
 
 // Output of a command on both streams.
 std::string OutputOf(const std::string& command, int* status) {
-  FILE* const pipe = popen((command + " 2>&1").c_str(), "r");
   std::string output;
-  char buffer[4096];
-  std::size_t count;
-  while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0) {
-    output.append(buffer, count);
-  }
-  *status = pclose(pipe);
+  *status = RunInShell(command, &output);
   return output;
 }
 

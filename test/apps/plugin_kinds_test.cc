@@ -2,16 +2,16 @@
 // name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 #include <string>
+
+#include "apps/shell.h"
 
 namespace plumbline {
 namespace {
@@ -32,20 +32,12 @@ class PluginKindsTest : public ::testing::Test {
 
   // Everything that the run prints goes to `output`.
   static int Solve(const std::string& arguments, std::string* output) {
-    FILE* const pipe =
-        popen((PLUMBLINE_BIN_DIR "/plumbline_solve --odometry_refinement=false "
-                                 "--plugins=" PLUMBLINE_TEST_PLUGIN_DIR
-                                 "/plain_log.so " +
-               arguments + " 2>&1")
-                  .c_str(),
-              "r");
-    char buffer[4096];
-    std::size_t count;
-    output->clear();
-    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0)
-      output->append(buffer, count);
-    const int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return RunInShell(PLUMBLINE_BIN_DIR
+                          "/plumbline_solve --odometry_refinement=false "
+                          "--plugins=" PLUMBLINE_TEST_PLUGIN_DIR
+                          "/plain_log.so " +
+                          arguments,
+                      output);
   }
 
   std::string Read(const std::string& name) const {

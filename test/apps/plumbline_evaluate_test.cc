@@ -1,12 +1,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "apps/shell.h"
 
 namespace plumbline {
 namespace {
@@ -46,14 +46,7 @@ class EvaluateTest : public ::testing::Test {
   }
 
   int Run(const std::string& arguments, std::string* output) {
-    FILE* const pipe = popen((binary_ + arguments + " 2>&1").c_str(), "r");
-    char buffer[4096];
-    std::size_t count;
-    output->clear();
-    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0)
-      output->append(buffer, count);
-    const int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return RunInShell(binary_ + arguments, output);
   }
 
   std::string binary_;

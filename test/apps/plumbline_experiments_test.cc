@@ -5,15 +5,15 @@
 #include <plumbline/apps/synthetic_worlds.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/graph_g2o.h>
-#include <sys/wait.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+
+#include "apps/shell.h"
 
 namespace plumbline {
 namespace {
@@ -44,18 +44,9 @@ class ExperimentsBinaryTest : public ::testing::Test {
 
   // Runs a command line with the binary's folder put before it.
   static int Run(const std::string& command, std::string* output) {
-    const std::string line = "env -u PLUMBLINE_DATASETS " +
-                             std::string(PLUMBLINE_BIN_DIR) + "/" + command +
-                             " 2>&1";
-    FILE* const pipe = popen(line.c_str(), "r");
-    char buffer[4096];
-    std::size_t count;
-    output->clear();
-    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0) {
-      output->append(buffer, count);
-    }
-    const int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return RunInShell("env -u PLUMBLINE_DATASETS " +
+                          std::string(PLUMBLINE_BIN_DIR) + "/" + command,
+                      output);
   }
 
   std::string folder_;

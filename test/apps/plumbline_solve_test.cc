@@ -27,6 +27,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/shell.h"
 #include "detectors/hierarchy_worlds.h"
 
 namespace plumbline {
@@ -137,15 +138,7 @@ class SolveTest : public ::testing::Test {
 
   // Everything that the run prints goes to `output`.
   int Run(const std::string& arguments, std::string* output) {
-    FILE* const pipe =
-        popen((binary_ + " " + arguments + " 2>&1").c_str(), "r");
-    char buffer[4096];
-    std::size_t count;
-    output->clear();
-    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0)
-      output->append(buffer, count);
-    const int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return RunInShell(binary_ + " " + arguments, output);
   }
 
   int Solve(const std::string& input, const std::string& out,

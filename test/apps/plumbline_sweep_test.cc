@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -18,6 +17,8 @@
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "apps/shell.h"
 
 namespace plumbline {
 namespace {
@@ -78,16 +79,7 @@ echo "{\"y\": $((x * x)).$seed, \"input\": \"i\"}" > $out/summary.json
   }
 
   int Run(const std::string& arguments, std::string* output) {
-    FILE* const pipe =
-        popen((binary_ + " " + arguments + " 2>&1").c_str(), "r");
-    char buffer[4096];
-    std::size_t count;
-    output->clear();
-    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0) {
-      output->append(buffer, count);
-    }
-    const int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return RunInShell(binary_ + " " + arguments, output);
   }
 
   pid_t Start(const std::vector<std::string>& flags) {

@@ -25,6 +25,8 @@
 #include <thread>
 #include <vector>
 
+#include "apps/shell.h"
+
 namespace plumbline {
 namespace {
 
@@ -128,23 +130,10 @@ echo "{\"y\": $x.$seed}" > $out/summary.json
             std::istreambuf_iterator<char>()};
   }
 
-  // With what it prints; commands are the test's own, for a shell.
-  static int Shell(const std::string& command, std::string* output) {
-    FILE* const pipe = popen(("(" + command + ") 2>&1").c_str(), "r");
-    char buffer[4096];
-    std::size_t count;
-    output->clear();
-    while ((count = fread(buffer, 1, sizeof(buffer), pipe)) > 0) {
-      output->append(buffer, count);
-    }
-    const int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-
   bool WaitFor(const std::string& command, const std::string& text) {
     std::string output;
     for (int i = 0; i < 300; ++i) {
-      Shell(command, &output);
+      RunInShell(command, &output);
       if (output.find(text) != std::string::npos) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
@@ -158,12 +147,12 @@ echo "{\"y\": $x.$seed}" > $out/summary.json
         "cd " + folder_ + " && PLUMBLINE_DATASETS=/data/sets " + binary_ +
         " --grid=x=1,2,3,slow --trials=3 --time_limit=3 --output_dir=";
     std::string output;
-    ASSERT_EQ(
-        Shell(sweep + "there --jobs=4 " + flags + " -- ./program.sh", &output),
-        0)
+    ASSERT_EQ(RunInShell(sweep + "there --jobs=4 " + flags + " -- ./program.sh",
+                         &output),
+              0)
         << output;
     EXPECT_THAT(output, HasSubstr("runs: 12; 6 done, 3 failed, 3 timed out"));
-    ASSERT_EQ(Shell(sweep + "here --jobs=6 -- ./program.sh", &output), 0)
+    ASSERT_EQ(RunInShell(sweep + "here --jobs=6 -- ./program.sh", &output), 0)
         << output;
     EXPECT_EQ(Read("there/sweep.csv"), Read("here/sweep.csv"));
     EXPECT_THAT(Read("there/sweep.csv"),
@@ -193,9 +182,10 @@ TEST_F(SweepLauncherTest, ParallelOverSshToTwoHosts) {
   }
   std::string output;
   for (const std::string key : {"host_key", "user_key"}) {
-    ASSERT_EQ(Shell("ssh-keygen -q -t ed25519 -N '' -f " + folder_ + "/" + key,
-                    &output),
-              0)
+    ASSERT_EQ(
+        RunInShell("ssh-keygen -q -t ed25519 -N '' -f " + folder_ + "/" + key,
+                   &output),
+        0)
         << output;
   }
   fs::copy(folder_ + "/user_key.pub", folder_ + "/authorized_keys");
@@ -244,11 +234,11 @@ TEST_F(SweepLauncherTest, ParallelOverSshToTwoHosts) {
   EXPECT_EQ(seen, (std::set<std::string>{"first-host", "second-host"}));
 
   // A host that is not there is said.
-  EXPECT_EQ(Shell("cd " + folder_ + " && " + binary_ +
-                      " --grid=x=1 --output_dir=no --launcher=parallel "
-                      "--hosts=no-such-host.invalid" +
-                      ssh + " -- ./program.sh",
-                  &output),
+  EXPECT_EQ(RunInShell("cd " + folder_ + " && " + binary_ +
+                           " --grid=x=1 --output_dir=no --launcher=parallel "
+                           "--hosts=no-such-host.invalid" +
+                           ssh + " -- ./program.sh",
+                       &output),
             2)
       << output;
   EXPECT_THAT(output, HasSubstr("hosts that ssh logs into without a question"));
@@ -261,7 +251,7 @@ TEST_F(SweepLauncherTest, SlurmOnOneNode) {
   char host[256] = {};
   gethostname(host, sizeof(host) - 1);
   std::string user;
-  ASSERT_EQ(Shell("id -un", &user), 0);
+  ASSERT_EQ(RunInShell("id -un", &user), 0);
   for (const char* name : {"state", "spool"}) {
     fs::create_directories(folder_ + "/" + name);
   }
@@ -327,19 +317,19 @@ TEST_F(SweepLauncherTest, SlurmOnOneNode) {
       EXPECT_EQ(WEXITSTATUS(status), 130);
     } else {
       ASSERT_TRUE(WIFSIGNALED(status));
-      Shell("squeue --noheader --format=%t", &output);
+      RunInShell("squeue --noheader --format=%t", &output);
       EXPECT_THAT(output, HasSubstr("R\n"));
       // The slow run again, with a limit.
-      EXPECT_EQ(Shell(binary_ +
-                          " --time_limit=1 --launcher=slurm "
-                          "--output_dir=" +
-                          folder_ + "/" + out,
-                      &output),
+      EXPECT_EQ(RunInShell(binary_ +
+                               " --time_limit=1 --launcher=slurm "
+                               "--output_dir=" +
+                               folder_ + "/" + out,
+                           &output),
                 0)
           << output;
       EXPECT_THAT(Read(out + "/sweep.csv"), HasSubstr("longer than 1 s"));
     }
-    Shell("squeue --noheader --states=R,PD", &output);
+    RunInShell("squeue --noheader --states=R,PD", &output);
     EXPECT_EQ(output, "");
   }
   unsetenv("SLURM_CONF");
@@ -347,14 +337,15 @@ TEST_F(SweepLauncherTest, SlurmOnOneNode) {
 
 TEST_F(SweepLauncherTest, SaysWhatIsMissing) {
   std::string output;
-  EXPECT_EQ(Shell("cd " + folder_ + " && PATH=/no/such " + binary_ +
-                      " --launcher=parallel --output_dir=out -- ./program.sh",
-                  &output),
-            2);
+  EXPECT_EQ(
+      RunInShell("cd " + folder_ + " && PATH=/no/such " + binary_ +
+                     " --launcher=parallel --output_dir=out -- ./program.sh",
+                 &output),
+      2);
   EXPECT_THAT(output, HasSubstr("parallel: cannot be run"));
-  EXPECT_EQ(Shell("cd " + folder_ + " && PATH=/no/such " + binary_ +
-                      " --launcher=slurm --output_dir=out -- ./program.sh",
-                  &output),
+  EXPECT_EQ(RunInShell("cd " + folder_ + " && PATH=/no/such " + binary_ +
+                           " --launcher=slurm --output_dir=out -- ./program.sh",
+                       &output),
             2);
   EXPECT_THAT(output, HasSubstr("sbatch: cannot be run"));
 }

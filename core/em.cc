@@ -14,6 +14,10 @@ namespace {
 
 // Weights that moved less are not worth a solve.
 constexpr double kDeltaChange = 1e-6;
+// The loop ends when no more than this share of the structure came or went. The
+// larger a graph, the surer one place in it is still undecided, and a round for
+// its sake costs as much as any.
+constexpr double kNegligible = 1e-4;
 // In an iteration with a scope, virtual features with more constraints are
 // held: they speak for a large part of the map, and solving for them costs as
 // much.
@@ -173,6 +177,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
 
   void OnConstraintAdded(const Constraint& constraint) override {
     is_dirty = true;
+    ++changes;
     if (constraint.state == ConstraintState::kBroken) {
       broken_on_record.insert(constraint.id);
       if (constraint.kind == ConstraintClass::kStructure) {
@@ -194,6 +199,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
       return;
     }
     is_dirty = true;
+    ++changes;
     if (is_structure) {
       --structure_count;
       --structure_by_relation[constraint.type->name];
@@ -871,7 +877,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
     MeasureRelaxedErrors();
     if (!EndPhase("break", scope, start)) return has_changed;
 
-    for (std::size_t level = 0; level < hierarchy.size(); ++level) {
+    for (std::size_t level = 0; detects && level < hierarchy.size(); ++level) {
       start = std::chrono::steady_clock::now();
       if (Detect(static_cast<int>(level), features)) {
         has_changed = true;
@@ -908,6 +914,10 @@ struct EmOrchestrator::Impl final : public GraphListener {
   int highest_level = 0;
   // Global solves are to loop_tolerance.
   bool is_coarse = false;
+  // Constraints that came or went in this iteration of Run.
+  int changes = 0;
+  // False: an iteration only judges what is there.
+  bool detects = true;
   // The graph or a weight changed since the last global solve.
   bool is_dirty = true;
   bool is_usable = true;
@@ -960,15 +970,26 @@ EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
       impl_->options.cost_tolerance +
       (is_coarse ? 2.0 * impl_->options.loop_tolerance : 0.0);
   for (int i = 0; goes_on && i < impl_->options.max_iterations; ++i) {
+    impl_->changes = 0;
     const bool has_changed = impl_->Iterate(nullptr);
     goes_on = !impl_->is_stopped;
+    const bool is_settled =
+        !has_changed ||
+        (impl_->changes > 0 &&
+         impl_->changes <= kNegligible * impl_->structure_count);
     const double last_cost = cost;
     cost = total_cost();
-    if (goes_on && !has_changed && impl_->is_usable &&
+    if (goes_on && is_settled && impl_->is_usable &&
         std::abs(cost - last_cost) <=
             cost_tolerance * std::max(cost, last_cost)) {
       has_converged = true;
       goes_on = false;
+      if (has_changed) {
+        // What came last has not been judged.
+        impl_->detects = false;
+        impl_->Iterate(nullptr);
+        impl_->detects = true;
+      }
     }
   }
   impl_->is_coarse = false;

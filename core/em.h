@@ -72,8 +72,8 @@ struct EmOptions {
   /// has a step rejected everywhere, and the larger a graph the more often
   /// there is one.
   double loop_trust_region_radius = 1e7;
-  /// Converged: nothing added, nothing removed, and the relative change of the
-  /// total cost is smaller.
+  /// Converged: at most one in 10,000 of structure came or went (so nothing, in
+  /// smaller graphs), and the relative change of the total cost is smaller.
   double cost_tolerance = 1e-4;
   /// A broken hypothesis may be proposed again when its error has fallen by
   /// more than so many of its standard deviations since it was broken and the

@@ -812,6 +812,41 @@ TEST_F(EmTest, ALooseLoopEndsInATightSolve) {
   EXPECT_NE(trace_.back().phase, "final");
 }
 
+// A detector that is never done keeps a small graph from converging, and a
+// large one not; what it added last has been judged there.
+TEST_F(EmTest, OnePlaceOfTenThousandDoesNotHoldUpTheRest) {
+  // Not the same twice: what was broken is not proposed again.
+  int calls = 0;
+  const auto run = [&](int segments) {
+    while (static_cast<int>(segments_.size()) < segments) {
+      AddSegment(segments_.size() % 2 == 0 ? 0.5 : -0.5);
+    }
+    Add(0, "directions", 2, DirectionDetector({0.0}));
+    Add(0, "restless", 1,
+        [&](const Graph& graph, const Registry& registry,
+            const DetectionScope&) {
+          Transaction transaction;
+          transaction.AddConstraint(Structure(
+              registry, "segment_orientation", segments_[0],
+              graph.VirtualFeatures(1)[0], DegToRad(0.01 * ++calls), 0.5));
+          return transaction;
+        });
+    EmOptions options;
+    options.max_iterations = 10;
+    options.max_breaks_per_feature = 100;
+    return Make(options).Run();
+  };
+  AddSegment(45.0);
+  EXPECT_FALSE(run(20).converged);
+  trace_.clear();
+  const EmReport report = run(21000);
+  EXPECT_TRUE(report.converged);
+  EXPECT_LT(report.iterations, 10);
+  EXPECT_EQ(trace_.back().phase, "break");
+  EXPECT_EQ(Live(), 20999);
+  EXPECT_FALSE(HasLive(graph_, segments_[0], "segment_orientation"));
+}
+
 TEST_F(EmTest, AnEmptyHierarchyConverges) {
   AddSegment(0.0);
   const EmReport report = Make().Run();

@@ -334,6 +334,18 @@ struct EmOrchestrator::Impl final : public GraphListener {
     unmeasured.insert(key);
   }
 
+  // What a detector takes back counts as broken, or it could find and take back
+  // the same thing for ever: a curve that solves alternately draw to another
+  // one and away from it.
+  void RememberTakenBack(const Transaction& accepted) {
+    for (const ConstraintId id : accepted.removed_constraints()) {
+      const Constraint* constraint = graph->FindConstraint(id);
+      if (constraint != nullptr && IsLiveStructure(*constraint)) {
+        RememberBroken(*constraint);
+      }
+    }
+  }
+
   // What the hypotheses just broken would say, now that the map is solved
   // without them.
   void MeasureRelaxedErrors() {
@@ -667,6 +679,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
       if (proposal.empty()) continue;
       Transaction accepted = Filter(std::move(proposal), *detectors[i]);
       if (accepted.empty()) continue;
+      RememberTakenBack(accepted);
       graph->Apply(std::move(accepted));
       has_changed = true;
     }

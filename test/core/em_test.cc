@@ -847,6 +847,30 @@ TEST_F(EmTest, OnePlaceOfTenThousandDoesNotHoldUpTheRest) {
   EXPECT_FALSE(HasLive(graph_, segments_[0], "segment_orientation"));
 }
 
+// Finds a direction, takes it back, finds it again.
+TEST_F(EmTest, ADetectorThatTakesBackWhatItFoundComesToAnEnd) {
+  for (const double degrees : {0.0, 0.2, -0.1, 0.15}) AddSegment(degrees);
+  const auto find = DirectionDetector({0.0});
+  Add(0, "fickle", 2,
+      [find](const Graph& graph, const Registry& registry,
+             const DetectionScope& scope) {
+        if (graph.VirtualFeatures(1).empty()) {
+          return find(graph, registry, scope);
+        }
+        Transaction transaction;
+        const FeatureId id = graph.VirtualFeatures(1)[0];
+        for (const ConstraintId constraint : graph.ConstraintsOf(id)) {
+          transaction.RemoveConstraint(constraint);
+        }
+        transaction.RemoveFeature(id);
+        return transaction;
+      });
+  const EmReport report = Make().Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_LT(report.iterations, 10);
+  EXPECT_EQ(Live(), 0);
+}
+
 TEST_F(EmTest, AnEmptyHierarchyConverges) {
   AddSegment(0.0);
   const EmReport report = Make().Run();

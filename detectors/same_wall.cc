@@ -33,6 +33,9 @@ constexpr double kSameWidth = 1.5;
 // directions, rad.
 constexpr double kCrossing = DegToRad(20.0);
 
+// Steps of the longest way between two neighbours.
+constexpr double kStepsOfLongest = 16.0;
+
 using Pair = std::pair<int, int>;
 
 Pair Ordered(int i, int j) { return {std::min(i, j), std::max(i, j)}; }
@@ -238,6 +241,10 @@ class Search {
       }
       ways_begin_.push_back(static_cast<int>(ways_.size()));
     }
+    // In terms of the longest, so that steps are not many more than links.
+    double longest = 0.0;
+    for (const Way& way : ways_) longest = std::max(longest, way.length);
+    if (longest > 0.0) way_step_ = longest / kStepsOfLongest;
   }
 
   // Way along measurement links from a wall to every other, m. Closures that
@@ -246,25 +253,27 @@ class Search {
   std::vector<double> WaysFrom(int wall) {
     std::vector<double> ways(walls_.size(),
                              std::numeric_limits<double>::infinity());
-    const auto is_farther = [](const Way& a, const Way& b) {
-      return a.length > b.length;
-    };
     ways[wall] = 0.0;
-    queue_.assign(1, {wall, 0.0});
-    while (!queue_.empty()) {
-      std::pop_heap(queue_.begin(), queue_.end(), is_farther);
-      const Way nearest = queue_.back();
-      queue_.pop_back();
-      if (nearest.length > ways[nearest.to]) continue;
-      for (int k = ways_begin_[nearest.to]; k < ways_begin_[nearest.to + 1];
-           ++k) {
-        const Way way = {ways_[k].to, nearest.length + ways_[k].length};
-        if (way.length < ways[way.to]) {
+    // Nearest first to a step: a heap's order costs more than the few ways that
+    // are shortened once more.
+    if (buckets_.empty()) buckets_.resize(1);
+    buckets_[0].push_back({wall, 0.0});
+    for (std::size_t b = 0; b < buckets_.size(); ++b) {
+      // Grows while it is gone through.
+      for (std::size_t k = 0; k < buckets_[b].size(); ++k) {
+        const Way nearest = buckets_[b][k];
+        if (nearest.length > ways[nearest.to]) continue;
+        for (int w = ways_begin_[nearest.to]; w < ways_begin_[nearest.to + 1];
+             ++w) {
+          const Way way = {ways_[w].to, nearest.length + ways_[w].length};
+          if (!(way.length < ways[way.to])) continue;
           ways[way.to] = way.length;
-          queue_.push_back(way);
-          std::push_heap(queue_.begin(), queue_.end(), is_farther);
+          const auto step = static_cast<std::size_t>(way.length / way_step_);
+          if (step >= buckets_.size()) buckets_.resize(step + 1);
+          buckets_[step].push_back(way);
         }
       }
+      buckets_[b].clear();
     }
     return ways;
   }
@@ -557,7 +566,9 @@ class Search {
   // after the other's.
   std::vector<Way> ways_;
   std::vector<int> ways_begin_;
-  std::vector<Way> queue_;
+  // Of the search for ways: those of each step of their length, m.
+  double way_step_ = 1.0;
+  std::vector<std::vector<Way>> buckets_;
   std::vector<Pair> closures_;
   std::set<Pair> broken_;
   // Walls that closures make one, and features that anything connects, by id.

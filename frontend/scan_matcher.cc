@@ -81,7 +81,8 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points) {
   reference_.resize(bucket_begin_[cells]);
   std::vector<int> next(bucket_begin_.begin(), bucket_begin_.end() - 1);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (cell_of[i] >= 0) reference_[next[cell_of[i]]++] = points[i];
+    if (cell_of[i] < 0) continue;
+    reference_[next[cell_of[i]]++] = {points[i].position, points[i].normal};
   }
 }
 
@@ -101,7 +102,7 @@ int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
     const int base = row * bucket_columns_;
     const int end = bucket_begin_[base + column_end + 1];
     for (int i = bucket_begin_[base + column_begin]; i < end; ++i) {
-      const ScanPoint& candidate = reference_[i];
+      const Surface& candidate = reference_[i];
       const double distance = (candidate.position - point).squaredNorm();
       if (distance > best_distance ||
           (distance == best_distance && (best < 0 || i >= best))) {
@@ -131,7 +132,14 @@ int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
     const double left = best_distance - across * across;
     if (left < 0.0) return;
     const double half = std::sqrt(left);
-    look(row, cell(local.x() - half), cell(local.x() + half));
+    const int begin = cell(local.x() - half);
+    const int end = cell(local.x() + half);
+    if (row != own_row) {
+      look(row, begin, end);
+    } else {
+      look(row, begin, std::min(end, own_column - 1));
+      look(row, std::max(begin, own_column + 1), end);
+    }
   };
   for (int step = 0; own_row - step >= row_begin || own_row + step <= row_end;
        ++step) {
@@ -181,7 +189,7 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
         cost += 4.0;
         continue;
       }
-      const ScanPoint& partner = reference_[index];
+      const Surface& partner = reference_[index];
       const Eigen::Vector2d n = partner.normal;
       const double error = n.dot(position - partner.position);
       const double squared = error * error * inverse_variance;
@@ -254,7 +262,7 @@ void ScanMatcher::BuildField() const {
                                        (kFieldSigmaCells * kFieldSigmaCells))));
     }
   }
-  for (const ScanPoint& point : reference_) {
+  for (const Surface& point : reference_) {
     const Eigen::Vector2d local = (point.position - origin_) / resolution;
     const int column = static_cast<int>(local.x());
     const int row = static_cast<int>(local.y());

@@ -93,7 +93,12 @@ class ScanMatcher {
                        const Eigen::Vector2d& normal, double radius) const;
 
   ScanMatcherOptions options_;
-  std::vector<ScanPoint> reference_;
+  // What matching needs of a reference point: the search runs through many.
+  struct Surface {
+    Eigen::Vector2d position;
+    Eigen::Vector2d normal;
+  };
+  std::vector<Surface> reference_;
   // Buckets of reference points, by counting sort over cells.
   double bucket_size_ = 0.1;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();

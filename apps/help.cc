@@ -235,7 +235,8 @@ std::string ManPage(const AppInfo& info,
                     const std::vector<FlagDescription>& flags) {
   std::string text = ".TH " + Upper(info.name) + " 1 \"\" \"plumbline " +
                      std::string(kVersion) + "\" \"plumbline\"\n";
-  text += ".SH NAME\n" + Roff(info.name) + " \\- " +
+  // Long values cannot be broken: lines around them are not stretched.
+  text += ".ad l\n.SH NAME\n" + Roff(info.name) + " \\- " +
           Roff(FirstSentence(info.summary)) + "\n";
   text += ".SH SYNOPSIS\n";
   for (std::size_t i = 0; i < info.usage.size(); ++i) {

@@ -120,12 +120,14 @@ TEST(HelpTest, ManPage) {
   info.summary = "Writes a summary.json for you: fine. And more.";
   EXPECT_THAT(ManPage(info, TestFlags()),
               HasSubstr("plumbline_test \\- writes a summary.json for you\n"));
+  // Lines with a value that cannot be broken are not stretched.
+  EXPECT_THAT(page, HasSubstr("\n.ad l\n"));
   // No line is taken for a command that is none.
   for (const std::string& line : Lines(page)) {
     if (line[0] != '.') continue;
     const std::string command = line.substr(0, line.find(' '));
     EXPECT_THAT((std::vector<std::string>{".TH", ".SH", ".SS", ".TP", ".B",
-                                          ".br", ".nf", ".fi"}),
+                                          ".br", ".nf", ".fi", ".ad"}),
                 testing::Contains(command));
   }
 }

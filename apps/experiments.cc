@@ -997,11 +997,20 @@ SyntheticRun RunOnWorld(const Registry& registry,
                     em_options);
   run.start_error = error();
   run.phases.push_back({0, -1, "start", run.start_error});
+  // EM does not solve for the distances alone to the end.
+  std::vector<std::vector<double>> start;
+  for (const Feature* feature : std::as_const(*world->graph).Features()) {
+    start.emplace_back(feature->data(), feature->data() + feature->type->size);
+  }
+  session->SolveGlobal();
+  run.distances_error = error();
+  std::size_t next = 0;
+  for (Feature* feature : world->graph->MutableFeatures()) {
+    std::copy(start[next].begin(), start[next].end(), feature->data());
+    ++next;
+  }
   em.SetTrace([&](const EmPhase& phase) {
     run.phases.push_back(MakePhase(phase, error()));
-    if (phase.phase == "measurements") {
-      run.distances_error = run.phases.back().error;
-    }
   });
   run.em = em.Run(options.stop);
   run.final_error = error();

@@ -18,6 +18,17 @@ constexpr double kDeltaChange = 1e-6;
 // larger a graph, the surer one place in it is still undecided, and a round for
 // its sake costs as much as any.
 constexpr double kNegligible = 1e-4;
+// The first solve of a coarse loop is far from its end, and leaves so many
+// times more undone than the others: before there is structure, parts hang
+// loosely from each other.
+constexpr double kFirstRadius = 1e4;
+constexpr double kFirstTolerances = 10.0;
+// The last one leaves so much of what the others do.
+constexpr double kFinalTolerances = 1e-3;
+// Where a coarse loop finds no more than this share of the structure anew, it
+// settles what was found in place and leaves the rest of the graph to the next
+// iteration, which begins with a solve anyway.
+constexpr double kFew = 0.01;
 // In an iteration with a scope, virtual features with more constraints are
 // held: they speak for a large part of the map, and solving for them costs as
 // much.
@@ -178,6 +189,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
   void OnConstraintAdded(const Constraint& constraint) override {
     is_dirty = true;
     ++changes;
+    AddUnsettled(constraint);
     if (constraint.state == ConstraintState::kBroken) {
       broken_on_record.insert(constraint.id);
       if (constraint.kind == ConstraintClass::kStructure) {
@@ -200,6 +212,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
     }
     is_dirty = true;
     ++changes;
+    AddUnsettled(constraint);
     if (is_structure) {
       --structure_count;
       --structure_by_relation[constraint.type->name];
@@ -214,6 +227,13 @@ struct EmOrchestrator::Impl final : public GraphListener {
     for (const FeatureId id : constraint.features) {
       const Feature* feature = graph->FindFeature(id);
       if (feature != nullptr && feature->is_virtual) lost_support.insert(id);
+    }
+  }
+
+  void AddUnsettled(const Constraint& constraint) {
+    for (const FeatureId id : constraint.features) {
+      const Feature* feature = graph->FindFeature(id);
+      if (feature != nullptr && feature->is_virtual) unsettled.insert(id);
     }
   }
 
@@ -479,11 +499,11 @@ struct EmOrchestrator::Impl final : public GraphListener {
     if (scope.features == nullptr) {
       if (is_dirty) {
         is_usable =
-            (is_coarse ? session->SolveGlobal(options.loop_tolerance,
-                                              options.loop_trust_region_radius)
+            (is_coarse ? session->SolveGlobal(coarse_tolerance, coarse_radius)
                        : session->SolveGlobal())
                 .usable;
         is_dirty = false;
+        unsettled.clear();
         for (int level = 0; level <= highest_level; ++level) {
           for (const FeatureId id : graph->VirtualFeatures(level)) {
             UpdateExtent(id);
@@ -494,6 +514,17 @@ struct EmOrchestrator::Impl final : public GraphListener {
       is_usable = session->SolveLocal(scope.variables).usable;
       for (const FeatureId id : scope.variables) UpdateExtent(id);
     }
+    totals.solve_seconds += SecondsSince(start);
+  }
+
+  // Solves for the virtual features that gained or lost constraints since the
+  // last solve, with all others held.
+  void SettleInPlace() {
+    const auto start = std::chrono::steady_clock::now();
+    const std::vector<FeatureId> ids(unsettled.begin(), unsettled.end());
+    session->SolveLocal(ids);
+    for (const FeatureId id : ids) UpdateExtent(id);
+    unsettled.clear();
     totals.solve_seconds += SecondsSince(start);
   }
 
@@ -887,15 +918,21 @@ struct EmOrchestrator::Impl final : public GraphListener {
     bool has_changed = Break(scope);
     if (features != nullptr) scope = MakeScope(features);
     Optimize(scope);
+    if (is_coarse) solved_cost = session->Cost().total();
     MeasureRelaxedErrors();
     if (!EndPhase("break", scope, start)) return has_changed;
 
     for (std::size_t level = 0; detects && level < hierarchy.size(); ++level) {
       start = std::chrono::steady_clock::now();
+      const int changes_before = changes;
       if (Detect(static_cast<int>(level), features)) {
         has_changed = true;
         if (features != nullptr) scope = MakeScope(features);
-        Optimize(scope);
+        if (is_coarse && changes - changes_before <= kFew * structure_count) {
+          SettleInPlace();
+        } else {
+          Optimize(scope);
+        }
       }
       if (!EndPhase("detect_" + std::to_string(level), scope, start)) break;
     }
@@ -918,6 +955,8 @@ struct EmOrchestrator::Impl final : public GraphListener {
   std::set<HypothesisKey> silent_alone;
   // Virtual features that lost a constraint.
   std::set<FeatureId> lost_support;
+  // Virtual features that gained or lost one since the last solve.
+  std::set<FeatureId> unsettled;
 
   std::map<std::string, int> feature_counts;
   std::set<ConstraintId> broken_on_record;
@@ -925,8 +964,13 @@ struct EmOrchestrator::Impl final : public GraphListener {
   std::map<std::string, int> structure_by_relation;
   std::map<std::string, int> broken_by_relation;
   int highest_level = 0;
-  // Global solves are to loop_tolerance.
+  // Global solves are to this relative change of the cost, and begin with this
+  // radius of the trust region.
   bool is_coarse = false;
+  double coarse_tolerance = 0.0;
+  double coarse_radius = 0.0;
+  // In a coarse loop: after the last solve with what was broken left out.
+  double solved_cost = 0.0;
   // Constraints that came or went in this iteration of Run.
   int changes = 0;
   // False: an iteration only judges what is there.
@@ -963,21 +1007,28 @@ EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
   impl_->is_dirty = true;
   bool has_converged = false;
 
+  // With no structure there and none looked for, nothing moves after the first
+  // solve, and its cost need not be known.
+  const bool is_still = impl_->structure_count == 0 && impl_->hierarchy.empty();
+  const double tight = impl_->session->options().function_tolerance;
+  const bool is_coarse = impl_->options.loop_tolerance > tight && !is_still;
+  impl_->is_coarse = is_coarse;
+  impl_->coarse_tolerance = kFirstTolerances * impl_->options.loop_tolerance;
+  impl_->coarse_radius = kFirstRadius;
+
   const auto start = std::chrono::steady_clock::now();
   const Impl::Scope whole;
   impl_->Optimize(whole);
   bool goes_on = impl_->EndPhase(
       impl_->structure_count == 0 ? "measurements" : "optimize", whole, start);
-  // With no structure there and none looked for, nothing moves after the first
-  // solve, and its cost need not be known.
-  const bool is_still = impl_->structure_count == 0 && impl_->hierarchy.empty();
+  impl_->coarse_tolerance = impl_->options.loop_tolerance;
+  impl_->coarse_radius = impl_->options.loop_trust_region_radius;
+  // What a coarse loop found last may not be solved for.
   const auto total_cost = [&] {
-    return is_still ? 0.0 : impl_->session->Cost().total();
+    if (is_still) return 0.0;
+    return is_coarse ? impl_->solved_cost : impl_->session->Cost().total();
   };
   double cost = total_cost();
-  const bool is_coarse = impl_->options.loop_tolerance >
-                         impl_->session->options().function_tolerance;
-  impl_->is_coarse = is_coarse;
   // Solves that end at a change of the tolerance leave that much undone.
   const double cost_tolerance =
       impl_->options.cost_tolerance +
@@ -1005,13 +1056,15 @@ EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
       }
     }
   }
-  impl_->is_coarse = false;
-  if (is_coarse && !is_still && !impl_->is_stopped) {
+  if (is_coarse && !impl_->is_stopped) {
     const auto final_start = std::chrono::steady_clock::now();
     impl_->is_dirty = true;
+    impl_->coarse_tolerance =
+        std::max(tight, kFinalTolerances * impl_->options.loop_tolerance);
     impl_->Optimize(whole);
     impl_->EndPhase("final", whole, final_start);
   }
+  impl_->is_coarse = false;
   impl_->stop = nullptr;
   impl_->totals.converged = has_converged;
   EmReport report = impl_->totals;

@@ -60,11 +60,13 @@ struct EmOptions {
   /// The loop ends at the latest after so many iterations.
   int max_iterations = 50;
   /// Relative change of the cost at which solves of the whole graph within the
-  /// loop end, once the measurements alone have been solved for; 0: the
-  /// session's own tolerance. With a larger one a solve with the session's
-  /// follows when the loop has ended. Weights and hypotheses do not wait for
-  /// the last digits, and the more parts a graph has the longer some part of it
-  /// takes to settle.
+  /// loop end; 0: the session's own tolerance. With a larger one the first
+  /// solve, of the measurements alone, ends at ten times as much, and one to a
+  /// thousandth of it (the session's own where that is more) follows when the
+  /// loop has ended. Weights and hypotheses do not wait for the last digits,
+  /// and the more parts a graph has the longer some part of it takes to settle.
+  /// What a detector finds is settled in place where it is little; the next
+  /// iteration solves for the rest of the graph.
   double loop_tolerance = 0.0;
   /// Initial radius of the trust region of those solves (SessionOptions; only
   /// with a loop_tolerance). The radius is one for the whole graph: with steps

@@ -24,6 +24,9 @@ struct Entry {
   std::vector<int> joining;
   // It may be taken out when it turns out to be the same as another.
   bool may_go = true;
+  // It, or what lies near it, changed since it was last compared with others
+  // and extended.
+  bool is_dirty = true;
 };
 
 class CurveDetection {
@@ -34,17 +37,24 @@ class CurveDetection {
         options_(options),
         kind_(kind),
         entries_of_(static_cast<std::size_t>(points_.size())),
-        support_stamp_(entries_of_.size(), 0) {
+        stamps_(entries_of_.size(), 0),
+        steps_(entries_of_.size(), 0),
+        is_claimed_(entries_of_.size(), false),
+        is_unsearched_(entries_of_.size(), true) {
     Load(graph);
-    // Until a further call would find nothing.
+    IndexEntries();
+    // Until a further call would find nothing. What did not change is not
+    // looked at again: a large graph needs many rounds, each for a few places.
     for (int round = 0; round < kMaxRounds; ++round) {
-      IndexEntries();
       bool has_changed = Merge();
       if (has_changed) IndexEntries();
       for (std::size_t e = 0; e < entries_.size(); ++e) {
-        if (entries_[e].found.curve.kind == kind_ && Extend(e)) {
-          has_changed = true;
-        }
+        Entry& entry = entries_[e];
+        if (!entry.is_dirty) continue;
+        entry.is_dirty = entry.found.curve.kind == kind_ && Extend(e);
+        if (!entry.is_dirty) continue;
+        has_changed = true;
+        Touch(entry);
       }
       if (!has_changed && !Search(scope.seed)) break;
     }
@@ -183,25 +193,38 @@ class CurveDetection {
     return std::max(options_.max_gap, 3.0 * *middle);
   }
 
+  // Curves that touch another one, ascending.
+  std::vector<std::size_t> Touching(std::size_t e) const {
+    std::vector<std::size_t> others;
+    for (const int i : entries_[e].found.support) {
+      const auto& own = entries_of_[static_cast<std::size_t>(i)];
+      others.insert(others.end(), own.begin(), own.end());
+      for (const int j : points_.neighbors(i)) {
+        const auto& next = entries_of_[static_cast<std::size_t>(j)];
+        others.insert(others.end(), next.begin(), next.end());
+      }
+    }
+    std::sort(others.begin(), others.end());
+    others.erase(std::unique(others.begin(), others.end()), others.end());
+    others.erase(std::lower_bound(others.begin(), others.end(), e));
+    return others;
+  }
+
   // Takes out curves that have become the same as another one with more
   // support. True when there were any.
   bool Merge() {
-    std::vector<bool> is_merged(entries_.size(), false);
+    std::set<std::size_t> compared;
     for (std::size_t e = 0; e < entries_.size(); ++e) {
+      if (!entries_[e].is_dirty) continue;
+      compared.insert(e);
+      for (const std::size_t o : Touching(e)) compared.insert(o);
+    }
+    std::vector<bool> is_merged(entries_.size(), false);
+    bool has_merged = false;
+    for (const std::size_t e : compared) {
       const Entry& entry = entries_[e];
       if (entry.found.curve.kind != kind_ || !entry.may_go) continue;
-      // Curves that touch this one.
-      std::set<std::size_t> others;
-      for (const int i : entry.found.support) {
-        const auto& own = entries_of_[static_cast<std::size_t>(i)];
-        others.insert(own.begin(), own.end());
-        for (const int j : points_.neighbors(i)) {
-          const auto& next = entries_of_[static_cast<std::size_t>(j)];
-          others.insert(next.begin(), next.end());
-        }
-      }
-      others.erase(e);
-      for (const std::size_t o : others) {
+      for (const std::size_t o : Touching(e)) {
         const Entry& other = entries_[o];
         const std::size_t size = entry.found.support.size();
         const std::size_t other_size = other.found.support.size();
@@ -211,17 +234,46 @@ class CurveDetection {
           continue;
         }
         is_merged[e] = true;
+        has_merged = true;
         break;
       }
     }
-    bool has_merged = false;
-    for (std::size_t e = entries_.size(); e-- > 0;) {
+    if (!has_merged) return false;
+    for (const std::size_t e : compared) {
       if (!is_merged[e]) continue;
-      has_merged = true;
+      // Its points are free to join others.
+      for (const std::size_t o : Touching(e)) entries_[o].is_dirty = true;
+      Touch(entries_[e]);
       if (entries_[e].id != kNoId) removed_.push_back(entries_[e].id);
-      entries_.erase(entries_.begin() + static_cast<std::ptrdiff_t>(e));
     }
-    return has_merged;
+    std::size_t kept = 0;
+    for (std::size_t e = 0; e < entries_.size(); ++e) {
+      if (is_merged[e]) continue;
+      if (kept < e) entries_[kept] = std::move(entries_[e]);
+      ++kept;
+    }
+    entries_.resize(kept);
+    return true;
+  }
+
+  // Whether a line ends before the other begins, by more than a line may have
+  // no points: walls in line with each other, of neighbouring buildings for
+  // one, are two.
+  bool IsApart(const Entry& entry, const Entry& other) const {
+    const CurveRuler ruler(other.found.curve);
+    const double infinity = std::numeric_limits<double>::infinity();
+    double begin = infinity, end = -infinity;
+    for (const int i : other.found.support) {
+      const double along = ruler.Along(points_.position(i));
+      begin = std::min(begin, along);
+      end = std::max(end, along);
+    }
+    double gap = infinity;
+    for (const int i : entry.found.support) {
+      const double along = ruler.Along(points_.position(i));
+      gap = std::min(gap, std::max(begin - along, along - end));
+    }
+    return gap > GapLimit(other.found);
   }
 
   // Whether the support of a curve lies on the other as well as it should on
@@ -236,7 +288,8 @@ class CurveDetection {
       sum += distance * distance;
     }
     const auto count = static_cast<double>(entry.found.support.size());
-    return sum <= count * 0.5 * options_.gate * 0.5 * options_.gate;
+    return sum <= count * 0.5 * options_.gate * 0.5 * options_.gate &&
+           (kind_ == CurveKind::kCircle || !IsApart(entry, other));
   }
 
   // How near to a curve a point must be to join it. Where curves cross, some
@@ -281,7 +334,7 @@ class CurveDetection {
     };
     std::deque<Step> queue;
     for (const int i : found.support) {
-      support_stamp_[static_cast<std::size_t>(i)] = stamp_;
+      stamps_[static_cast<std::size_t>(i)] = stamp_;
       queue.push_back({i, i, 0});
     }
     std::map<int, int> gaps;
@@ -290,13 +343,13 @@ class CurveDetection {
       queue.pop_front();
       for (const int i : points_.neighbors(step.point)) {
         const auto k = static_cast<std::size_t>(i);
-        if (support_stamp_[k] == stamp_) continue;
+        if (stamps_[k] == stamp_) continue;
         const double distance =
             std::abs(ruler.SignedDistance(points_.position(i)));
         if (distance <= JoinGate(found.curve, i) &&
             (points_.position(i) - points_.position(step.from)).norm() <=
                 limit) {
-          support_stamp_[k] = stamp_;
+          stamps_[k] = stamp_;
           entries_of_[k].push_back(index);
           found.support.push_back(i);
           entry.joining.push_back(i);
@@ -317,12 +370,49 @@ class CurveDetection {
     return found.support.size() > before;
   }
 
-  // Points that support a curve or are left over of one.
-  std::vector<bool> Claimed() const {
-    std::vector<bool> is_claimed(entries_of_.size(), false);
-    for (const int i : outliers_) {
-      is_claimed[static_cast<std::size_t>(i)] = true;
+  // A search may find something else near the support of a curve that came,
+  // grew or went.
+  void Touch(const Entry& entry) {
+    touched_.insert(touched_.end(), entry.found.support.begin(),
+                    entry.found.support.end());
+  }
+
+  // Visits the points of `queue` and those within `reach` constraints of them;
+  // after that `queue` holds them all.
+  template <typename Visit>
+  void Spread(int reach, std::vector<int>* queue, const Visit& visit) {
+    ++stamp_;
+    std::size_t count = 0;
+    for (const int i : *queue) {
+      const auto k = static_cast<std::size_t>(i);
+      if (stamps_[k] == stamp_) continue;
+      stamps_[k] = stamp_;
+      steps_[k] = 0;
+      (*queue)[count++] = i;
     }
+    queue->resize(count);
+    for (std::size_t q = 0; q < queue->size(); ++q) {
+      const int from = (*queue)[q];
+      visit(from);
+      const int step = steps_[static_cast<std::size_t>(from)] + 1;
+      if (step > reach) continue;
+      for (const int i : points_.neighbors(from)) {
+        const auto k = static_cast<std::size_t>(i);
+        if (stamps_[k] == stamp_) continue;
+        stamps_[k] = stamp_;
+        steps_[k] = step;
+        queue->push_back(i);
+      }
+    }
+  }
+
+  // Points that support a curve or are left over of one.
+  void UpdateClaimed() {
+    is_claimed_.assign(is_claimed_.size(), false);
+    for (const int i : outliers_) {
+      is_claimed_[static_cast<std::size_t>(i)] = true;
+    }
+    std::vector<int> queue;
     for (const Entry& entry : entries_) {
       const FoundCurve& found = entry.found;
       const CurveRuler ruler(found.curve);
@@ -330,43 +420,65 @@ class CurveDetection {
       for (const int i : found.support) {
         const double distance = ruler.SignedDistance(points_.position(i));
         sum += distance * distance;
+        is_claimed_[static_cast<std::size_t>(i)] = true;
       }
       const double near = std::max(
           options_.gate,
           3.0 * std::sqrt(sum / static_cast<double>(found.support.size())));
-      std::map<int, int> steps;
-      std::vector<int> queue;
-      for (const int i : found.support) {
-        is_claimed[static_cast<std::size_t>(i)] = true;
-        steps[i] = 0;
+      queue = found.support;
+      Spread(options_.max_gap_points, &queue, [&](int i) {
+        if (std::abs(ruler.SignedDistance(points_.position(i))) <= near) {
+          is_claimed_[static_cast<std::size_t>(i)] = true;
+        }
+      });
+    }
+  }
+
+  // Marks the points of which a search may say something else than the last
+  // one: those connected, past points that are not claimed, with one that is as
+  // near to a change as a curve may reach over a gap.
+  void UpdateUnsearched() {
+    std::vector<int> queue = std::move(touched_);
+    touched_.clear();
+    // A claim reaches as far as a gap, and what it ends is next to it.
+    Spread(2 * options_.max_gap_points + 2, &queue, [&](int i) {
+      if (!is_claimed_[static_cast<std::size_t>(i)]) {
+        is_unsearched_[static_cast<std::size_t>(i)] = true;
+      }
+    });
+    for (std::size_t q = 0; q < queue.size(); ++q) {
+      if (!is_unsearched_[static_cast<std::size_t>(queue[q])]) continue;
+      for (const int i : points_.neighbors(queue[q])) {
+        const auto k = static_cast<std::size_t>(i);
+        if (is_claimed_[k] || is_unsearched_[k]) continue;
+        is_unsearched_[k] = true;
         queue.push_back(i);
       }
-      for (std::size_t k = 0; k < queue.size(); ++k) {
-        const int next = steps.at(queue[k]) + 1;
-        if (next > options_.max_gap_points) break;
-        for (const int i : points_.neighbors(queue[k])) {
-          if (!steps.emplace(i, next).second) continue;
-          queue.push_back(i);
-          if (std::abs(ruler.SignedDistance(points_.position(i))) <= near) {
-            is_claimed[static_cast<std::size_t>(i)] = true;
-          }
-        }
-      }
     }
-    return is_claimed;
   }
 
   // Adds new curves of the kind; false when there are none.
   bool Search(std::uint64_t seed) {
+    UpdateClaimed();
+    UpdateUnsearched();
+    std::vector<bool> is_out = is_claimed_;
+    for (std::size_t i = 0; i < is_out.size(); ++i) {
+      is_out[i] = is_out[i] || !is_unsearched_[i];
+    }
+    is_unsearched_.assign(is_unsearched_.size(), false);
     std::vector<FoundCurve> known;
     for (const Entry& entry : entries_) known.push_back(entry.found);
     bool has_found = false;
     for (FoundCurve& found :
-         SearchCurves(points_, Claimed(), known, seed, options_)) {
+         SearchCurves(points_, is_out, known, seed, options_)) {
       if (found.curve.kind != kind_) continue;
       Entry entry;
       entry.found = std::move(found);
       entry.joining = entry.found.support;
+      for (const int i : entry.found.support) {
+        entries_of_[static_cast<std::size_t>(i)].push_back(entries_.size());
+      }
+      Touch(entry);
       entries_.push_back(std::move(entry));
       has_found = true;
     }
@@ -406,9 +518,17 @@ class CurveDetection {
   std::vector<int> outliers_;
   // Indices of those that each point supports.
   std::vector<std::vector<std::size_t>> entries_of_;
-  // Scratch of Extend: equal to stamp_ for the support of the curve.
-  std::vector<int> support_stamp_;
+  // Scratch: points that were visited are those with the last stamp, and in how
+  // many steps.
+  std::vector<int> stamps_;
+  std::vector<int> steps_;
   int stamp_ = 0;
+  // Points that support a curve or are left over of one, as of the last search.
+  std::vector<bool> is_claimed_;
+  // Points that no search has looked at since something changed near them.
+  std::vector<bool> is_unsearched_;
+  // Support of curves that changed since the last search.
+  std::vector<int> touched_;
 };
 
 }  // namespace

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <limits>
 #include <map>
 #include <queue>
-#include <random>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -28,9 +28,12 @@ constexpr std::size_t kMaxNeighborhood = 200;
 constexpr double kNeighborhoodReach = 5.0;
 constexpr int kLineDraws = 24;
 // Points that are shuffled together.
-constexpr std::size_t kShuffled = 1024;
+constexpr int kShuffled = 1024;
 constexpr int kCircleDraws = 48;
 constexpr int kMaxRefits = 8;
+// Points over which false alarms are counted, however many there are: what is
+// found in a building does not depend on how many others are on the map.
+constexpr double kPointsPerFalseAlarm = 1000.0;
 // Points that so many hypotheses explain are not grown from any more.
 constexpr int kEnoughHypotheses = 2;
 // Gaps longer than so many times the usual spacing end a line.
@@ -115,7 +118,9 @@ struct Moments {
     const double cxx = xx - x * x / n;
     const double cyy = yy - y * y / n;
     const double cxy = xy - x * y / n;
-    return std::max(0.0, 0.5 * (cxx + cyy - std::hypot(cxx - cyy, 2.0 * cxy)));
+    const double difference = cxx - cyy;
+    const double root = std::sqrt(difference * difference + 4.0 * cxy * cxy);
+    return std::max(0.0, 0.5 * (cxx + cyy - root));
   }
 };
 
@@ -142,18 +147,24 @@ bool IsPolygon(const std::vector<Eigen::Vector2d>& points,
     return n * std::log(error + floor) + parameters * std::log(n);
   };
   const double limit = criterion(circle_error, 3);
-  // Smallest error of the points before each break with so many sides.
   const std::size_t breaks = sums.size();
+  // Of the line from one break to another.
+  std::vector<double> side_errors(breaks * breaks, 0.0);
+  for (std::size_t end = 1; end < breaks; ++end) {
+    for (std::size_t begin = 0; begin < end; ++begin) {
+      side_errors[end * breaks + begin] =
+          sums[end].Minus(sums[begin]).LineError();
+    }
+  }
+  // Smallest error of the points before each break with so many sides.
   std::vector<double> errors(breaks, std::numeric_limits<double>::infinity());
   errors[0] = 0.0;
   for (int sides = 1; sides <= kMaxSides; ++sides) {
     std::vector<double> next(breaks, std::numeric_limits<double>::infinity());
     for (std::size_t end = 1; end < breaks; ++end) {
       for (std::size_t begin = 0; begin < end; ++begin) {
-        if (std::isinf(errors[begin])) continue;
-        next[end] =
-            std::min(next[end],
-                     errors[begin] + sums[end].Minus(sums[begin]).LineError());
+        next[end] = std::min(next[end],
+                             errors[begin] + side_errors[end * breaks + begin]);
       }
     }
     errors.swap(next);
@@ -163,6 +174,24 @@ bool IsPolygon(const std::vector<Eigen::Vector2d>& points,
   return false;
 }
 
+// Steele, Lea and Flood 2014: good numbers from any state, so that every point
+// can have its own at no cost.
+class SplitMix {
+ public:
+  explicit SplitMix(std::uint64_t state) : state_(state) {}
+
+  std::uint64_t operator()() {
+    state_ += 0x9e3779b97f4a7c15u;
+    std::uint64_t z = state_;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
 class CurveSearcher {
  public:
   CurveSearcher(const PointGraph& points, const std::vector<bool>& is_claimed,
@@ -171,14 +200,14 @@ class CurveSearcher {
       : points_(points),
         known_(known),
         options_(options),
-        engine_(seed),
+        seed_(seed),
+        random_(seed),
         is_free_(static_cast<std::size_t>(points.size())),
         inlier_stamp_(static_cast<std::size_t>(points.size()), 0),
         visit_stamp_(static_cast<std::size_t>(points.size()), 0),
         visit_gap_(static_cast<std::size_t>(points.size()), 0) {
     for (std::size_t i = 0; i < is_free_.size(); ++i) {
       is_free_[i] = !is_claimed[i];
-      if (is_free_[i]) ++num_free_;
     }
   }
 
@@ -215,7 +244,14 @@ class CurveSearcher {
 
   // A number below `bound`; the bias of the remainder is far below what
   // matters.
-  int Draw(std::size_t bound) { return static_cast<int>(engine_() % bound); }
+  int Draw(std::size_t bound) { return static_cast<int>(random_() % bound); }
+
+  // A point's own number. It depends on nothing else, so that what is found
+  // somewhere does not depend on what there is elsewhere.
+  std::uint64_t NumberOf(int i) const {
+    return SplitMix(seed_ ^
+                    SplitMix(static_cast<std::uint64_t>(points_.id(i)))())();
+  }
 
   std::size_t MinPoints(CurveKind kind) const {
     return static_cast<std::size_t>(kind == CurveKind::kLine
@@ -244,13 +280,16 @@ class CurveSearcher {
     }
     // Shuffled, but those far apart not with each other: points that are near
     // have near numbers mostly, and lie near each other in memory.
-    for (std::size_t begin = 0; begin < seeds.size(); begin += kShuffled) {
-      for (std::size_t i = std::min(kShuffled, seeds.size() - begin); i > 1;
-           --i) {
-        std::swap(seeds[begin + i - 1],
-                  seeds[begin + static_cast<std::size_t>(Draw(i))]);
-      }
+    std::vector<std::uint64_t> numbers(is_free_.size());
+    for (const int i : seeds) {
+      numbers[static_cast<std::size_t>(i)] = NumberOf(i);
     }
+    std::sort(seeds.begin(), seeds.end(), [&numbers](int a, int b) {
+      return std::make_tuple(a / kShuffled,
+                             numbers[static_cast<std::size_t>(a)], a) <
+             std::make_tuple(b / kShuffled,
+                             numbers[static_cast<std::size_t>(b)], b);
+    });
     std::vector<int> neighborhood;
     for (int start = 0; start < kStarts; ++start) {
       const double tolerance =
@@ -261,6 +300,8 @@ class CurveSearcher {
           if (explained[static_cast<std::size_t>(seed)] >= kEnoughHypotheses) {
             continue;
           }
+          random_ = SplitMix(numbers[static_cast<std::size_t>(seed)] +
+                             2 * start + (kind == CurveKind::kLine ? 0 : 1));
           GrowNeighborhood(seed, tolerance, &neighborhood);
           Hypothesis hypothesis;
           if (!Draw(kind, neighborhood, tolerance, &hypothesis.curve) ||
@@ -584,8 +625,8 @@ class CurveSearcher {
     // Places where a curve of this size could begin, its offset there, its
     // direction and bend by what the tolerance can tell, and the tolerances.
     const double resolution = std::max(1.0, coverage.length / e);
-    double tests = std::max(1.0, num_free_ / count) / p * resolution * kStarts *
-                   kLevelsPerStart;
+    double tests = std::max(1.0, kPointsPerFalseAlarm / count) / p *
+                   resolution * kStarts * kLevelsPerStart;
     if (is_circle) tests *= std::sqrt(resolution);
     const double significance =
         (trials * divergence - std::log(tests)) / std::log(10.0);
@@ -1025,9 +1066,9 @@ class CurveSearcher {
   const PointGraph& points_;
   const std::vector<FoundCurve>& known_;
   const CurveSearchOptions& options_;
-  std::mt19937_64 engine_;
+  const std::uint64_t seed_;
+  SplitMix random_;
   std::vector<bool> is_free_;
-  double num_free_ = 0.0;
   std::vector<Hypothesis> hypotheses_;
 
   // Points that each selected hypothesis owns, and its significance by them.

@@ -23,9 +23,10 @@ struct CurveSearchOptions {
   /// curve is the same. Wider than sigma: points are off by their measurements
   /// too. Bends of less than half of it are none.
   double gate = 0.1;
-  /// Log10 of the expected number of curves of the kind that the whole graph
-  /// would show by chance, at which one is accepted.
-  double max_log_false_alarms = 0.0;
+  /// Log10 of the expected number of curves of the kind that 1,000 points would
+  /// show by chance, at which one is accepted. Well below one: EM looks many
+  /// times, and what is left over each time is different.
+  double max_log_false_alarms = -1.0;
   /// Points that support a curve are connected with each other past at most so
   /// many points that do not.
   int max_gap_points = 2;
@@ -70,10 +71,10 @@ struct FoundCurve {
 ///    2 e to each other along the curve count as one, which keeps p <= 1/3
 ///    and makes the test independent of the density. With k of n connected
 ///    points near the curve within e, the chance is at most
-///    exp(-n KL(k/n || p)) (Chernoff), times the number of curves that the
-///    graph could show at this resolution (a-contrario testing; Desolneux,
-///    Moisan and Morel 2008). The tolerance e is the one with the fewest
-///    expected false alarms.
+///    exp(-n KL(k/n || p)) (Chernoff), times the number of curves that
+///    1,000 points could show at this resolution (a-contrario testing;
+///    Desolneux, Moisan and Morel 2008). The tolerance e is the one with the
+///    fewest expected false alarms.
 /// 3. Selection between lines and circles. The most significant curve takes its
 ///    points, the others are judged by what is left. A curve gives way to
 ///    others on its points when they are more significant together: four walls
@@ -85,6 +86,11 @@ struct FoundCurve {
 /// 4. What is left over of a more significant curve that it touches, or of a
 ///    `known` one (curve and support matter), is no curve of its own; nor is a
 ///    line that goes on at less than min_corner where another ends.
+///
+/// What is found among points that are connected with each other, past points
+/// that are not claimed, depends on these and what is within
+/// options.max_gap_points + 1 constraints of them alone, so that the rest may
+/// be claimed when it was searched before.
 ///
 /// The same seed gives the same result. The most significant first.
 std::vector<FoundCurve> SearchCurves(const PointGraph& points,

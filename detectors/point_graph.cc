@@ -96,10 +96,7 @@ PointGraph::PointGraph(const Graph& graph, const DetectionScope& scope,
     for (const auto& [id, step] : steps) add(graph.GetFeature(id), step == 0);
   }
   Connect(graph);
-  const bool is_connected =
-      std::any_of(neighbors_.begin(), neighbors_.end(),
-                  [](const auto& neighbors) { return !neighbors.empty(); });
-  if (scope.level > 0 && !is_connected) ConnectNearest();
+  if (scope.level > 0 && neighbors_.empty()) ConnectNearest();
 }
 
 int PointGraph::Find(FeatureId id) const {
@@ -109,16 +106,18 @@ int PointGraph::Find(FeatureId id) const {
 }
 
 void PointGraph::Connect(const Graph& graph) {
-  neighbors_.resize(ids_.size());
-  for (std::size_t i = 0; i < ids_.size(); ++i) {
-    std::vector<int>& neighbors = neighbors_[i];
-    ForEachMeasured(graph, ids_[i], [&](FeatureId id) {
+  neighbors_begin_.assign(1, 0);
+  std::vector<int> own;
+  for (const FeatureId from : ids_) {
+    own.clear();
+    ForEachMeasured(graph, from, [&](FeatureId id) {
       const int j = Find(id);
-      if (j >= 0) neighbors.push_back(j);
+      if (j >= 0) own.push_back(j);
     });
-    std::sort(neighbors.begin(), neighbors.end());
-    neighbors.erase(std::unique(neighbors.begin(), neighbors.end()),
-                    neighbors.end());
+    std::sort(own.begin(), own.end());
+    own.erase(std::unique(own.begin(), own.end()), own.end());
+    neighbors_.insert(neighbors_.end(), own.begin(), own.end());
+    neighbors_begin_.push_back(neighbors_.size());
   }
 }
 
@@ -141,7 +140,9 @@ void PointGraph::ConnectNearest() {
     }
   }
   for (std::size_t i = 0; i < connected.size(); ++i) {
-    neighbors_[i].assign(connected[i].begin(), connected[i].end());
+    neighbors_.insert(neighbors_.end(), connected[i].begin(),
+                      connected[i].end());
+    neighbors_begin_[i + 1] = neighbors_.size();
   }
 }
 

@@ -5,6 +5,7 @@
 #include <plumbline/core/graph.h>
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 namespace plumbline {
@@ -13,6 +14,20 @@ namespace plumbline {
 /// index. Indices are in the order of ids.
 class PointGraph {
  public:
+  /// A range of indices, good as long as the graph.
+  class Neighbors {
+   public:
+    /// Of the indices from `begin` to before `end`.
+    Neighbors(const int* begin, const int* end) : begin_(begin), end_(end) {}
+    /// For loops over it.
+    const int* begin() const { return begin_; }
+    const int* end() const { return end_; }
+
+   private:
+    const int* begin_;
+    const int* end_;
+  };
+
   /// Points of scope.level with finite coordinates. With a list in the scope:
   /// the points listed and those that are connected to them by at most `reach`
   /// constraints, at a cost that depends on these only.
@@ -29,8 +44,10 @@ class PointGraph {
     return positions_[static_cast<std::size_t>(i)];
   }
   /// Indices of the points connected with the i-th, ascending.
-  const std::vector<int>& neighbors(int i) const {
-    return neighbors_[static_cast<std::size_t>(i)];
+  Neighbors neighbors(int i) const {
+    const auto k = static_cast<std::size_t>(i);
+    return {neighbors_.data() + neighbors_begin_[k],
+            neighbors_.data() + neighbors_begin_[k + 1]};
   }
   /// Whether the scope lists the i-th point (all do without a list).
   bool is_listed(int i) const {
@@ -45,7 +62,11 @@ class PointGraph {
 
   std::vector<FeatureId> ids_;
   std::vector<Eigen::Vector2d> positions_;
-  std::vector<std::vector<int>> neighbors_;
+  // Those of the i-th point are from neighbors_begin_[i] to before
+  // neighbors_begin_[i + 1]: side by side, since searches go along the edges
+  // all the time.
+  std::vector<int> neighbors_;
+  std::vector<std::size_t> neighbors_begin_;
   std::vector<bool> is_listed_;
 };
 

@@ -18,11 +18,10 @@ constexpr double kDeltaChange = 1e-6;
 // larger a graph, the surer one place in it is still undecided, and a round for
 // its sake costs as much as any.
 constexpr double kNegligible = 1e-4;
-// The first solve of a coarse loop is far from its end, and leaves so many
-// times more undone than the others: before there is structure, parts hang
-// loosely from each other.
+// The first solve of a coarse loop is far from its end, and leaves so much of
+// what the others do: what is found first depends on it.
 constexpr double kFirstRadius = 1e4;
-constexpr double kFirstTolerances = 10.0;
+constexpr double kFirstTolerances = 0.03;
 // The last one leaves so much of what the others do.
 constexpr double kFinalTolerances = 1e-3;
 // Where a coarse loop finds no more than this share of the structure anew, it

@@ -61,9 +61,9 @@ struct EmOptions {
   int max_iterations = 50;
   /// Relative change of the cost at which solves of the whole graph within the
   /// loop end; 0: the session's own tolerance. With a larger one the first
-  /// solve, of the measurements alone, ends at ten times as much, and one to a
-  /// thousandth of it (the session's own where that is more) follows when the
-  /// loop has ended. Weights and hypotheses do not wait for the last digits,
+  /// solve, of the measurements alone, ends at 0.03 of it, and one to a
+  /// thousandth (the session's own where that is more) follows when the loop
+  /// has ended. Weights and hypotheses do not wait for the last digits,
   /// and the more parts a graph has the longer some part of it takes to settle.
   /// What a detector finds is settled in place where it is little; the next
   /// iteration solves for the rest of the graph.

@@ -8,7 +8,7 @@ namespace plumbline {
 
 /// EmOptions::loop_tolerance for graphs of points: points that turned over
 /// settle slowly, one here and one there.
-constexpr double kPointsLoopTolerance = 1e-4;
+constexpr double kPointsLoopTolerance = 3e-4;
 
 /// The hierarchy (MakeHierarchy) that is looked for in a graph with these types
 /// of raw features when nothing is asked for (method.md, section 5):

@@ -24,9 +24,9 @@ struct CurveSearchOptions {
   /// too. Bends of less than half of it are none.
   double gate = 0.1;
   /// Log10 of the expected number of curves of the kind that 1,000 points would
-  /// show by chance, at which one is accepted. Below one: EM looks many times,
-  /// and what is left over each time is different.
-  double max_log_false_alarms = -0.5;
+  /// show by chance, at which one is accepted. Well below one: EM looks many
+  /// times, and what is left over each time is different.
+  double max_log_false_alarms = -1.0;
   /// Points that support a curve are connected with each other past at most so
   /// many points that do not.
   int max_gap_points = 2;

@@ -199,7 +199,7 @@ TEST_F(CurveRansacTest, IsolatedPointsMakeNothing) {
   EXPECT_TRUE(Detect("line_ransac").empty());
 }
 
-// One false curve in 1,000 points is expected in three graphs at most.
+// One false curve in 1,000 points is expected in ten graphs at most.
 TEST_F(CurveRansacTest, WanderingChainsMakeNothing) {
   int found = 0;
   for (int seed = 1; seed <= 6; ++seed) {

@@ -2,12 +2,13 @@
 // et al. 2009) and against the truth of a simulated building.
 
 #include <gflags/gflags.h>
-#include <plumbline/apps/app.h>
-#include <plumbline/apps/closure_truth.h>
-#include <plumbline/apps/map_truth.h>
-#include <plumbline/apps/relations.h>
+#include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/evaluation/closure_truth.h>
+#include <plumbline/apps/evaluation/map_truth.h>
+#include <plumbline/apps/evaluation/relations.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
+#include <plumbline/frontend/tum.h>
 
 #include <cstdio>
 #include <iostream>

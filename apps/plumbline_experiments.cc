@@ -1,13 +1,14 @@
 // Runs the paper's experiments and writes their tables and figures.
 
 #include <gflags/gflags.h>
-#include <plumbline/apps/app.h>
-#include <plumbline/apps/detector_parameters.h>
-#include <plumbline/apps/experiments.h>
-#include <plumbline/apps/progress.h>
+#include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/detector_parameters.h>
+#include <plumbline/apps/cli/progress.h>
+#include <plumbline/apps/experiments/experiments.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/core/version.h>
 #include <plumbline/detectors/builtins.h>
 
 #include <algorithm>

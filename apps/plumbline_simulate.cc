@@ -3,11 +3,11 @@
 // writes one of the paper's synthetic worlds as a graph.
 
 #include <gflags/gflags.h>
-#include <plumbline/apps/app.h>
-#include <plumbline/apps/progress.h>
-#include <plumbline/apps/simulator.h>
-#include <plumbline/apps/synthetic_worlds.h>
-#include <plumbline/apps/world.h>
+#include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/progress.h>
+#include <plumbline/apps/simulation/simulator.h>
+#include <plumbline/apps/simulation/synthetic_worlds.h>
+#include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>

@@ -1,13 +1,9 @@
 // Turns a robot's log, or a graph, into a true map.
 
 #include <gflags/gflags.h>
-#include <plumbline/apps/app.h>
-#include <plumbline/apps/log_solver.h>
-#include <plumbline/apps/marginals_output.h>
-#include <plumbline/apps/progress.h>
+#include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/progress.h>
 #include <plumbline/apps/solve_flags.h>
-#include <plumbline/apps/solve_outputs.h>
-#include <plumbline/apps/summary.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/initial_guess.h>
@@ -18,6 +14,11 @@
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/log_reader.h>
+#include <plumbline/outputs/marginals_output.h>
+#include <plumbline/outputs/solve_outputs.h>
+#include <plumbline/outputs/summary.h>
+#include <plumbline/pipeline/log_solver.h>
+#include <plumbline/pipeline/without_structure.h>
 #include <unistd.h>
 
 #include <algorithm>

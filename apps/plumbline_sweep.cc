@@ -3,13 +3,13 @@
 
 #include <fcntl.h>
 #include <gflags/gflags.h>
-#include <plumbline/apps/app.h>
-#include <plumbline/apps/progress.h>
-#include <plumbline/apps/sweep.h>
-#include <plumbline/apps/sweep_grid.h>
-#include <plumbline/apps/sweep_launcher.h>
-#include <plumbline/apps/sweep_overview.h>
-#include <plumbline/apps/sweep_table.h>
+#include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/progress.h>
+#include <plumbline/apps/sweep/sweep.h>
+#include <plumbline/apps/sweep/sweep_grid.h>
+#include <plumbline/apps/sweep/sweep_launcher.h>
+#include <plumbline/apps/sweep/sweep_overview.h>
+#include <plumbline/apps/sweep/sweep_table.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <sys/file.h>

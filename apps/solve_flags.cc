@@ -1,5 +1,5 @@
 #include <gflags/gflags.h>
-#include <plumbline/apps/detector_parameters.h>
+#include <plumbline/apps/cli/detector_parameters.h>
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/error.h>
 #include <plumbline/detectors/structure_prior.h>

@@ -2,13 +2,13 @@
 #define PLUMBLINE_APPS_SOLVE_FLAGS_H_
 
 #include <gflags/gflags_declare.h>
-#include <plumbline/apps/app.h>
-#include <plumbline/apps/log_solver.h>
-#include <plumbline/apps/occupancy_grid.h>
+#include <plumbline/apps/cli/app.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/initial_guess.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/log_reader.h>
+#include <plumbline/outputs/occupancy_grid.h>
+#include <plumbline/pipeline/log_solver.h>
 
 #include <set>
 #include <string>

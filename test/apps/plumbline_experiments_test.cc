@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <plumbline/apps/synthetic_worlds.h>
+#include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/graph_g2o.h>
 

@@ -1,12 +1,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <plumbline/apps/relations.h>
-#include <plumbline/apps/solve_outputs.h>
-#include <plumbline/apps/synthetic_worlds.h>
+#include <plumbline/apps/evaluation/relations.h>
+#include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/tum.h>
+#include <plumbline/outputs/solve_outputs.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -4,8 +4,8 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <plumbline/apps/relations.h>
 #include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/tum.h>
 #include <poll.h>
 #include <signal.h>
 #include <sys/ioctl.h>

@@ -2,10 +2,10 @@
 // with the map.
 
 #include <benchmark/benchmark.h>
-#include <plumbline/apps/log_solver.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/pipeline/log_solver.h>
 
 #include <Eigen/LU>
 #include <algorithm>

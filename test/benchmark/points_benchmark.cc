@@ -5,8 +5,8 @@
 //
 // With --phases also a line for each phase of EM.
 
-#include <plumbline/apps/line_plot.h>
-#include <plumbline/apps/synthetic_worlds.h>
+#include <plumbline/apps/figures/line_plot.h>
+#include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/core/em.h>
 #include <plumbline/core/session.h>
 #include <plumbline/detectors/builtins.h>

@@ -1,0 +1,289 @@
+#include <gflags/gflags.h>
+#include <glog/logging.h>
+#include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/help.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/number_text.h>
+#include <plumbline/core/version.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <map>
+#include <new>
+#include <set>
+#include <sstream>
+#include <utility>
+
+// gflags defines these and would act on them with exit status 1.
+DECLARE_bool(help);
+DECLARE_bool(helpshort);
+DECLARE_bool(helpfull);
+DECLARE_bool(version);
+
+DEFINE_string(help_format, "text",
+              "What --help prints: text, man (a manual page) or bash (a "
+              "completion script)");
+PLUMBLINE_FLAG_CHOICES(help_format, "text", "man", "bash");
+
+namespace plumbline {
+
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+extern "C" void HandleInterrupt(int) { interrupted = 1; }
+
+void CatchInterrupts() {
+  struct sigaction action = {};
+  action.sa_handler = HandleInterrupt;
+  // The second signal finds the default action: the way out of work that does
+  // not ask often enough.
+  action.sa_flags = SA_RESETHAND | SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+struct Condition {
+  double minimum = 0.0;
+  double maximum = 0.0;
+  /// Not empty: one of these words, and no range.
+  std::vector<std::string> choices;
+};
+
+// Constructed on first use: conditions register from static initializers.
+std::map<std::string, Condition>& Conditions() {
+  static auto* conditions = new std::map<std::string, Condition>;
+  return *conditions;
+}
+
+std::string FormatNumber(double value) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.10g", value);
+  return text;
+}
+
+std::string Describe(const Condition& condition) {
+  if (condition.choices.empty()) {
+    return FormatNumber(condition.minimum) + " to " +
+           FormatNumber(condition.maximum);
+  }
+  std::string text;
+  for (const std::string& choice : condition.choices) {
+    if (!text.empty()) text += ", ";
+    text += choice;
+  }
+  return text;
+}
+
+bool Holds(const Condition& condition, const std::string& value) {
+  if (!condition.choices.empty()) {
+    return std::find(condition.choices.begin(), condition.choices.end(),
+                     value) != condition.choices.end();
+  }
+  const double number = std::strtod(value.c_str(), nullptr);
+  return std::isfinite(number) && number >= condition.minimum &&
+         number <= condition.maximum;
+}
+
+std::string Directory(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  return slash == std::string::npos ? "" : path.substr(0, slash);
+}
+
+std::vector<gflags::CommandLineFlagInfo> OwnFlagInfos() {
+  // glog's, gflags' and Ceres' flags come from other folders than ours.
+  static const std::string folder = Directory(__FILE__);
+  std::vector<gflags::CommandLineFlagInfo> all;
+  gflags::GetAllFlags(&all);
+  std::vector<gflags::CommandLineFlagInfo> own;
+  for (gflags::CommandLineFlagInfo& info : all) {
+    if (Directory(info.filename) == folder) own.push_back(std::move(info));
+  }
+  std::sort(own.begin(), own.end(),
+            [](const auto& a, const auto& b) { return a.name < b.name; });
+  return own;
+}
+
+FlagValue ToFlagValue(const gflags::CommandLineFlagInfo& info) {
+  // gflags writes 0.3 as 0.29999999999999999.
+  const auto text = [&info](const std::string& value) {
+    if (info.type != "double") return value;
+    std::string shortest;
+    AppendNumber(std::strtod(value.c_str(), nullptr), &shortest);
+    return shortest;
+  };
+  return {info.name, text(info.current_value), text(info.default_value),
+          info.type};
+}
+
+[[noreturn]] void ExitWithUsageError(const AppInfo& info,
+                                     const std::string& message) {
+  std::fprintf(stderr, "%s%s: --help lists the flags\n", message.c_str(),
+               info.name.c_str());
+  std::exit(kExitUsage);
+}
+
+}  // namespace
+
+namespace internal {
+
+FlagCondition::FlagCondition(const char* name, double minimum, double maximum) {
+  Condition condition;
+  condition.minimum = minimum;
+  condition.maximum = maximum;
+  Conditions()[name] = condition;
+}
+
+FlagCondition::FlagCondition(const char* name,
+                             std::initializer_list<const char*> choices) {
+  Condition condition;
+  condition.choices.assign(choices.begin(), choices.end());
+  Conditions()[name] = condition;
+}
+
+}  // namespace internal
+
+std::vector<std::string> CheckFlagValues() {
+  std::vector<std::string> problems;
+  for (const auto& entry : Conditions()) {
+    gflags::CommandLineFlagInfo flag;
+    if (!gflags::GetCommandLineFlagInfo(entry.first.c_str(), &flag)) continue;
+    if (Holds(entry.second, flag.current_value)) continue;
+    problems.push_back("--" + flag.name + "=" + flag.current_value + ": " +
+                       (entry.second.choices.empty()
+                            ? "out of range: expected "
+                            : "unknown value: expected one of ") +
+                       Describe(entry.second));
+  }
+  return problems;
+}
+
+std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
+                                    char** argv) {
+  // As defaults, so that --minloglevel=0 and --log_dir still do what they say.
+  gflags::SetCommandLineOptionWithMode("logtostderr", "true",
+                                       gflags::SET_FLAGS_DEFAULT);
+  gflags::SetCommandLineOptionWithMode("minloglevel", "1",
+                                       gflags::SET_FLAGS_DEFAULT);
+  gflags::SetUsageMessage(info.summary);
+  gflags::SetVersionString(kVersion);
+  gflags::ParseCommandLineNonHelpFlags(&argc, &argv, /*remove_flags=*/true);
+
+  if (FLAGS_help || FLAGS_helpshort) {
+    for (const std::string& problem : CheckFlagValues()) {
+      if (problem.find("--help_format") == 0) {
+        ExitWithUsageError(info, problem + "\n");
+      }
+    }
+    const std::vector<FlagDescription> flags = DescribeFlags();
+    const std::string text = FLAGS_help_format == "man" ? ManPage(info, flags)
+                             : FLAGS_help_format == "bash"
+                                 ? BashCompletion(info, flags)
+                                 : HelpText(info, flags);
+    std::fputs(text.c_str(), stdout);
+    std::exit(kExitSuccess);
+  }
+  if (FLAGS_helpfull) {
+    gflags::ShowUsageWithFlags(argv[0]);
+    std::exit(kExitSuccess);
+  }
+  if (FLAGS_version) {
+    std::printf("%s %s\n", info.name.c_str(), kVersion);
+    std::exit(kExitSuccess);
+  }
+  gflags::HandleCommandLineHelpFlags();
+
+  std::string problems;
+  for (const std::string& problem : CheckFlagValues()) {
+    problems += problem + "\n";
+  }
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  if (!info.takes_arguments) {
+    for (const std::string& argument : arguments) {
+      problems += argument +
+                  ": unexpected argument: expected flags only, as --name=value"
+                  " (a bool as --name or --noname)\n";
+    }
+  }
+  if (!problems.empty()) ExitWithUsageError(info, problems);
+
+  if (!google::IsGoogleLoggingInitialized()) {
+    // glog keeps the pointer.
+    static const std::string name = info.name;
+    google::InitGoogleLogging(name.c_str());
+  }
+  CatchInterrupts();
+  return arguments;
+}
+
+int RunMain(const std::function<int()>& run) {
+  int status = kExitInternal;
+  try {
+    status = run();
+    std::cout.flush();
+    if (status == kExitSuccess &&
+        (!std::cout || std::fflush(stdout) != 0 || std::ferror(stdout))) {
+      throw Error("standard output", 0, "cannot be written", "");
+    }
+    if (status == kExitSuccess && InterruptRequested()) {
+      std::fprintf(stderr, "interrupted: what was done so far is written\n");
+      status = kExitInterrupted;
+    }
+  } catch (const Error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    status = kExitInput;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "out of memory\n");
+    status = kExitInternal;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "internal error: %s\n", error.what());
+    status = kExitInternal;
+  }
+  return status;
+}
+
+bool InterruptRequested() { return interrupted != 0; }
+
+std::vector<FlagValue> OwnFlags() {
+  std::vector<FlagValue> flags;
+  for (const gflags::CommandLineFlagInfo& info : OwnFlagInfos()) {
+    flags.push_back(ToFlagValue(info));
+  }
+  return flags;
+}
+
+std::vector<FlagDescription> DescribeFlags() {
+  std::vector<FlagDescription> flags;
+  for (const gflags::CommandLineFlagInfo& info : OwnFlagInfos()) {
+    FlagDescription flag;
+    flag.name = info.name;
+    flag.type = info.type;
+    flag.description = info.description;
+    flag.default_value =
+        info.type == "double"
+            ? FormatNumber(std::strtod(info.default_value.c_str(), nullptr))
+            : info.default_value;
+    const auto condition = Conditions().find(info.name);
+    if (condition != Conditions().end()) {
+      flag.choices = condition->second.choices;
+      if (flag.choices.empty()) flag.range = Describe(condition->second);
+    }
+    flags.push_back(std::move(flag));
+  }
+  return flags;
+}
+
+std::vector<FlagValue> ChangedFlags() {
+  std::vector<FlagValue> flags;
+  for (FlagValue& flag : OwnFlags()) {
+    if (flag.value != flag.default_value) flags.push_back(std::move(flag));
+  }
+  return flags;
+}
+
+}  // namespace plumbline

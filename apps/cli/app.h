@@ -1,0 +1,121 @@
+#ifndef PLUMBLINE_APPS_CLI_APP_H_
+#define PLUMBLINE_APPS_CLI_APP_H_
+
+#include <plumbline/core/flag_value.h>
+
+#include <functional>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// Exit statuses of every binary.
+enum ExitStatus {
+  kExitSuccess = 0,
+  /// Wrong flags.
+  kExitUsage = 1,
+  /// Wrong input, or output that cannot be written (plumbline::Error).
+  kExitInput = 2,
+  /// Any other exception.
+  kExitInternal = 3,
+  /// Ctrl-C, with what was done so far written out (128 + SIGINT).
+  kExitInterrupted = 130,
+};
+
+/// Flags that belong together, for --help.
+struct FlagGroup {
+  std::string title;
+  /// Names without dashes, in the order in which they are shown.
+  std::vector<std::string> flags;
+};
+
+/// What --help says about a binary.
+struct AppInfo {
+  /// "plumbline_solve"
+  std::string name;
+  /// One or two sentences; wrapped to 80 columns.
+  std::string summary;
+  /// Command lines without the binary's name, shown as given:
+  /// "--input=LOG_OR_GRAPH --output_dir=DIR [flags]".
+  std::vector<std::string> usage;
+  /// A whole command line to start from.
+  std::string example;
+  /// Flags of ours that no group lists come last, under "Other flags".
+  std::vector<FlagGroup> groups;
+  /// Arguments that are no flags are refused unless this is true.
+  bool takes_arguments = false;
+};
+
+/// Parses the command line (and --flagfile, --fromenv), starts glog (warnings
+/// and worse, on stderr only) and catches Ctrl-C and SIGTERM. Returns the
+/// arguments that are no flags.
+///
+/// Ends the process: with status 0 after --help and --version, with kExitUsage
+/// and a message on stderr for an unknown flag, a value that does not parse, a
+/// value outside of its range (PLUMBLINE_FLAG_RANGE, PLUMBLINE_FLAG_CHOICES)
+/// and arguments where none are taken.
+std::vector<std::string> ParseFlags(const AppInfo& info, int argc, char** argv);
+
+/// Runs a binary's work and returns the process's exit status: what `run`
+/// returns; kExitInput when it throws an Error (its message goes to stderr);
+/// kExitInternal for any other exception; kExitInterrupted when it succeeded
+/// but was cut short by Ctrl-C.
+int RunMain(const std::function<int()>& run);
+
+/// True once the user pressed Ctrl-C (or the process got SIGTERM). Long work
+/// asks between steps, writes what it has and returns. A second Ctrl-C ends
+/// the process at once.
+bool InterruptRequested();
+
+/// What --help says of a flag of this project.
+struct FlagDescription {
+  std::string name;
+  /// "bool", "int32", "double", "string", ...
+  std::string type;
+  std::string description;
+  /// As it is shown; may be empty.
+  std::string default_value;
+  /// The words that are understood, if these are all.
+  std::vector<std::string> choices;
+  /// "0 to 1"; empty without a range.
+  std::string range;
+};
+
+/// All of them, by name.
+std::vector<FlagDescription> DescribeFlags();
+
+/// Flags of this project that are linked into the binary, by name.
+std::vector<FlagValue> OwnFlags();
+
+/// Of OwnFlags those whose value is not the default.
+std::vector<FlagValue> ChangedFlags();
+
+/// What is wrong with the present values of flags that have a range or a list
+/// of choices: one line each, empty when all is well. ParseFlags calls it.
+std::vector<std::string> CheckFlagValues();
+
+namespace internal {
+
+/// Registers the condition that CheckFlagValues checks.
+struct FlagCondition {
+  FlagCondition(const char* name, double minimum, double maximum);
+  FlagCondition(const char* name, std::initializer_list<const char*> choices);
+};
+
+}  // namespace internal
+
+/// Behind a DEFINE_double, DEFINE_int32, ...: the values that make sense, both
+/// ends included. Values that are not finite are refused always.
+#define PLUMBLINE_FLAG_RANGE(flag, minimum, maximum)                   \
+  static const ::plumbline::internal::FlagCondition flag_range_##flag( \
+      #flag, (minimum), (maximum))
+
+/// Behind a DEFINE_string: the words that are understood.
+#define PLUMBLINE_FLAG_CHOICES(flag, ...)                                \
+  static const ::plumbline::internal::FlagCondition flag_choices_##flag( \
+      #flag, {__VA_ARGS__})
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_APPS_CLI_APP_H_

@@ -1,0 +1,153 @@
+#include <gflags/gflags.h>
+#include <plumbline/apps/cli/progress.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <utility>
+
+DEFINE_bool(quiet, false, "Print errors only: no progress bars and no remarks");
+DEFINE_bool(verbose, false, "Print what is being done, a line a step");
+
+namespace plumbline {
+namespace {
+
+constexpr std::chrono::milliseconds kPatience(1000);
+constexpr std::chrono::milliseconds kInterval(200);
+
+// There is a bar on the terminal.
+bool bar_is_shown = false;
+
+void WipeBar() {
+  if (!bar_is_shown) return;
+  std::fputs("\r\033[K", stderr);
+  bar_is_shown = false;
+}
+
+void PrintLine(const char* format, va_list arguments) {
+  WipeBar();
+  std::vfprintf(stderr, format, arguments);
+  std::fputc('\n', stderr);
+}
+
+int TerminalColumns() {
+  winsize size = {};
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) {
+    return 80;
+  }
+  return size.ws_col;
+}
+
+std::string FormatDuration(double seconds) {
+  // A long way off is far enough; also keeps the conversion in range.
+  const long long rounded =
+      std::llround(std::min(std::max(seconds, 0.0), 3.6e8));
+  char text[48];
+  if (rounded < 60) {
+    std::snprintf(text, sizeof(text), "%lld s", rounded);
+  } else if (rounded < 3600) {
+    std::snprintf(text, sizeof(text), "%lld min %02lld s", rounded / 60,
+                  rounded % 60);
+  } else {
+    std::snprintf(text, sizeof(text), "%lld h %02lld min", rounded / 3600,
+                  rounded % 3600 / 60);
+  }
+  return text;
+}
+
+std::string FormatRate(double rate) {
+  char text[32];
+  std::snprintf(text, sizeof(text), rate < 10.0 ? "%.1f" : "%.0f", rate);
+  return text;
+}
+
+}  // namespace
+
+std::string ProgressLine(const std::string& title, const std::string& unit,
+                         std::int64_t done, std::int64_t total, double seconds,
+                         int columns) {
+  const double rate = seconds > 0.0 ? done / seconds : 0.0;
+  std::string numbers = std::to_string(done);
+  if (total > 0) numbers += "/" + std::to_string(total);
+  numbers += ", " + FormatRate(rate) + " " + unit + "/s";
+  std::string bar;
+  if (total > 0) {
+    const double fraction =
+        std::min(1.0, std::max(0.0, static_cast<double>(done) / total));
+    if (rate > 0.0) {
+      numbers += ", " + FormatDuration((total - done) / rate) + " left";
+    }
+    // The bar takes what the words leave, within reason.
+    const int room =
+        columns - static_cast<int>(title.size() + numbers.size()) - 9;
+    const int width = std::min(30, room);
+    if (width >= 5) {
+      const int filled = static_cast<int>(fraction * width);
+      bar = "[" + std::string(filled, '=') + std::string(width - filled, ' ') +
+            "] ";
+    }
+    char percent[16];
+    std::snprintf(percent, sizeof(percent), "%3d%% ",
+                  static_cast<int>(fraction * 100.0));
+    bar += percent;
+  }
+  std::string line = title + " " + bar + numbers;
+  if (static_cast<int>(line.size()) > columns) {
+    line.resize(static_cast<std::size_t>(std::max(columns, 0)));
+  }
+  return line;
+}
+
+void Remark(const char* format, ...) {
+  if (FLAGS_quiet) return;
+  va_list arguments;
+  va_start(arguments, format);
+  PrintLine(format, arguments);
+  va_end(arguments);
+}
+
+void Detail(const char* format, ...) {
+  if (FLAGS_quiet || !FLAGS_verbose) return;
+  va_list arguments;
+  va_start(arguments, format);
+  PrintLine(format, arguments);
+  va_end(arguments);
+}
+
+Progress::Progress(std::string title, std::string unit, std::int64_t total)
+    : title_(std::move(title)),
+      unit_(std::move(unit)),
+      total_(total),
+      enabled_(!FLAGS_quiet && isatty(STDERR_FILENO) != 0),
+      start_(Clock::now()),
+      last_shown_(start_) {}
+
+Progress::~Progress() { Finish(); }
+
+void Progress::Update(std::int64_t done) {
+  if (!enabled_) return;
+  const Clock::time_point now = Clock::now();
+  if (now - start_ < kPatience) return;
+  if (visible_ && now - last_shown_ < kInterval) return;
+  const std::chrono::duration<double> elapsed = now - start_;
+  // One column is left free: some terminals wrap when the last one is used.
+  const std::string line = ProgressLine(title_, unit_, done, total_,
+                                        elapsed.count(), TerminalColumns() - 1);
+  std::fprintf(stderr, "\r\033[K%s", line.c_str());
+  std::fflush(stderr);
+  visible_ = true;
+  bar_is_shown = true;
+  last_shown_ = now;
+}
+
+void Progress::Finish() {
+  if (!visible_) return;
+  WipeBar();
+  std::fflush(stderr);
+  visible_ = false;
+}
+
+}  // namespace plumbline

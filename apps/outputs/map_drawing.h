@@ -1,0 +1,118 @@
+#ifndef PLUMBLINE_OUTPUTS_MAP_DRAWING_H_
+#define PLUMBLINE_OUTPUTS_MAP_DRAWING_H_
+
+#include <plumbline/core/graph.h>
+#include <plumbline/factors/pose2.h>
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// A straight wall, m, map frame.
+struct DrawnWall {
+  double x1 = 0.0;
+  double y1 = 0.0;
+  double x2 = 0.0;
+  double y2 = 0.0;
+  /// Index into MapDrawing::cluster_directions, or -1 for none.
+  int cluster = -1;
+  FeatureId id = kNoId;
+  /// What was merged into it, ascending (MergeWalls); empty stands for the id.
+  std::vector<FeatureId> members;
+};
+
+/// A round thing, m, map frame.
+struct DrawnCircle {
+  double x = 0.0;
+  double y = 0.0;
+  double radius = 0.0;
+  FeatureId id = kNoId;
+};
+
+/// A rectangle of walls, m, rad, map frame: half its sides along its direction
+/// and across.
+struct DrawnRectangle {
+  double x = 0.0;
+  double y = 0.0;
+  double direction = 0.0;
+  double half_length = 0.0;
+  double half_width = 0.0;
+  FeatureId id = kNoId;
+};
+
+/// How well a position is known, m, map frame.
+struct DrawnEllipse {
+  double x = 0.0;
+  double y = 0.0;
+  /// Half axes, and the direction of the longer one, rad.
+  double major = 0.0;
+  double minor = 0.0;
+  double direction = 0.0;
+  FeatureId id = kNoId;
+};
+
+/// A map as a person wants to see it. Whatever has a number that is not finite,
+/// or lies more than 10,000 km from the origin, is passed over.
+struct MapDrawing {
+  std::vector<DrawnWall> walls;
+  std::vector<DrawnCircle> circles;
+  /// Tinted areas under everything, the large ones first.
+  std::vector<DrawnRectangle> rectangles;
+  /// Where walls of different visits were found to be one: x, y (m, map frame),
+  /// direction of the wall (rad). A thin mark across the wall.
+  std::vector<Pose2> closures;
+  /// Drawn thin, over everything; what they are of, for the legend.
+  std::vector<DrawnEllipse> ellipses;
+  std::string ellipses_title;
+  /// Drawn thin and light under the walls.
+  std::vector<Pose2> path;
+  /// Scan points or landmarks, m, map frame: faint, under everything.
+  std::vector<Eigen::Vector2d> points;
+  /// Common centres of circles, m, map frame: crosses.
+  std::vector<Eigen::Vector2d> centers;
+  /// Direction of each orientation cluster, rad, modulo pi: for the legend.
+  std::vector<double> cluster_directions;
+  /// The orientation feature of each cluster; empty when not made from a graph.
+  std::vector<FeatureId> cluster_features;
+  /// One line above the map; may be empty.
+  std::string title;
+};
+
+struct MapDrawingOptions {
+  /// Length of the picture's longer side, px, 200 to 20000. Line widths and
+  /// letters grow with it.
+  int long_side = 2400;
+};
+
+/// Draws the walls (segments and lines with an extent), circles, rectangles and
+/// points of a graph; virtual points are common centres. A wall's cluster is
+/// the orientation feature to which live structure ties it or the rectangle
+/// that it is a side of; clusters are numbered by the length of wall that they
+/// hold, longest first. An empty `path` is replaced by the graph's poses in the
+/// order of ids.
+MapDrawing DrawingFromGraph(const Graph& graph, const std::vector<Pose2>& path);
+
+/// Ends of a wall feature (segment or line) in the map frame, m: x1, y1, x2,
+/// y2. False when the feature is no wall or has no extent.
+bool WallEnds(const Feature& feature, DrawnWall* wall);
+
+/// Largest length of the form 1, 2 or 5 times a power of ten that is at most
+/// `longest` (> 0), m.
+double ScaleBarLength(double longest);
+
+/// Writes the drawing as SVG whose outer user unit is the metre: x to the
+/// right as in the map, y downwards, so y of the map is minus y of the viewBox.
+/// Written whole or not at all; the same drawing gives the same bytes. Throws
+/// Error for options out of range or when the file cannot be written.
+void WriteMapSvg(const MapDrawing& drawing, const std::string& path,
+                 const MapDrawingOptions& options = {});
+
+/// The same picture as PNG on white.
+void WriteMapPng(const MapDrawing& drawing, const std::string& path,
+                 const MapDrawingOptions& options = {});
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_OUTPUTS_MAP_DRAWING_H_

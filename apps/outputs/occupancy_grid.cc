@@ -1,0 +1,288 @@
+#include <plumbline/core/atomic_file.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/number_text.h>
+#include <plumbline/outputs/occupancy_grid.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+std::string Number(double value) {
+  std::string text;
+  AppendNumber(value, &text);
+  return text;
+}
+
+// With two digits, rounded up: what is told to a person who has to give it.
+std::string RoundedUp(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
+  std::string text;
+  AppendFixed(std::ceil(value / unit) * unit,
+              std::max(0, static_cast<int>(-std::floor(std::log10(unit)))),
+              &text);
+  return text;
+}
+
+std::vector<Vector2d> BeamDirections(const Scan& scan) {
+  std::vector<Vector2d> beams(scan.ranges.size());
+  for (std::size_t i = 0; i < beams.size(); ++i) {
+    const double angle =
+        scan.start_angle + static_cast<double>(i) * scan.angle_step;
+    beams[i] = Vector2d(std::cos(angle), std::sin(angle));
+  }
+  return beams;
+}
+
+}  // namespace
+
+OccupancyGrid::OccupancyGrid(const Vector2d& low, const Vector2d& high,
+                             const OccupancyOptions& options)
+    : options_(options) {
+  const double resolution = options_.resolution;
+  if (!(resolution > 0.0) || !std::isfinite(resolution) ||
+      options_.border < 0 || !(options_.usable_range > 0.0)) {
+    throw PLUMBLINE_ERROR("occupancy grid with a resolution of " +
+                              Number(resolution) + " m and a usable range of " +
+                              Number(options_.usable_range) + " m",
+                          "numbers over 0");
+  }
+  const Vector2d size = high - low;
+  if (!(size[0] >= 0.0) || !(size[1] >= 0.0) || !size.allFinite()) {
+    throw PLUMBLINE_ERROR("an occupancy grid of nothing",
+                          "scans with returns at finite poses");
+  }
+  const Vector2d cells = (size / resolution).array() + 2.0 +
+                         2.0 * static_cast<double>(options_.border);
+  if (cells[0] * cells[1] > static_cast<double>(options_.max_cells)) {
+    // Rims and rounding take a little more.
+    const double needed =
+        1.02 *
+        std::sqrt(size[0] * size[1] / static_cast<double>(options_.max_cells));
+    const double longest = size.maxCoeff() * 1.02 /
+                           static_cast<double>(options_.max_cells) *
+                           (2.0 + 2.0 * options_.border);
+    throw Error("occupancy grid", 0,
+                RoundedUp(size[0]) + " m x " + RoundedUp(size[1]) +
+                    " m in cells of " + Number(resolution) + " m are " +
+                    RoundedUp(cells[0] * cells[1]) + " cells",
+                "at most " + std::to_string(options_.max_cells) +
+                    ", as with cells of " +
+                    RoundedUp(std::max(needed, longest)) + " m");
+  }
+  // Whole multiples of the cell keep the grids of two runs aligned.
+  const Vector2d first =
+      (low / resolution).array().floor() - static_cast<double>(options_.border);
+  const Vector2d last = (high / resolution).array().floor() +
+                        static_cast<double>(options_.border);
+  origin_ = first * resolution;
+  width_ = static_cast<int>(last[0] - first[0]) + 1;
+  height_ = static_cast<int>(last[1] - first[1]) + 1;
+  tile_columns_ = (width_ + kTileSize - 1) >> kTileBits;
+  tile_rows_ = (height_ + kTileSize - 1) >> kTileBits;
+  tiles_.resize(static_cast<std::size_t>(tile_columns_) * tile_rows_);
+}
+
+OccupancyGrid::Tile* OccupancyGrid::TileAt(int column, int row) {
+  std::unique_ptr<Tile>& tile =
+      tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
+             (column >> kTileBits)];
+  if (tile == nullptr) tile = std::make_unique<Tile>();
+  return tile.get();
+}
+
+// Once a scan; the share is kept when a counter is full.
+inline void OccupancyGrid::Count(std::uint16_t Cell::*counter, Cell* cell) {
+  if (cell->scan == scan_) return;
+  cell->scan = scan_;
+  if (++(cell->*counter) == std::numeric_limits<std::uint16_t>::max()) {
+    cell->hits /= 2;
+    cell->misses /= 2;
+  }
+}
+
+// Bresenham's line from one cell to another: all octants by one error term.
+void OccupancyGrid::Clear(int column0, int row0, int column1, int row1,
+                          bool with_last) {
+  const int dx = std::abs(column1 - column0);
+  const int dy = -std::abs(row1 - row0);
+  const int step_x = column0 < column1 ? 1 : -1;
+  const int step_y = row0 < row1 ? 1 : -1;
+  int error = dx + dy;
+  int x = column0;
+  int y = row0;
+  Tile* tile = nullptr;
+  int tile_x = -1;
+  int tile_y = -1;
+  for (;;) {
+    const bool is_last = x == column1 && y == row1;
+    if (is_last && !with_last) return;
+    if ((x >> kTileBits) != tile_x || (y >> kTileBits) != tile_y) {
+      tile_x = x >> kTileBits;
+      tile_y = y >> kTileBits;
+      const bool is_inside = tile_x >= 0 && tile_y >= 0 &&
+                             tile_x < tile_columns_ && tile_y < tile_rows_;
+      tile = is_inside ? TileAt(x, y) : nullptr;
+    }
+    if (tile != nullptr) {
+      Count(&Cell::misses, &(*tile)[((y & (kTileSize - 1)) << kTileBits) +
+                                    (x & (kTileSize - 1))]);
+    }
+    if (is_last) return;
+    const int doubled = 2 * error;
+    if (doubled >= dy) {
+      error += dy;
+      x += step_x;
+    }
+    if (doubled <= dx) {
+      error += dx;
+      y += step_y;
+    }
+  }
+}
+
+void OccupancyGrid::AddScan(const Scan& scan, const Pose2& pose) {
+  const Pose2 laser = Compose(pose, scan.laser_offset);
+  if (!laser.allFinite()) return;
+  if (scan.ranges.size() != beams_.size() || scan.start_angle != start_angle_ ||
+      scan.angle_step != angle_step_) {
+    beams_ = BeamDirections(scan);
+    start_angle_ = scan.start_angle;
+    angle_step_ = scan.angle_step;
+  }
+  // 0 is the mark of cells that no scan counted.
+  if (++scan_ == 0) ++scan_;
+
+  const double per_metre = 1.0 / options_.resolution;
+  const Vector2d start = (laser.head<2>() - origin_) * per_metre;
+  const double c = std::cos(laser[2]) * per_metre;
+  const double s = std::sin(laser[2]) * per_metre;
+  constexpr double kFarthestCell = 1e9;
+  if (!(start.cwiseAbs().maxCoeff() < kFarthestCell)) return;
+  const int column = static_cast<int>(std::floor(start[0]));
+  const int row = static_cast<int>(std::floor(start[1]));
+  rays_.clear();
+  for (std::size_t i = 0; i < beams_.size(); ++i) {
+    double range = scan.ranges[i];
+    if (!(range >= options_.minimum_range)) continue;
+    const bool is_hit = range <= options_.usable_range;
+    range = std::min(range, options_.usable_range);
+    const Vector2d& beam = beams_[i];
+    const double x = start[0] + range * (c * beam[0] - s * beam[1]);
+    const double y = start[1] + range * (s * beam[0] + c * beam[1]);
+    if (!(std::abs(x) < kFarthestCell && std::abs(y) < kFarthestCell)) continue;
+    rays_.push_back({static_cast<int>(std::floor(x)),
+                     static_cast<int>(std::floor(y)), is_hit});
+  }
+  for (const Ray& ray : rays_) {
+    if (!ray.is_hit || ray.column < 0 || ray.row < 0 || ray.column >= width_ ||
+        ray.row >= height_) {
+      continue;
+    }
+    Tile* const tile = TileAt(ray.column, ray.row);
+    Count(&Cell::hits, &(*tile)[((ray.row & (kTileSize - 1)) << kTileBits) +
+                                (ray.column & (kTileSize - 1))]);
+  }
+  for (const Ray& ray : rays_) {
+    Clear(column, row, ray.column, ray.row, !ray.is_hit);
+  }
+}
+
+std::uint8_t OccupancyGrid::Pixel(int column, int row) const {
+  const std::unique_ptr<Tile>& tile =
+      tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
+             (column >> kTileBits)];
+  if (tile == nullptr) return kUnknown;
+  const Cell& cell = (*tile)[((row & (kTileSize - 1)) << kTileBits) +
+                             (column & (kTileSize - 1))];
+  const int seen = cell.hits + cell.misses;
+  if (seen == 0) return kUnknown;
+  if (cell.hits >= options_.occupied_share * seen) {
+    // Once is no evidence, neither that something is there nor that not.
+    return cell.hits >= options_.min_hits ? kOccupied : kUnknown;
+  }
+  return kFree;
+}
+
+OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
+                                const std::vector<Pose2>& poses,
+                                const OccupancyOptions& options) {
+  if (scans.size() < poses.size()) {
+    throw PLUMBLINE_ERROR(std::to_string(poses.size()) + " poses for " +
+                              std::to_string(scans.size()) + " scans",
+                          "a scan a pose");
+  }
+  Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
+  Vector2d high = -low;
+  std::vector<Vector2d> beams;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Scan& scan = scans[i];
+    if (i == 0 || scan.ranges.size() != scans[i - 1].ranges.size() ||
+        scan.start_angle != scans[i - 1].start_angle ||
+        scan.angle_step != scans[i - 1].angle_step) {
+      beams = BeamDirections(scan);
+    }
+    const Pose2 laser = Compose(poses[i], scan.laser_offset);
+    if (!laser.allFinite()) continue;
+    const double c = std::cos(laser[2]);
+    const double s = std::sin(laser[2]);
+    for (std::size_t j = 0; j < beams.size(); ++j) {
+      if (!(scan.ranges[j] >= options.minimum_range)) continue;
+      const double range =
+          std::min<double>(scan.ranges[j], options.usable_range);
+      const Vector2d end(
+          laser[0] + range * (c * beams[j][0] - s * beams[j][1]),
+          laser[1] + range * (s * beams[j][0] + c * beams[j][1]));
+      low = low.cwiseMin(end);
+      high = high.cwiseMax(end);
+    }
+    low = low.cwiseMin(laser.head<2>());
+    high = high.cwiseMax(laser.head<2>());
+  }
+  OccupancyGrid grid(low, high, options);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    grid.AddScan(scans[i], poses[i]);
+  }
+  return grid;
+}
+
+void WriteOccupancyPgm(const OccupancyGrid& grid, std::ostream& output) {
+  output << "P5\n# plumbline: " << Number(grid.resolution()) << " m a pixel\n"
+         << grid.width() << ' ' << grid.height() << "\n255\n";
+  std::string line(static_cast<std::size_t>(grid.width()), '\0');
+  for (int row = grid.height() - 1; row >= 0; --row) {
+    for (int column = 0; column < grid.width(); ++column) {
+      line[column] = static_cast<char>(grid.Pixel(column, row));
+    }
+    output.write(line.data(), static_cast<std::streamsize>(line.size()));
+  }
+}
+
+void WriteOccupancyYaml(const OccupancyGrid& grid, const std::string& image,
+                        std::ostream& output) {
+  // 205 stands for (255 - 205) / 255 = 0.19608, just not free.
+  output << "image: " << image
+         << "\nmode: trinary\nresolution: " << Number(grid.resolution())
+         << "\norigin: [" << Number(grid.origin()[0]) << ", "
+         << Number(grid.origin()[1])
+         << ", 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
+}
+
+void WriteOccupancyMap(const OccupancyGrid& grid, const std::string& stem) {
+  const std::string image = stem + ".pgm";
+  WriteFileAtomically(image, [&grid](std::ostream& output) {
+    WriteOccupancyPgm(grid, output);
+  });
+  WriteFileAtomically(stem + ".yaml", [&](std::ostream& output) {
+    WriteOccupancyYaml(grid, std::filesystem::path(image).filename().string(),
+                       output);
+  });
+}
+
+}  // namespace plumbline

@@ -1,0 +1,129 @@
+#ifndef PLUMBLINE_OUTPUTS_OCCUPANCY_GRID_H_
+#define PLUMBLINE_OUTPUTS_OCCUPANCY_GRID_H_
+
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/scan.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+struct OccupancyOptions {
+  /// Side of a cell, m.
+  double resolution = 0.05;
+  /// Returns that are nearer are the robot itself, m; returns that are farther
+  /// hit nothing, and clear the way only so far.
+  double minimum_range = 0.1;
+  double usable_range = 50.0;
+  /// A cell is occupied when at least so many scans hit it, and these are at
+  /// least this share of the scans that hit it or saw through it. The share is
+  /// the threshold at 0 of log-odds that go up by 3 for a hit and down by 1
+  /// for a miss.
+  int min_hits = 2;
+  double occupied_share = 0.25;
+  /// Rim of unknown cells around what was seen.
+  int border = 10;
+  /// Most cells that the grid may have (width times height).
+  std::int64_t max_cells = 100'000'000;
+};
+
+/// A grid of what is free, occupied and unknown, from the rays of laser scans.
+/// Memory is taken by tiles as they are seen: 6 bytes a cell.
+class OccupancyGrid {
+ public:
+  /// What ROS' map_server writes for these in a PGM.
+  static constexpr std::uint8_t kOccupied = 0;
+  static constexpr std::uint8_t kUnknown = 205;
+  static constexpr std::uint8_t kFree = 254;
+
+  /// An unknown grid that holds everything between two corners (m, map frame)
+  /// and the border. Its cells are aligned to multiples of the resolution.
+  /// Throws Error when options make no sense or the grid has too many cells;
+  /// the message says which resolution would do.
+  OccupancyGrid(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                const OccupancyOptions& options);
+
+  /// Casts the rays of a scan whose robot stood at `pose` (map frame). A cell
+  /// is hit or seen through at most once a scan, and hit rather than seen
+  /// through. Readings without return are passed over: a laser also sees none
+  /// on glass and on black things. What lies outside of the grid is left out.
+  void AddScan(const Scan& scan, const Pose2& pose);
+
+  /// kOccupied, kFree or kUnknown; column from the left (x), row from the
+  /// bottom (y).
+  std::uint8_t Pixel(int column, int row) const;
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  double resolution() const { return options_.resolution; }
+  /// Lower left corner of the lower left cell, m, map frame.
+  const Eigen::Vector2d& origin() const { return origin_; }
+
+ private:
+  static constexpr int kTileBits = 6;
+  static constexpr int kTileSize = 1 << kTileBits;
+  struct Cell {
+    std::uint16_t hits = 0;
+    std::uint16_t misses = 0;
+    /// The scan that counted it last.
+    std::uint16_t scan = 0;
+  };
+  using Tile = std::array<Cell, kTileSize * kTileSize>;
+
+  Tile* TileAt(int column, int row);
+  void Count(std::uint16_t Cell::*counter, Cell* cell);
+  void Clear(int column0, int row0, int column1, int row1, bool with_last);
+
+  OccupancyOptions options_;
+  int width_ = 0;
+  int height_ = 0;
+  int tile_columns_ = 0;
+  int tile_rows_ = 0;
+  Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
+  std::vector<std::unique_ptr<Tile>> tiles_;
+  /// Number of the present scan, from 1, modulo 2^16: a cell that was seen last
+  /// exactly so many scans ago is passed over once.
+  std::uint16_t scan_ = 0;
+  /// Directions of the beams of the last scan, in the laser's frame.
+  std::vector<Eigen::Vector2d> beams_;
+  double start_angle_ = 0.0;
+  double angle_step_ = 0.0;
+  /// Ends of the present scan's rays.
+  struct Ray {
+    int column, row;
+    bool is_hit;
+  };
+  std::vector<Ray> rays_;
+};
+
+/// The grid of all scans, one pose (map frame) a scan; poses that are not
+/// finite are passed over. Throws as the constructor does, also when there is
+/// nothing to be seen.
+OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
+                                const std::vector<Pose2>& poses,
+                                const OccupancyOptions& options);
+
+/// Writes the grid as binary PGM, top row first, as map_server and Nav2 read
+/// it.
+void WriteOccupancyPgm(const OccupancyGrid& grid, std::ostream& output);
+
+/// Writes what goes with the picture: image, mode, resolution (m a pixel),
+/// origin (lower left corner, m, m, rad), negate, occupied_thresh, free_thresh.
+/// The thresholds are those with which 0, 205 and 254 read as occupied, unknown
+/// and free.
+void WriteOccupancyYaml(const OccupancyGrid& grid, const std::string& image,
+                        std::ostream& output);
+
+/// Writes `stem`.pgm and then `stem`.yaml, each whole or not at all. Throws
+/// Error when one cannot be written.
+void WriteOccupancyMap(const OccupancyGrid& grid, const std::string& stem);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_OUTPUTS_OCCUPANCY_GRID_H_

@@ -1,0 +1,393 @@
+#include <plumbline/core/atomic_file.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/core/version.h>
+#include <plumbline/outputs/map_drawing.h>
+#include <plumbline/outputs/report.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <exception>
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace plumbline {
+
+// report_page.html, by the build.
+extern const char kReportPage[];
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kLeastWay = 0.1;  // m, between poses of the path
+
+// To a tenth of a millimetre, or of the unit that it is in: the page stays
+// small. What is not finite becomes null.
+Json Rounded(double value, double steps = 1e4) {
+  if (!std::isfinite(value)) return nullptr;
+  const double rounded = std::round(value * steps) / steps;
+  return rounded == 0.0 ? 0.0 : rounded;
+}
+
+// With six digits.
+Json Digits(double value) {
+  if (!std::isfinite(value) || value == 0.0) return Rounded(value);
+  const double steps =
+      std::pow(10.0, 5.0 - std::floor(std::log10(std::abs(value))));
+  return std::isfinite(steps) && steps > 0.0 ? Rounded(value, steps)
+                                             : Json(0.0);
+}
+
+Json RoundedArray(const std::vector<double>& values) {
+  Json array = Json::array();
+  for (const double value : values) {
+    if (!std::isfinite(value)) return nullptr;
+    array.push_back(Rounded(value));
+  }
+  return array;
+}
+
+// What is drawn of a feature: 4 numbers are the ends of a wall, 3 a circle, 2 a
+// point, 8 the corners of a rectangle; null for what has no place.
+Json Geometry(const Feature& feature) {
+  const std::string& type = feature.type->name;
+  const auto& p = feature.parameters;
+  DrawnWall wall;
+  if (WallEnds(feature, &wall)) {
+    return RoundedArray({wall.x1, wall.y1, wall.x2, wall.y2});
+  }
+  if (type == "circle") return RoundedArray({p[0], p[1], p[2]});
+  if (type == "point") return RoundedArray({p[0], p[1]});
+  if (type == "rectangle") {
+    const Eigen::Vector2d center(p[0], p[1]);
+    const Eigen::Vector2d along(p[3] * std::cos(p[2]), p[3] * std::sin(p[2]));
+    const Eigen::Vector2d across(-p[4] * std::sin(p[2]), p[4] * std::cos(p[2]));
+    std::vector<double> corners;
+    const Eigen::Vector2d offsets[] = {-along - across, along - across,
+                                       along + across, -along + across};
+    for (const Eigen::Vector2d& offset : offsets) {
+      const Eigen::Vector2d corner = center + offset;
+      corners.push_back(corner[0]);
+      corners.push_back(corner[1]);
+    }
+    return RoundedArray(corners);
+  }
+  return nullptr;
+}
+
+// Names in the order in which they first occur, and which one each element has.
+class Names {
+ public:
+  int Add(const std::string& name) {
+    const auto added = ids_.emplace(name, static_cast<int>(names_.size()));
+    if (added.second) names_.push_back(name);
+    return added.first->second;
+  }
+  Json ToJson() const { return names_; }
+
+ private:
+  std::map<std::string, int> ids_;
+  Json names_ = Json::array();
+};
+
+// Units of the rows of the relations that come with the program: "deg" for what
+// is kept in rad and shown in degrees.
+const std::map<std::string, std::vector<std::string>>& RowUnits() {
+  static const auto* units =
+      new std::map<std::string, std::vector<std::string>>{
+          {"point_point_distance", {"m"}},
+          {"point_point_coincidence", {"m", "m"}},
+          {"point_line_distance", {"m"}},
+          {"point_circle_distance", {"m"}},
+          {"pose_pose", {"m", "m", "deg"}},
+          {"pose_segment_collinearity", {"m", "deg"}},
+          {"line_orientation", {"deg"}},
+          {"segment_orientation", {"deg"}},
+          {"orientation_orientation", {"deg"}},
+          {"rectangle_orientation", {"deg"}},
+          {"segment_rectangle", {"m", "deg"}},
+          {"line_rectangle", {"m", "deg"}}};
+  return *units;
+}
+
+// f(x) (-) u at the present state, in the relation's units; null when it cannot
+// be evaluated.
+Json ErrorOf(const Graph& graph, const Constraint& constraint) {
+  try {
+    RelationArguments arguments;
+    arguments.expected = constraint.expected;
+    const Eigen::Index rows = constraint.expected.size();
+    arguments.sqrt_information = Eigen::MatrixXd::Identity(rows, rows);
+    std::vector<const double*> blocks;
+    for (const FeatureId id : constraint.features) {
+      arguments.features.push_back(&graph.GetFeature(id));
+      blocks.push_back(arguments.features.back()->data());
+    }
+    std::vector<double> error(static_cast<std::size_t>(rows));
+    if (!constraint.type->make_cost(arguments)->Evaluate(
+            blocks.data(), error.data(), nullptr)) {
+      return nullptr;
+    }
+    Json array = Json::array();
+    for (const double value : error) array.push_back(Digits(value));
+    return array;
+  } catch (const std::exception&) {
+    return nullptr;
+  }
+}
+
+// One standard deviation of each row, the others left free to fit.
+Json ToleranceOf(const Constraint& constraint) {
+  Json array = Json::array();
+  for (Eigen::Index i = 0; i < constraint.information.rows(); ++i) {
+    const double information = constraint.information(i, i);
+    if (!(information > 0.0)) return nullptr;
+    array.push_back(Digits(1.0 / std::sqrt(information)));
+  }
+  return array;
+}
+
+Json FeaturesToJson(const Report& report, Names* types, Names* sources) {
+  const Graph& graph = *report.graph;
+  Json id = Json::array(), type = Json::array(), level = Json::array();
+  Json is_virtual = Json::array(), source = Json::array();
+  Json scans = Json::array(), measured = Json::array();
+  Json parameters = Json::array(), after = Json::array();
+  Json before = Json::array();
+  for (const Feature* feature : graph.Features()) {
+    // A path is shown as such; thousands of poses would hide the rest.
+    if (feature->type->name == "pose") continue;
+    id.push_back(feature->id);
+    type.push_back(types->Add(feature->type->name));
+    level.push_back(feature->level);
+    is_virtual.push_back(feature->is_virtual ? 1 : 0);
+    source.push_back(sources->Add(feature->source));
+    scans.push_back(feature->observations);
+    int measurements = 0;
+    for (const ConstraintId constraint_id : graph.ConstraintsOf(feature->id)) {
+      const Constraint& constraint = graph.GetConstraint(constraint_id);
+      measurements += constraint.kind == ConstraintClass::kMeasurement &&
+                      constraint.state == ConstraintState::kLive;
+    }
+    measured.push_back(measurements);
+    after.push_back(Geometry(*feature));
+    // Walls say all by their ends.
+    Json values = nullptr;
+    if (after.back().is_null()) {
+      values = Json::array();
+      for (int i = 0; i < feature->type->size; ++i) {
+        values.push_back(Digits(feature->parameters[i]));
+      }
+    }
+    parameters.push_back(std::move(values));
+    const auto found = report.before.features.find(feature->id);
+    before.push_back(found == report.before.features.end()
+                         ? Json(nullptr)
+                         : Geometry(found->second));
+  }
+  Json json;
+  json["id"] = std::move(id);
+  json["type"] = std::move(type);
+  json["level"] = std::move(level);
+  json["virtual"] = std::move(is_virtual);
+  json["source"] = std::move(source);
+  json["scans"] = std::move(scans);
+  json["measured"] = std::move(measured);
+  json["parameters"] = std::move(parameters);
+  json["after"] = std::move(after);
+  json["before"] =
+      report.before.features.empty() ? Json(nullptr) : std::move(before);
+  return json;
+}
+
+Json StructureToJson(const Graph& graph, Names* relations, Names* sources) {
+  Json id = Json::array(), relation = Json::array(), features = Json::array();
+  Json delta = Json::array(), live = Json::array(), error = Json::array();
+  Json tolerance = Json::array(), source = Json::array();
+  for (const Constraint* constraint : graph.Constraints()) {
+    if (constraint->kind != ConstraintClass::kStructure) continue;
+    const bool is_live = constraint->state == ConstraintState::kLive;
+    id.push_back(constraint->id);
+    relation.push_back(relations->Add(constraint->type->name));
+    features.push_back(constraint->features);
+    delta.push_back(Digits(constraint->delta));
+    live.push_back(is_live ? 1 : 0);
+    // Only the broken ones are listed with their reasons.
+    error.push_back(is_live ? Json(nullptr) : ErrorOf(graph, *constraint));
+    tolerance.push_back(is_live ? Json(nullptr) : ToleranceOf(*constraint));
+    source.push_back(sources->Add(constraint->source));
+  }
+  Json json;
+  json["id"] = std::move(id);
+  json["relation"] = std::move(relation);
+  json["features"] = std::move(features);
+  json["delta"] = std::move(delta);
+  json["live"] = std::move(live);
+  json["error"] = std::move(error);
+  json["tolerance"] = std::move(tolerance);
+  json["source"] = std::move(source);
+  return json;
+}
+
+// The poses of `path` that are worth drawing, by their indices.
+std::vector<std::size_t> SparsePath(const std::vector<Pose2>& path) {
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (!path[i].allFinite()) continue;
+    if (!indices.empty() &&
+        (path[i] - path[indices.back()]).head<2>().norm() < kLeastWay) {
+      continue;
+    }
+    indices.push_back(i);
+  }
+  return indices;
+}
+
+Json PathToJson(const std::vector<Pose2>& path,
+                const std::vector<std::size_t>& indices) {
+  Json json = Json::array();
+  for (const std::size_t i : indices) {
+    json.push_back(Rounded(path[i][0], 1e3));
+    json.push_back(Rounded(path[i][1], 1e3));
+  }
+  return json;
+}
+
+Json TraceToJson(const std::vector<EmTraceRow>& trace) {
+  Json json = Json::array();
+  for (const EmTraceRow& row : trace) {
+    json.push_back(
+        {{"iteration", row.phase.iteration},
+         {"phase", row.phase.phase},
+         {"measurement", Digits(row.phase.cost.measurement)},
+         {"structure", Digits(row.phase.cost.structure)},
+         {"constraints", row.phase.structure_constraints},
+         {"broken", row.phase.broken_constraints},
+         {"features", row.phase.features},
+         {"error", row.mean_position_error ? Digits(*row.mean_position_error)
+                                           : Json(nullptr)}});
+  }
+  return json;
+}
+
+Json CountsToJson(const Summary& summary) {
+  Json features = Json::object();
+  for (const auto& type : summary.features) {
+    Json levels = Json::object();
+    for (const auto& level : type.second) {
+      levels[std::to_string(level.first)] = level.second;
+    }
+    features[type.first] = std::move(levels);
+  }
+  Json constraints = Json::object();
+  for (const auto& type : summary.constraints) {
+    constraints[type.first] = {{"measurement", type.second.measurement},
+                               {"structure", type.second.structure},
+                               {"broken", type.second.broken}};
+  }
+  return {{"scans", summary.scans},
+          {"features", std::move(features)},
+          {"constraints", std::move(constraints)}};
+}
+
+Json DataToJson(const Report& report) {
+  const Summary& summary = report.summary;
+  Names types, sources, relations;
+  Json json;
+  json["title"] = report.title;
+  json["input"] = summary.input;
+  json["seed"] = summary.seed;
+  json["version"] = kVersion;
+  json["delta_threshold"] = Rounded(report.delta_threshold, 1e9);
+  json["counts"] = CountsToJson(summary);
+  json["cost"] = {{"initial", Digits(summary.initial_cost)},
+                  {"measurement", Digits(summary.measurement_cost)},
+                  {"structure", Digits(summary.structure_cost)}};
+  json["em"] = {{"iterations", summary.em_iterations},
+                {"converged", summary.em_converged}};
+  json["orthogonality_deg"] = summary.orthogonality_deg
+                                  ? Digits(*summary.orthogonality_deg)
+                                  : Json(nullptr);
+  json["skipped"] = Json::array();
+  for (const SkipReport& skip : summary.skipped) {
+    json["skipped"].push_back({{"reason", skip.reason}, {"count", skip.count}});
+  }
+  json["features"] = FeaturesToJson(report, &types, &sources);
+  json["structure"] = StructureToJson(*report.graph, &relations, &sources);
+  json["types"] = types.ToJson();
+  json["sources"] = sources.ToJson();
+  json["relations"] = relations.ToJson();
+  json["units"] = RowUnits();
+  const std::vector<std::size_t> way = SparsePath(report.path);
+  json["path"] = PathToJson(report.path, way);
+  json["path_before"] = report.before.path.size() == report.path.size()
+                            ? PathToJson(report.before.path, way)
+                            : Json(nullptr);
+  json["trace"] = TraceToJson(report.trace);
+  return json;
+}
+
+Json RunToJson(const Report& report) {
+  const Summary& summary = report.summary;
+  Json flags = Json::array();
+  for (const FlagValue& flag : report.flags) {
+    flags.push_back({{"name", flag.name},
+                     {"value", flag.value},
+                     {"default_value", flag.default_value}});
+  }
+  Json phase_seconds = Json::array();
+  for (const EmTraceRow& row : report.trace) {
+    phase_seconds.push_back(Digits(row.phase.seconds));
+  }
+  return {{"flags", std::move(flags)},
+          {"time_s",
+           {{"total", Digits(summary.total_seconds)},
+            {"parse", Digits(summary.parse_seconds)},
+            {"frontend", Digits(summary.frontend_seconds)},
+            {"detect", Digits(summary.detect_seconds)},
+            {"solve", Digits(summary.solve_seconds)}}},
+          {"peak_memory_bytes", summary.peak_memory_bytes},
+          {"phase_seconds", std::move(phase_seconds)}};
+}
+
+// As it may stand in a script element: nothing in it ends the element. Bytes
+// that are no UTF-8 are replaced.
+std::string ScriptText(const Json& json) {
+  const std::string text =
+      json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string escaped;
+  escaped.reserve(text.size());
+  for (const char c : text) {
+    if (c == '<') {
+      escaped += "\\u003c";
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+}  // namespace
+
+void WriteReport(const Report& report, std::ostream& output) {
+  const std::string page = kReportPage;
+  const std::string data_mark = "PLUMBLINE_DATA";
+  const std::string run_mark = "PLUMBLINE_RUN";
+  const std::size_t data = page.find(data_mark);
+  const std::size_t run = page.find(run_mark);
+  if (data == std::string::npos || run == std::string::npos || run < data) {
+    throw PLUMBLINE_ERROR("the page has no place for its data",
+                          data_mark + " and then " + run_mark);
+  }
+  output << page.substr(0, data) << ScriptText(DataToJson(report))
+         << page.substr(data + data_mark.size(), run - data - data_mark.size())
+         << ScriptText(RunToJson(report)) << page.substr(run + run_mark.size());
+}
+
+void WriteReport(const Report& report, const std::string& path) {
+  WriteFileAtomically(
+      path, [&report](std::ostream& output) { WriteReport(report, output); });
+}
+
+}  // namespace plumbline

@@ -1,0 +1,48 @@
+#ifndef PLUMBLINE_OUTPUTS_REPORT_H_
+#define PLUMBLINE_OUTPUTS_REPORT_H_
+
+#include <plumbline/core/flag_value.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/map_without_structure.h>
+#include <plumbline/outputs/em_trace.h>
+#include <plumbline/outputs/summary.h>
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// What report.html shows.
+struct Report {
+  /// Never null while it is written.
+  const Graph* graph = nullptr;
+  /// Raw features, and one pose for each of the path; without features there is
+  /// no before and after.
+  MapWithoutStructure before;
+  /// Map frame; what lies nearer than 10 cm to the one before is left out.
+  std::vector<Pose2> path;
+  std::vector<EmTraceRow> trace;
+  Summary summary;
+  /// All of them, not only those that were changed.
+  std::vector<FlagValue> flags;
+  double delta_threshold = 0.0;
+  std::string title;
+};
+
+/// Writes one page that needs nothing but a browser: the map with and without
+/// structure, what supports each wall, the levels of structure, delta, costs by
+/// phase of EM, broken constraints, times, flags. Names and paths are data in
+/// it, never markup. The same report gives the same bytes; what differs between
+/// two runs of the same input (times, memory, flags) stands on one line, in the
+/// element with the id "run".
+void WriteReport(const Report& report, std::ostream& output);
+
+/// The same into a file, whole or not at all. Throws Error when it cannot be
+/// written.
+void WriteReport(const Report& report, const std::string& path);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_OUTPUTS_REPORT_H_

@@ -1,0 +1,302 @@
+#include <plumbline/core/atomic_file.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/graph_json.h>
+#include <plumbline/frontend/tum.h>
+#include <plumbline/outputs/em_trace.h>
+#include <plumbline/outputs/floor_plan.h>
+#include <plumbline/outputs/floor_plan_dxf.h>
+#include <plumbline/outputs/floor_plan_geojson.h>
+#include <plumbline/outputs/floor_plan_svg.h>
+#include <plumbline/outputs/map_drawing.h>
+#include <plumbline/outputs/marginals_output.h>
+#include <plumbline/outputs/report.h>
+#include <plumbline/outputs/solve_outputs.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <functional>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using std::filesystem::path;
+
+std::vector<Pose2> Poses(const SolveOutcome& outcome) {
+  std::vector<Pose2> poses;
+  poses.reserve(outcome.trajectory.size());
+  for (const TimedPose& timed : outcome.trajectory) poses.push_back(timed.pose);
+  return poses;
+}
+
+MapDrawing Drawing(const SolveOutcome& outcome) {
+  MapDrawing drawing = DrawingFromGraph(*outcome.graph, Poses(outcome));
+  drawing.title = outcome.title;
+  if (outcome.ellipse_sigmas > 0.0) {
+    drawing.ellipses =
+        EllipsesOf(*outcome.graph, outcome.covariances, outcome.ellipse_sigmas);
+    char text[64];
+    std::snprintf(text, sizeof(text), "%g standard deviations",
+                  outcome.ellipse_sigmas);
+    drawing.ellipses_title = text;
+  }
+  return drawing;
+}
+
+FloorPlan Plan(const SolveOutcome& outcome) {
+  FloorPlan plan = MakeFloorPlan(*outcome.graph, Poses(outcome));
+  plan.title = outcome.title;
+  return plan;
+}
+
+Report MakeReport(const SolveOutcome& outcome) {
+  Report report;
+  report.graph = outcome.graph;
+  if (outcome.without_structure) report.before = outcome.without_structure();
+  report.path = Poses(outcome);
+  for (const EmPhase& phase : outcome.trace)
+    report.trace.push_back({phase, {}});
+  report.summary = outcome.summary;
+  report.flags = outcome.flags;
+  report.delta_threshold = outcome.delta_threshold;
+  report.title = outcome.title;
+  return report;
+}
+
+std::string WriteOccupancy(const SolveOutcome& outcome, const path& folder) {
+  std::optional<OccupancyGrid> grid;
+  try {
+    grid = MakeOccupancyGrid(*outcome.scans, Poses(outcome), outcome.occupancy);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  WriteOccupancyMap(*grid, folder / "occupancy");
+  return "";
+}
+
+// For writers that have no reason not to write.
+template <typename Write>
+auto Always(Write write) {
+  return [write](const SolveOutcome& outcome, const path& folder) {
+    write(outcome, folder);
+    return std::string();
+  };
+}
+
+// Runs the tasks on so many threads; the first exception, in the order of
+// tasks, is thrown again when all have ended. `progress` is told how many are
+// done.
+void RunTasks(const std::vector<std::function<void()>>& tasks, int threads,
+              const std::function<void(int, int)>& progress) {
+  std::vector<std::exception_ptr> failures(tasks.size());
+  std::mutex mutex;
+  std::size_t next = 0;
+  int done = 0;
+  auto work = [&] {
+    for (;;) {
+      std::size_t index;
+      {
+        std::lock_guard<std::mutex> lock(mutex);
+        if (next == tasks.size()) return;
+        index = next++;
+      }
+      try {
+        tasks[index]();
+      } catch (...) {
+        failures[index] = std::current_exception();
+      }
+      std::lock_guard<std::mutex> lock(mutex);
+      ++done;
+      if (progress) progress(done, static_cast<int>(tasks.size()));
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int i = 1; i < threads && i < static_cast<int>(tasks.size()); ++i) {
+    pool.emplace_back(work);
+  }
+  work();
+  for (std::thread& thread : pool) thread.join();
+  for (const std::exception_ptr& failure : failures) {
+    if (failure) std::rethrow_exception(failure);
+  }
+}
+
+}  // namespace
+
+void RegisterBuiltinOutputWriters(Registry* registry) {
+  const auto add = [&](const char* name, const char* description,
+                       bool by_default, bool of_scans, auto write,
+                       const std::vector<std::string>& further_files = {}) {
+    if (registry->Find<OutputWriterType>(name) != nullptr) return;
+    OutputWriterType type;
+    type.name = name;
+    type.further_files = further_files;
+    type.description = description;
+    type.by_default = by_default;
+    type.of_scans = of_scans;
+    type.write = [write](const SolvedRun& run, const path& folder) {
+      return write(dynamic_cast<const SolveOutcome&>(run), folder);
+    };
+    registry->Register(std::move(type));
+  };
+  add("map.png", "the map as a picture", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteMapPng(Drawing(outcome), folder / "map.png");
+      }));
+  add("report.html", "all of it as one page for a browser", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteReport(MakeReport(outcome), folder / "report.html");
+      }));
+  add("map.svg", "the map as a picture that can be zoomed", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteMapSvg(Drawing(outcome), folder / "map.svg");
+      }));
+  add("map.json", "every feature and constraint", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFileAtomically(folder / "map.json", [&](std::ostream& output) {
+          WriteGraphJson(*outcome.graph, output, &outcome.covariances);
+        });
+      }));
+  add("graph.g2o", "the same as g2o text", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFileAtomically(folder / "graph.g2o", [&](std::ostream& output) {
+          WriteG2o(*outcome.graph, outcome.g2o, output);
+        });
+      }));
+  add("em_trace.csv", "a row a phase of expectation maximization", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        std::vector<EmTraceRow> rows;
+        for (const EmPhase& phase : outcome.trace) rows.push_back({phase, {}});
+        WriteEmTrace(rows, folder / "em_trace.csv");
+      }));
+  add("trajectory.tum", "the pose of every scan", true, true,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFileAtomically(folder / "trajectory.tum",
+                            [&](std::ostream& output) {
+                              WriteTum(outcome.trajectory, output);
+                            });
+      }));
+  add("floorplan.dxf", "walls as CAD lines, layers by direction", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFloorPlanDxf(Plan(outcome), folder / "floorplan.dxf");
+      }));
+  add("floorplan.svg", "the plan on paper, to scale", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFloorPlanSvg(Plan(outcome), folder / "floorplan.svg");
+      }));
+  add("floorplan.geojson", "the plan as GeoJSON in metres of the map", false,
+      false, Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteFloorPlanGeoJson(Plan(outcome), folder / "floorplan.geojson");
+      }));
+  add("occupancy.pgm", "a grid for ROS map_server and Nav2, and its .yaml",
+      true, true, WriteOccupancy, {"occupancy.yaml"});
+}
+
+std::set<std::string> SelectOutputs(const std::string& list,
+                                    const Registry& registry) {
+  const auto outputs = registry.All<OutputWriterType>();
+  std::set<std::string> all;
+  std::set<std::string> by_default;
+  for (const OutputWriterType* output : outputs) {
+    all.insert(output->name);
+    if (output->by_default) by_default.insert(output->name);
+  }
+  std::set<std::string> selected;
+  if (!list.empty() && list[0] == '-') selected = by_default;
+  std::istringstream words(list);
+  std::string word;
+  while (std::getline(words, word, ',')) {
+    if (word.empty() || word == "none") continue;
+    if (word == "all") {
+      selected = all;
+    } else if (word == "default") {
+      selected.insert(by_default.begin(), by_default.end());
+    } else if (all.count(word) > 0) {
+      selected.insert(word);
+    } else if (word[0] == '-' && all.count(word.substr(1)) > 0) {
+      selected.erase(word.substr(1));
+    } else {
+      std::string names = "all, default, none";
+      for (const OutputWriterType* output : outputs) {
+        names += ", " + output->name;
+      }
+      throw Error("--outputs", 0, "unknown file '" + word + "'",
+                  "names separated by commas, a minus in front of those to "
+                  "leave out: " +
+                      names);
+    }
+  }
+  return selected;
+}
+
+WrittenOutputs WriteSolveOutputs(
+    const SolveOutcome& outcome, const std::set<std::string>& names,
+    const path& folder, int threads,
+    const std::function<void(int, int)>& progress) {
+  std::vector<const OutputWriterType*> selected;
+  for (const OutputWriterType* output :
+       outcome.registry->All<OutputWriterType>()) {
+    if (names.count(output->name) == 0) continue;
+    if (output->of_scans && outcome.trajectory.empty()) continue;
+    selected.push_back(output);
+  }
+  std::vector<std::string> reasons(selected.size());
+  std::vector<std::function<void()>> tasks;
+  for (std::size_t i = 0; i < selected.size(); ++i) {
+    tasks.push_back([&reasons, &selected, &outcome, &folder, i] {
+      reasons[i] = selected[i]->write(outcome, folder);
+    });
+  }
+  RunTasks(tasks, threads, progress);
+  WrittenOutputs written;
+  for (std::size_t i = 0; i < selected.size(); ++i) {
+    if (!reasons[i].empty()) {
+      written.reasons.push_back(selected[i]->name +
+                                " not written: " + reasons[i]);
+      continue;
+    }
+    written.files.push_back(selected[i]->name);
+    written.files.insert(written.files.end(),
+                         selected[i]->further_files.begin(),
+                         selected[i]->further_files.end());
+  }
+  std::sort(written.files.begin(), written.files.end());
+  return written;
+}
+
+std::vector<std::string> RemoveOutputsOfEarlierRun(
+    const path& folder, const std::vector<std::string>& written) {
+  std::vector<std::string> removed;
+  std::ifstream file(folder / "summary.json");
+  const auto json = nlohmann::json::parse(file, nullptr, false);
+  if (!json.is_object()) return removed;
+  const auto files = json.find("files");
+  if (files == json.end() || !files->is_array()) return removed;
+  for (const auto& entry : *files) {
+    if (!entry.is_string()) continue;
+    const std::string name = entry.get<std::string>();
+    // A name in this folder and nothing that leads out of it.
+    if (name.empty() || name == "." || name == ".." ||
+        name.find('/') != std::string::npos || name == "summary.json" ||
+        std::count(written.begin(), written.end(), name) > 0) {
+      continue;
+    }
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(
+            std::filesystem::symlink_status(folder / name, error))) {
+      continue;
+    }
+    if (std::filesystem::remove(folder / name, error)) removed.push_back(name);
+  }
+  return removed;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,72 @@
+#ifndef PLUMBLINE_OUTPUTS_SOLVE_OUTPUTS_H_
+#define PLUMBLINE_OUTPUTS_SOLVE_OUTPUTS_H_
+
+#include <plumbline/core/graph_json.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/frontend/map_without_structure.h>
+#include <plumbline/frontend/output_writer.h>
+#include <plumbline/outputs/occupancy_grid.h>
+#include <plumbline/outputs/summary.h>
+
+#include <filesystem>
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// All that the files of plumbline_solve are made of.
+struct SolveOutcome : SolvedRun {
+  OccupancyOptions occupancy;
+  double delta_threshold = 0.0;
+  /// All of them, for the report.
+  std::vector<FlagValue> flags;
+  /// For map.json, and of how many standard deviations ellipses are drawn (0:
+  /// none).
+  FeatureCovariances covariances;
+  double ellipse_sigmas = 0.0;
+  /// Makes the map without structure, for the report; may be null.
+  std::function<MapWithoutStructure()> without_structure;
+  /// Complete but for the times and memory of writing.
+  Summary summary;
+};
+
+/// Registers the output writers of this folder. They take a SolveOutcome and no
+/// other SolvedRun. Does nothing for what is there already.
+void RegisterBuiltinOutputWriters(Registry* registry);
+
+/// Names that a list selects: "default", "all", "none", names, and names with a
+/// minus in front, which are taken out again; from left to right, separated by
+/// commas. A list that begins with a minus begins from the default. Throws
+/// Error that lists the names for one that is unknown.
+std::set<std::string> SelectOutputs(const std::string& list,
+                                    const Registry& registry);
+
+/// What WriteSolveOutputs did.
+struct WrittenOutputs {
+  /// Names of the files, in order.
+  std::vector<std::string> files;
+  /// A line for each that made no sense, with why.
+  std::vector<std::string> reasons;
+};
+
+/// Writes the files selected on so many threads; throws Error when a file
+/// cannot be written. `progress` (may be null) is told how many are done and
+/// how many there are, by one thread at a time.
+WrittenOutputs WriteSolveOutputs(
+    const SolveOutcome& outcome, const std::set<std::string>& names,
+    const std::filesystem::path& folder, int threads,
+    const std::function<void(int, int)>& progress = nullptr);
+
+/// Removes from a folder what an earlier run wrote and this one did not: the
+/// regular files that the summary.json there names as its own ("files"), but
+/// for those in `written`. Returns their names. Without a summary.json of that
+/// kind nothing is removed, since nothing says whose the files are.
+std::vector<std::string> RemoveOutputsOfEarlierRun(
+    const std::filesystem::path& folder,
+    const std::vector<std::string>& written);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_OUTPUTS_SOLVE_OUTPUTS_H_

@@ -1,0 +1,259 @@
+#include <plumbline/core/atomic_file.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/core/version.h>
+#include <plumbline/detectors/merged_walls.h>
+#include <plumbline/detectors/same_wall.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/outputs/map_drawing.h>
+#include <plumbline/outputs/summary.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+namespace plumbline {
+namespace {
+
+// Keeps the order of the contract.
+using Json = nlohmann::ordered_json;
+
+constexpr double kLeastWallLength = 1.0;    // m
+constexpr double kWindow = DegToRad(10.0);  // to either side
+constexpr double kQuarterTurn = DegToRad(90.0);
+
+double FoldedDifference(double a, double b) {
+  return WrapAngle(a - b, kQuarterTurn);
+}
+
+/// Direction modulo 90 degrees with the most wall around it: the mode of the
+/// density with the kernel 1 - (x / window)^2 on a grid of a quarter degree.
+/// The mean within the window, iterated, climbs that same density.
+double DominantDirectionGuess(const std::vector<WallDirection>& walls) {
+  constexpr int kBins = 360;
+  constexpr double kBinWidth = kQuarterTurn / kBins;
+  std::array<double, kBins> histogram{};
+  for (const WallDirection& wall : walls) {
+    const double folded = WrapAngle(wall.direction, kQuarterTurn);
+    const int bin =
+        static_cast<int>(std::floor((folded + kQuarterTurn / 2.0) / kBinWidth));
+    histogram[std::min(std::max(bin, 0), kBins - 1)] += wall.length;
+  }
+  constexpr int kReach = static_cast<int>(kWindow / kBinWidth);
+  int best = 0;
+  double best_density = -1.0;
+  for (int bin = 0; bin < kBins; ++bin) {
+    double density = 0.0;
+    for (int offset = -kReach; offset <= kReach; ++offset) {
+      const double x = offset * kBinWidth / kWindow;
+      density += histogram[(bin + offset + kBins) % kBins] * (1.0 - x * x);
+    }
+    if (density > best_density) {
+      best_density = density;
+      best = bin;
+    }
+  }
+  return (best + 0.5) * kBinWidth - kQuarterTurn / 2.0;
+}
+
+Json FlagToJson(const FlagValue& flag) {
+  if (flag.type == "bool") return flag.value == "true";
+  if (flag.type == "double") return std::strtod(flag.value.c_str(), nullptr);
+  if (flag.type == "string") return flag.value;
+  if (flag.type[0] == 'u') {
+    return static_cast<std::uint64_t>(
+        std::strtoull(flag.value.c_str(), nullptr, 10));
+  }
+  return static_cast<std::int64_t>(
+      std::strtoll(flag.value.c_str(), nullptr, 10));
+}
+
+Json OptionalToJson(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+}  // namespace
+
+std::optional<double> OrthogonalityDeg(
+    const std::vector<WallDirection>& all_walls) {
+  std::vector<WallDirection> walls;
+  for (const WallDirection& wall : all_walls) {
+    if (wall.length >= kLeastWallLength && std::isfinite(wall.length) &&
+        std::isfinite(wall.direction)) {
+      walls.push_back(wall);
+    }
+  }
+  if (walls.empty()) return std::nullopt;
+
+  double dominant = DominantDirectionGuess(walls);
+  double square_sum = 0.0;
+  double weight_sum = 0.0;
+  // The set of walls inside the window changes a few times at most; the bound
+  // is for walls that sit on its edge.
+  for (int i = 0; i < 100; ++i) {
+    double sum = 0.0;
+    square_sum = 0.0;
+    weight_sum = 0.0;
+    for (const WallDirection& wall : walls) {
+      const double deviation = FoldedDifference(wall.direction, dominant);
+      if (std::abs(deviation) > kWindow) continue;
+      sum += wall.length * deviation;
+      square_sum += wall.length * deviation * deviation;
+      weight_sum += wall.length;
+    }
+    // The guess has a wall within the window, and so has every mean after it.
+    const double step = sum / weight_sum;
+    if (std::abs(step) < 1e-12) break;
+    dominant += step;
+  }
+  return RadToDeg(std::sqrt(square_sum / weight_sum));
+}
+
+std::optional<double> OrthogonalityDeg(const Graph& graph) {
+  std::vector<WallDirection> walls;
+  for (const MergedWall& merged : MergeWalls(graph)) {
+    const Feature& wall = merged.wall;
+    DrawnWall ends;
+    if (!WallEnds(wall, &ends)) continue;
+    const int angle = wall.type->name == "line" ? 1 : 2;
+    walls.push_back(
+        {wall.parameters[angle], wall.extent_end - wall.extent_begin});
+  }
+  return OrthogonalityDeg(walls);
+}
+
+std::int64_t PeakMemoryBytes() {
+  rusage usage = {};
+  if (getrusage(RUSAGE_SELF, &usage) != 0) return 0;
+  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
+}
+
+std::optional<double> MeanOfTenth(const std::vector<double>& values,
+                                  int tenth) {
+  const std::size_t begin = values.size() * tenth / 10;
+  const std::size_t end = values.size() * (tenth + 1) / 10;
+  if (begin >= end) return std::nullopt;
+  double sum = 0.0;
+  for (std::size_t i = begin; i < end; ++i) sum += values[i];
+  return sum / static_cast<double>(end - begin);
+}
+
+void CountGraph(const Graph& graph, Summary* summary) {
+  summary->features.clear();
+  for (const Feature* feature : graph.Features()) {
+    ++summary->features[feature->type->name][feature->level];
+  }
+  summary->constraints.clear();
+  for (const Constraint* constraint : graph.Constraints()) {
+    Summary::ConstraintCounts& counts =
+        summary->constraints[constraint->type->name];
+    if (constraint->state == ConstraintState::kBroken) {
+      ++counts.broken;
+    } else if (constraint->kind == ConstraintClass::kStructure) {
+      ++counts.structure;
+    } else {
+      ++counts.measurement;
+    }
+  }
+  summary->closures = {};
+  const auto closures = summary->constraints.find(kSameWallRelation);
+  if (closures != summary->constraints.end()) {
+    summary->closures.live = closures->second.structure;
+    summary->closures.broken = closures->second.broken;
+    summary->closures.proposed =
+        summary->closures.live + summary->closures.broken;
+  }
+  summary->orthogonality_deg = OrthogonalityDeg(graph);
+}
+
+void WriteSummary(const Summary& summary, std::ostream& output) {
+  Json flags = Json::object();
+  for (const FlagValue& flag : summary.flags) {
+    flags[flag.name] = FlagToJson(flag);
+  }
+  Json features = Json::object();
+  for (const auto& type : summary.features) {
+    Json levels = Json::object();
+    for (const auto& level : type.second) {
+      levels[std::to_string(level.first)] = level.second;
+    }
+    features[type.first] = std::move(levels);
+  }
+  Json constraints = Json::object();
+  for (const auto& type : summary.constraints) {
+    constraints[type.first] = {{"measurement", type.second.measurement},
+                               {"structure", type.second.structure},
+                               {"broken", type.second.broken}};
+  }
+  Json json;
+  json["input"] = summary.input;
+  json["seed"] = summary.seed;
+  json["flags"] = std::move(flags);
+  json["counts"] = {{"scans", summary.scans},
+                    {"features", std::move(features)},
+                    {"constraints", std::move(constraints)}};
+  json["cost"] = {{"initial", summary.initial_cost},
+                  {"measurement", summary.measurement_cost},
+                  {"structure", summary.structure_cost},
+                  {"total", summary.measurement_cost + summary.structure_cost}};
+  json["em"] = {{"iterations", summary.em_iterations},
+                {"converged", summary.em_converged}};
+  json["time_s"] = {{"total", summary.total_seconds},
+                    {"parse", summary.parse_seconds},
+                    {"frontend", summary.frontend_seconds},
+                    {"detect", summary.detect_seconds},
+                    {"solve", summary.solve_seconds},
+                    {"write", summary.write_seconds}};
+  json["peak_memory_bytes"] = summary.peak_memory_bytes;
+  json["orthogonality_deg"] = OptionalToJson(summary.orthogonality_deg);
+  json["closures"] = {{"proposed", summary.closures.proposed},
+                      {"live", summary.closures.live},
+                      {"broken", summary.closures.broken}};
+  json["version"] = kVersion;
+  json["files"] = summary.files;
+  if (summary.solver) {
+    const Summary::Solver& solver = *summary.solver;
+    json["solver"] = {
+        {"objective", summary.measurement_cost + summary.structure_cost},
+        {"iterations", solver.iterations},
+        {"solves", solver.solves},
+        {"converged", solver.converged},
+        {"evaluation_s", solver.evaluation_seconds},
+        {"linear_solver_s", solver.linear_solver_seconds},
+        {"setup_s", solver.setup_seconds},
+        {"start",
+         {{"poses", solver.start_poses},
+          {"landmarks", solver.start_landmarks},
+          {"kept", solver.start_kept},
+          {"seconds", solver.start_seconds}}}};
+  }
+  if (summary.scans > 0) {
+    Json skipped = Json::array();
+    for (const SkipReport& skip : summary.skipped) {
+      skipped.push_back({{"reason", skip.reason},
+                         {"count", skip.count},
+                         {"first_lines", skip.first_lines}});
+    }
+    const std::optional<double> early = MeanOfTenth(summary.scan_seconds, 1);
+    const std::optional<double> late = MeanOfTenth(summary.scan_seconds, 9);
+    Json frontend;
+    frontend["skipped"] = std::move(skipped);
+    frontend["scan_seconds_second_tenth"] = OptionalToJson(early);
+    frontend["scan_seconds_last_tenth"] = OptionalToJson(late);
+    frontend["scan_seconds_growth"] =
+        early && late && *early > 0.0 ? Json(*late / *early) : Json(nullptr);
+    json["frontend"] = std::move(frontend);
+  }
+  // A path may hold bytes that are no UTF-8.
+  output << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+}
+
+void WriteSummary(const Summary& summary, const std::string& path) {
+  WriteFileAtomically(path, [&summary](std::ostream& output) {
+    WriteSummary(summary, output);
+  });
+}
+
+}  // namespace plumbline

@@ -1,0 +1,141 @@
+#ifndef PLUMBLINE_OUTPUTS_SUMMARY_H_
+#define PLUMBLINE_OUTPUTS_SUMMARY_H_
+
+#include <plumbline/core/flag_value.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/frontend/scan.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// Direction and length of a wall.
+struct WallDirection {
+  /// rad; only its value modulo pi/2 counts.
+  double direction = 0.0;
+  /// m
+  double length = 0.0;
+};
+
+/// Over walls of at least 1 m: the RMS deviation in degrees, weighted by
+/// length, of the direction from the nearest multiple of 90 degrees off the
+/// dominant direction; walls farther than 10 degrees from any multiple are left
+/// out (evaluation.md). The dominant direction is the weighted mean, modulo 90
+/// degrees, of the walls within 10 degrees of it, started at the direction
+/// with the most wall around it. None without any wall of at least 1 m.
+std::optional<double> OrthogonalityDeg(const std::vector<WallDirection>& walls);
+
+/// The same over the walls of a graph (MergeWalls).
+std::optional<double> OrthogonalityDeg(const Graph& graph);
+
+/// Most memory that the process has held so far, bytes.
+std::int64_t PeakMemoryBytes();
+
+/// Mean of the values in one tenth of a series, counted from 0 to 9 (indices
+/// n tenth / 10 up to n (tenth + 1) / 10); none when that tenth is empty.
+std::optional<double> MeanOfTenth(const std::vector<double>& values, int tenth);
+
+/// What a run did, written as summary.json.
+struct Summary {
+  struct ConstraintCounts {
+    /// Live ones by class, and broken ones of either.
+    std::int64_t measurement = 0;
+    std::int64_t structure = 0;
+    std::int64_t broken = 0;
+  };
+
+  std::string input;
+  std::uint64_t seed = 1;
+  /// Those that differ from the defaults: ChangedFlags().
+  std::vector<FlagValue> flags;
+  /// Names of the files that the run wrote beside this one.
+  std::vector<std::string> files;
+
+  std::int64_t scans = 0;
+  /// By type name and level.
+  std::map<std::string, std::map<int, std::int64_t>> features;
+  /// By relation name.
+  std::map<std::string, ConstraintCounts> constraints;
+
+  /// Closures: hypotheses that walls of different visits are one, all that
+  /// were taken up, those that still hold, and those that were broken.
+  struct Closures {
+    std::int64_t proposed = 0;
+    std::int64_t live = 0;
+    std::int64_t broken = 0;
+  };
+  Closures closures;
+
+  /// Sums of squared whitened residuals (CostReport): before anything was
+  /// optimized, and at the end.
+  double initial_cost = 0.0;
+  double measurement_cost = 0.0;
+  double structure_cost = 0.0;
+
+  int em_iterations = 0;
+  bool em_converged = false;
+
+  /// Seconds.
+  double total_seconds = 0.0;
+  double parse_seconds = 0.0;
+  double frontend_seconds = 0.0;
+  double detect_seconds = 0.0;
+  double solve_seconds = 0.0;
+  double write_seconds = 0.0;
+
+  std::int64_t peak_memory_bytes = 0;
+  std::optional<double> orthogonality_deg;
+
+  /// Of a graph only: what the start placed (InitialGuessReport) and all solves
+  /// together did.
+  struct Solver {
+    std::int64_t start_poses = 0;
+    std::int64_t start_landmarks = 0;
+    std::int64_t start_kept = 0;
+    double start_seconds = 0.0;
+    int solves = 0;
+    /// Every solve reached its tolerance.
+    bool converged = true;
+    /// Steps computed, each a factorization.
+    int iterations = 0;
+    double evaluation_seconds = 0.0;
+    double linear_solver_seconds = 0.0;
+    /// Building, ordering, copying.
+    double setup_seconds = 0.0;
+  };
+  std::optional<Solver> solver;
+
+  /// Of a log only (scans > 0): what was passed over, and the time that each
+  /// scan took, s, in the order of scans; may be empty.
+  std::vector<SkipReport> skipped;
+  std::vector<double> scan_seconds;
+};
+
+/// Fills in features, constraints, closures and orthogonality_deg.
+void CountGraph(const Graph& graph, Summary* summary);
+
+/// Writes the keys of the product's contract, in its order: input, seed, flags,
+/// counts {scans, features {type {level}}, constraints {type {measurement,
+/// structure, broken}}}, cost {initial, measurement, structure, total}, em
+/// {iterations, converged}, time_s {total, parse, frontend, detect, solve,
+/// write}, peak_memory_bytes, orthogonality_deg (null when there is no wall),
+/// closures {proposed, live, broken}, version, files; for a graph also solver
+/// {objective (cost.total), iterations, solves, converged, evaluation_s,
+/// linear_solver_s, setup_s, start {poses, landmarks, kept, seconds}}; for a
+/// log also frontend {skipped [{reason, count, first_lines}],
+/// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
+/// (their quotient)}. Numbers that are not finite become null.
+void WriteSummary(const Summary& summary, std::ostream& output);
+
+/// The same into a file, whole or not at all. Throws Error when it cannot be
+/// written.
+void WriteSummary(const Summary& summary, const std::string& path);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_OUTPUTS_SUMMARY_H_

@@ -1,0 +1,123 @@
+#include <plumbline/core/disjoint_sets.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/detectors/merged_walls.h>
+#include <plumbline/detectors/same_wall.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+// Lengths below count as this, m.
+constexpr double kLeastLength = 1e-3;
+
+Vector2d Along(const WallPiece& piece) {
+  return {std::cos(piece.pose[2]), std::sin(piece.pose[2])};
+}
+
+double LengthOf(const WallPiece& piece) {
+  return std::max(piece.end - piece.begin, kLeastLength);
+}
+
+}  // namespace
+
+WallPiece UnitePieces(const std::vector<WallPiece>& pieces) {
+  if (pieces.empty()) {
+    throw PLUMBLINE_ERROR("no pieces of a wall", "at least one");
+  }
+  if (pieces.size() == 1) return pieces.front();
+  const WallPiece& longest = *std::max_element(
+      pieces.begin(), pieces.end(), [](const WallPiece& a, const WallPiece& b) {
+        return LengthOf(a) < LengthOf(b);
+      });
+  // Differences to the longest, so that nothing is lost far from the origin.
+  double turn = 0.0;
+  double turn_weight = 0.0;
+  for (const WallPiece& piece : pieces) {
+    const double weight = std::pow(LengthOf(piece), 3);
+    turn += weight * NormalizeAngle(piece.pose[2] - longest.pose[2]);
+    turn_weight += weight;
+  }
+  WallPiece united = longest;
+  united.pose[2] = NormalizeAngle(longest.pose[2] + turn / turn_weight);
+  const Vector2d along = Along(united);
+  const Vector2d across(-along.y(), along.x());
+  const Vector2d origin = longest.pose.head<2>();
+  double offset = 0.0;
+  double offset_weight = 0.0;
+  bool is_first = true;
+  for (const WallPiece& piece : pieces) {
+    const Vector2d relative = piece.pose.head<2>() - origin;
+    const Vector2d own = Along(piece);
+    const Vector2d middle = relative + 0.5 * (piece.begin + piece.end) * own;
+    offset += LengthOf(piece) * across.dot(middle);
+    offset_weight += LengthOf(piece);
+    for (const double end : {piece.begin, piece.end}) {
+      const double at = along.dot(relative + end * own);
+      united.begin = is_first ? at : std::min(united.begin, at);
+      united.end = is_first ? at : std::max(united.end, at);
+      is_first = false;
+    }
+  }
+  united.pose.head<2>() += offset / offset_weight * across;
+  return united;
+}
+
+std::vector<MergedWall> MergeWalls(const Graph& graph) {
+  std::vector<const Feature*> walls;
+  std::map<FeatureId, std::size_t> index;
+  for (const Feature* feature : graph.Features()) {
+    if (feature->type->name != "segment" && feature->type->name != "line") {
+      continue;
+    }
+    index[feature->id] = walls.size();
+    walls.push_back(feature);
+  }
+  DisjointSets sets(walls.size());
+  for (const Constraint* constraint : graph.Constraints()) {
+    if (constraint->state != ConstraintState::kLive ||
+        constraint->type->name != kSameWallRelation) {
+      continue;
+    }
+    sets.Join(index.at(constraint->features[0]),
+              index.at(constraint->features[1]));
+  }
+  std::map<std::size_t, std::vector<const Feature*>> classes;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    classes[sets.Find(i)].push_back(walls[i]);
+  }
+  std::vector<MergedWall> merged;
+  merged.reserve(classes.size());
+  for (const auto& [root, members] : classes) {
+    MergedWall wall;
+    wall.wall = *members.front();
+    std::vector<WallPiece> pieces;
+    for (const Feature* member : members) {
+      wall.members.push_back(member->id);
+      pieces.push_back({Pose2(member->parameters[0], member->parameters[1],
+                              member->parameters[2]),
+                        member->extent_begin, member->extent_end});
+      if (member != members.front()) {
+        wall.wall.observations += member->observations;
+      }
+    }
+    if (members.size() > 1) {
+      const WallPiece united = UnitePieces(pieces);
+      std::copy(united.pose.data(), united.pose.data() + 3,
+                wall.wall.parameters.begin());
+      wall.wall.extent_begin = united.begin;
+      wall.wall.extent_end = united.end;
+    }
+    merged.push_back(std::move(wall));
+  }
+  return merged;
+}
+
+}  // namespace plumbline

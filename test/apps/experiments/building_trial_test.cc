@@ -1,0 +1,80 @@
+#include <gtest/gtest.h>
+#include <plumbline/apps/experiments/building_trial.h>
+#include <plumbline/detectors/builtins.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+TEST(BuildingTrialTest, EveryShapeHasABuilding) {
+  std::set<std::size_t> walls;
+  for (const std::string& shape : BuildingShapes()) {
+    const World world = MakeWorld(shape, 3, 1.0);
+    EXPECT_GT(world.walls.size(), 10u) << shape;
+    EXPECT_GT(world.path.size(), 4u) << shape;
+    walls.insert(world.walls.size());
+    // Another seed, another building.
+    EXPECT_NE(MakeWorld(shape, 4, 1.0).walls[0].end.x(), world.walls[0].end.x())
+        << shape;
+  }
+  EXPECT_EQ(walls.size(), BuildingShapes().size());
+}
+
+TEST(BuildingTrialTest, ObliqueWingsDiffer) {
+  const WorldSurfaces a = MakeSurfaces(MakeWorld("oblique", 1, 1.0));
+  const WorldSurfaces b = MakeSurfaces(MakeWorld("oblique", 2, 1.0));
+  ASSERT_EQ(a.orientations_deg.size(), 4u);
+  ASSERT_EQ(b.orientations_deg.size(), 4u);
+  EXPECT_NE(a.orientations_deg, b.orientations_deg);
+}
+
+// A square ring of corridors, 10 m by 8 m, driven round one and a half times.
+World Ring() {
+  World world;
+  const auto wall = [&world](double x1, double y1, double x2, double y2) {
+    world.walls.push_back({{x1, y1}, {x2, y2}, 0.0});
+  };
+  wall(-1.0, -1.0, 11.0, -1.0);
+  wall(11.0, -1.0, 11.0, 9.0);
+  wall(11.0, 9.0, -1.0, 9.0);
+  wall(-1.0, 9.0, -1.0, -1.0);
+  wall(1.0, 1.0, 9.0, 1.0);
+  wall(9.0, 1.0, 9.0, 7.0);
+  wall(9.0, 7.0, 1.0, 7.0);
+  wall(1.0, 7.0, 1.0, 1.0);
+  world.path = {{0.0, 0.0}, {10.0, 0.0}, {10.0, 8.0}, {0.0, 8.0},
+                {0.0, 0.0}, {10.0, 0.0}, {10.0, 8.0}};
+  return world;
+}
+
+TEST(BuildingTrialTest, ARingOfCorridors) {
+  Registry registry;
+  RegisterBuiltins(&registry);
+  const BuildingTrial trial =
+      RunBuildingTrial(Ring(), SimulatorOptions(), 5, registry, {});
+  EXPECT_FALSE(trial.is_stopped);
+  EXPECT_GT(trial.scans, 200);
+  EXPECT_EQ(trial.map.walls.size(), 8u);
+  EXPECT_TRUE(trial.map.missed_walls.empty());
+  EXPECT_TRUE(trial.map.false_walls.empty());
+  EXPECT_LT(trial.map.offset_error.mean, 0.02);
+  EXPECT_LT(trial.mean_position_error, 0.02);
+  EXPECT_EQ(trial.closures.wrong, 0);
+  EXPECT_EQ(trial.closures.closed_revisits, trial.closures.revisits);
+  EXPECT_FALSE(trial.drawing.walls.empty());
+}
+
+TEST(BuildingTrialTest, Stopped) {
+  Registry registry;
+  RegisterBuiltins(&registry);
+  const BuildingTrial trial = RunBuildingTrial(
+      Ring(), SimulatorOptions(), 5, registry, {}, [] { return true; });
+  EXPECT_TRUE(trial.is_stopped);
+  EXPECT_EQ(trial.scans, 0);
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -1,0 +1,451 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/detector.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/graph_json.h>
+#include <plumbline/detectors/builtins.h>
+#include <plumbline/detectors/same_wall.h>
+#include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/pipeline/log_solver.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+class LogSolverTest : public ::testing::Test {
+ protected:
+  LogSolverTest() { RegisterBuiltins(&registry_); }
+
+  // The first scans of the bundled log.
+  static Log Office(std::size_t scans) {
+    Log log = ReadCarmenLog(
+        std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/office.clf.gz", {});
+    if (log.scans.size() > scans) log.scans.resize(scans);
+    return log;
+  }
+
+  static std::string Json(const Graph& graph) {
+    std::ostringstream text;
+    WriteGraphJson(graph, text);
+    return text.str();
+  }
+
+  static void ExpectFinite(const std::vector<Pose2>& trajectory) {
+    for (const Pose2& pose : trajectory) {
+      ASSERT_TRUE(pose.allFinite()) << pose.transpose();
+    }
+  }
+
+  Registry registry_;
+};
+
+TEST_F(LogSolverTest, SolvesTheStartOfALog) {
+  const Log log = Office(250);
+  LogSolver solver(registry_, {});
+  std::size_t calls = 0;
+  const LogSolverResult result =
+      solver.Run(log, [&](std::size_t done, std::size_t all) {
+        EXPECT_EQ(done, ++calls);
+        EXPECT_EQ(all, 250u);
+      });
+  EXPECT_EQ(calls, 250u);
+  EXPECT_FALSE(result.interrupted);
+  ASSERT_EQ(result.trajectory.size(), 250u);
+  EXPECT_EQ(result.scan_seconds.size(), 250u);
+  ExpectFinite(result.trajectory);
+  EXPECT_GT(result.key_scans, 20);
+  EXPECT_LE(result.key_scans, 250);
+  EXPECT_GT(result.feature_matches, result.features_created);
+  EXPECT_TRUE(result.em.converged);
+  EXPECT_TRUE(std::isfinite(result.final_cost.total()));
+  EXPECT_FALSE(solver.trace().empty());
+  // Directions at right angles were found.
+  EXPECT_GE(solver.graph().VirtualFeatures(1).size(), 2u);
+  std::set<std::string> relations;
+  for (const Constraint* constraint : solver.graph().Constraints()) {
+    relations.insert(constraint->type->name);
+  }
+  EXPECT_EQ(relations.count("segment_orientation"), 1u);
+  EXPECT_EQ(relations.count("orientation_orientation"), 1u);
+}
+
+TEST_F(LogSolverTest, WithoutStructureThereAreMeasurementsOnly) {
+  LogSolverOptions options;
+  options.structure = false;
+  // Not looked at.
+  options.hierarchy = "no_such_detector";
+  // The joint adjustment has other measurements than the replay.
+  options.refine = Refinement::kMap;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(Office(150));
+  ASSERT_EQ(result.trajectory.size(), 150u);
+  ExpectFinite(result.trajectory);
+  EXPECT_EQ(result.final_cost.structure, 0.0);
+  EXPECT_LE(result.final_cost.measurement, result.initial_cost.measurement);
+  EXPECT_TRUE(result.em.converged);
+  for (const Feature* feature : solver.graph().Features()) {
+    EXPECT_FALSE(feature->is_virtual);
+  }
+  for (const Constraint* constraint : solver.graph().Constraints()) {
+    EXPECT_EQ(constraint->kind, ConstraintClass::kMeasurement);
+  }
+}
+
+TEST_F(LogSolverTest, FullRefinementBringsThePosesBack) {
+  for (const Refinement refine : {Refinement::kMap, Refinement::kFull}) {
+    LogSolverOptions options;
+    options.refine = refine;
+    LogSolver solver(registry_, options);
+    const LogSolverResult result = solver.Run(Office(250));
+    ASSERT_EQ(result.trajectory.size(), 250u);
+    ExpectFinite(result.trajectory);
+    std::int64_t poses = 0;
+    std::int64_t votes = 0;
+    for (const Feature* feature : solver.graph().Features()) {
+      if (feature->type->name == "pose") ++poses;
+    }
+    for (const Constraint* constraint : solver.graph().Constraints()) {
+      if (constraint->type->name == "pose_segment_points") ++votes;
+    }
+    EXPECT_EQ(result.wall_votes, votes);
+    if (refine == Refinement::kFull) {
+      EXPECT_GT(result.scan_relations, 10);
+      EXPECT_GT(votes, 50);
+      // Every third key scan.
+      EXPECT_EQ(poses, (result.key_scans + 2) / 3);
+    } else {
+      EXPECT_EQ(result.scan_relations, 0);
+      EXPECT_EQ(poses, 1);
+    }
+  }
+}
+
+TEST_F(LogSolverTest, SameBytesEveryTime) {
+  const Log log = Office(150);
+  LogSolver first(registry_, {});
+  LogSolver second(registry_, {});
+  const LogSolverResult a = first.Run(log);
+  const LogSolverResult b = second.Run(log);
+  EXPECT_EQ(a.trajectory, b.trajectory);
+  EXPECT_EQ(Json(first.graph()), Json(second.graph()));
+}
+
+// Closures of a graph by their state.
+std::map<ConstraintState, int> Closures(const Graph& graph) {
+  std::map<ConstraintState, int> count;
+  for (const Constraint* constraint : graph.Constraints()) {
+    if (constraint->type->name == kSameWallRelation) ++count[constraint->state];
+  }
+  return count;
+}
+
+TEST_F(LogSolverTest, WithoutGlobalAssociationTheDetectorChangesNothing) {
+  // A registry that has never heard of the detector gives the same bytes.
+  Registry without;
+  RegisterBuiltinRelations(&without);
+  for (const DetectorType* type : registry_.detectors()) {
+    if (type->name != "same_wall") without.Register(DetectorType(*type));
+  }
+  LogSolverOptions options;
+  options.global_association = false;
+  const Log log = Office(400);
+  LogSolver first(registry_, options);
+  const LogSolverResult a = first.Run(log);
+  LogSolver second(without, options);
+  const LogSolverResult b = second.Run(log);
+  EXPECT_EQ(Json(first.graph()), Json(second.graph()));
+  EXPECT_EQ(a.trajectory, b.trajectory);
+  EXPECT_TRUE(Closures(first.graph()).empty());
+}
+
+TEST_F(LogSolverTest, LoopsAreClosed) {
+  const Log log = Office(100000);
+  LogSolverOptions options;
+  options.refine = Refinement::kMap;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(log);
+  EXPECT_TRUE(result.em.converged);
+  EXPECT_GT(Closures(solver.graph())[ConstraintState::kLive], 5);
+  // The iterations of the trace go on over the start of closing.
+  int last = 0;
+  for (const EmPhase& phase : solver.trace()) {
+    EXPECT_GE(phase.iteration, last);
+    last = phase.iteration;
+  }
+}
+
+// Says, once loops are being closed, that the two walls farthest apart that
+// look the same way are one: what same_wall would say if it were fooled.
+class FooledDetector : public StructureDetector {
+ public:
+  static constexpr char kName[] = "fooled";
+
+  const std::string& name() const override {
+    static const std::string name = kName;
+    return name;
+  }
+  Transaction Detect(const Graph& graph, const Registry& registry,
+                     const DetectionScope& scope) const override {
+    Transaction transaction;
+    if (scope.features != nullptr) return transaction;
+    bool is_closing = false;
+    for (const Constraint* constraint : graph.Constraints()) {
+      is_closing = is_closing || constraint->source == "same_wall";
+    }
+    if (!is_closing) return transaction;
+    std::vector<const Feature*> walls;
+    for (const Feature* feature : graph.Features()) {
+      if (feature->type->name == "segment" &&
+          feature->extent_end - feature->extent_begin > 3.0) {
+        walls.push_back(feature);
+      }
+    }
+    const Feature* first = nullptr;
+    const Feature* second = nullptr;
+    double farthest = 0.0;
+    for (const Feature* a : walls) {
+      for (const Feature* b : walls) {
+        const double angle = b->parameters[2] - a->parameters[2];
+        const double dx = b->parameters[0] - a->parameters[0];
+        const double dy = b->parameters[1] - a->parameters[1];
+        const double offset =
+            -std::sin(a->parameters[2]) * dx + std::cos(a->parameters[2]) * dy;
+        if (std::cos(angle) > 0.999 && offset > farthest) {
+          farthest = offset;
+          first = a;
+          second = b;
+        }
+      }
+    }
+    if (first == nullptr) return transaction;
+    for (const ConstraintId id : graph.ConstraintsOf(first->id)) {
+      if (graph.GetConstraint(id).source == kName) return transaction;
+    }
+    Constraint constraint;
+    constraint.type = &registry.GetRelation(kSameWallRelation);
+    constraint.features = {first->id, second->id};
+    constraint.expected = Eigen::VectorXd::Zero(2);
+    constraint.information = 400.0 * Eigen::Matrix2d::Identity();
+    constraint.kind = ConstraintClass::kStructure;
+    constraint.source = kName;
+    transaction.AddConstraint(std::move(constraint));
+    return transaction;
+  }
+};
+
+TEST_F(LogSolverTest, AFalseClosureIsBrokenAndTheMapReturns) {
+  DetectorType type;
+  type.name = FooledDetector::kName;
+  type.description = "takes two walls that are not one for one";
+  type.reads = {"segment"};
+  type.make = [](const DetectorParameters&) {
+    return std::make_unique<FooledDetector>();
+  };
+  registry_.Register(type);
+  const Log log = Office(100000);
+  LogSolverOptions options;
+  options.refine = Refinement::kMap;
+  options.complete_walls = false;
+  options.hierarchy = "orientation_mixture/orientation_relation";
+  LogSolver truthful(registry_, options);
+  const LogSolverResult expected = truthful.Run(log);
+  options.hierarchy = "orientation_mixture,fooled/orientation_relation";
+  LogSolver fooled(registry_, options);
+  const LogSolverResult result = fooled.Run(log);
+
+  int proposed = 0;
+  for (const Constraint* constraint : fooled.graph().Constraints()) {
+    if (constraint->source != FooledDetector::kName) continue;
+    ++proposed;
+    EXPECT_EQ(constraint->state, ConstraintState::kBroken);
+    EXPECT_LT(constraint->delta, 0.3);
+  }
+  EXPECT_GE(proposed, 1);
+  // It was live for a while, and bent the map.
+  double highest = 0.0;
+  double last = 0.0;
+  bool was_live = false;
+  for (const EmPhase& phase : fooled.trace()) {
+    const auto live = phase.structure_by_relation.find(kSameWallRelation);
+    was_live = was_live ||
+               (live != phase.structure_by_relation.end() && live->second > 0);
+    highest = std::max(highest, phase.cost.total());
+    last = phase.cost.total();
+  }
+  EXPECT_TRUE(was_live);
+  EXPECT_GT(highest, 2.0 * last);
+  // The map is what it is without, to less than the noise of a range: what the
+  // closure bent was weighed and broken with it, and found again.
+  ASSERT_EQ(result.trajectory.size(), expected.trajectory.size());
+  for (std::size_t i = 0; i < result.trajectory.size(); ++i) {
+    EXPECT_LT((result.trajectory[i] - expected.trajectory[i]).norm(), 0.01)
+        << i;
+  }
+  EXPECT_EQ(Closures(fooled.graph())[ConstraintState::kLive],
+            Closures(truthful.graph())[ConstraintState::kLive]);
+}
+
+TEST_F(LogSolverTest, StoppedOnTheWay) {
+  const Log log = Office(150);
+  for (const std::size_t scans : {0, 1, 70}) {
+    SCOPED_TRACE(scans);
+    LogSolver solver(registry_, {});
+    std::size_t done = 0;
+    const LogSolverResult result = solver.Run(
+        log, [&](std::size_t count, std::size_t) { done = count; },
+        [&] { return done >= scans; });
+    EXPECT_TRUE(result.interrupted);
+    EXPECT_EQ(result.trajectory.size(), scans);
+    EXPECT_EQ(result.scan_seconds.size(), scans);
+    ExpectFinite(result.trajectory);
+    if (scans == 70) {
+      EXPECT_GT(solver.graph().num_features(), 5u);
+    }
+  }
+}
+
+TEST_F(LogSolverTest, StructureAtTheEndOnly) {
+  LogSolverOptions options;
+  options.em_every = 0;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(Office(150));
+  EXPECT_EQ(result.trajectory.size(), 150u);
+  EXPECT_GE(solver.graph().VirtualFeatures(1).size(), 1u);
+  EXPECT_TRUE(result.em.converged);
+}
+
+TEST_F(LogSolverTest, EmptyLog) {
+  LogSolver solver(registry_, {});
+  const LogSolverResult result = solver.Run(Log());
+  EXPECT_TRUE(result.trajectory.empty());
+  EXPECT_EQ(result.final_cost.total(), 0.0);
+}
+
+TEST_F(LogSolverTest, ScansWithoutAnyReturn) {
+  Log log = Office(40);
+  for (Scan& scan : log.scans) {
+    scan.ranges.assign(scan.ranges.size(), 0.0f);
+  }
+  // One without beams at all.
+  log.scans[3].ranges.clear();
+  LogSolver solver(registry_, {});
+  const LogSolverResult result = solver.Run(log);
+  ASSERT_EQ(result.trajectory.size(), 40u);
+  // Odometry is all that there is.
+  for (std::size_t i = 0; i < 40; ++i) {
+    EXPECT_LT((result.trajectory[i] - log.scans[i].odometry).norm(), 1e-6) << i;
+  }
+}
+
+LogSolverOptions Points() {
+  LogSolverOptions options;
+  options.features = RawFeatures::kPoints;
+  options.em.full_weight_test = true;
+  return options;
+}
+
+TEST_F(LogSolverTest, PointsAsLevelZero) {
+  LogSolverOptions options = Points();
+  // The second direction has few points in so short a log.
+  options.detector_parameters["line_ransac"]["max_log_false_alarms"] = -0.5;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(Office(250));
+  EXPECT_FALSE(result.interrupted);
+  ASSERT_EQ(result.trajectory.size(), 250u);
+  ExpectFinite(result.trajectory);
+  EXPECT_GT(result.feature_matches, 5 * result.features_created);
+  EXPECT_TRUE(result.em.converged);
+  std::map<std::string, std::map<int, int>> features;
+  for (const Feature* feature : solver.graph().Features()) {
+    ++features[feature->type->name][feature->level];
+  }
+  EXPECT_EQ(features.count("segment"), 0u);
+  EXPECT_EQ(features["point"][0], result.features_created);
+  EXPECT_EQ(features["pose"][0], 1);
+  EXPECT_GE(features["line"][1], 5);
+  EXPECT_GE(features["orientation"][2], 2);
+  std::set<std::string> relations;
+  for (const Constraint* constraint : solver.graph().Constraints()) {
+    relations.insert(constraint->type->name);
+  }
+  EXPECT_EQ(relations,
+            (std::set<std::string>{
+                "line_orientation", "orientation_orientation",
+                "point_line_distance", "point_point_distance", "pose_point"}));
+  // What needs walls at level 0 was left out, though the options ask for it.
+  EXPECT_EQ(result.glimpsed_walls, 0);
+  EXPECT_EQ(result.scan_relations, 0);
+  EXPECT_EQ(result.wall_votes, 0);
+}
+
+TEST_F(LogSolverTest, PointsWithoutStructure) {
+  LogSolverOptions options = Points();
+  options.structure = false;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(Office(150));
+  ASSERT_EQ(result.trajectory.size(), 150u);
+  ExpectFinite(result.trajectory);
+  EXPECT_EQ(result.final_cost.structure, 0.0);
+  for (const Feature* feature : solver.graph().Features()) {
+    EXPECT_FALSE(feature->is_virtual);
+  }
+}
+
+TEST_F(LogSolverTest, PointsSameBytesEveryTime) {
+  const Log log = Office(150);
+  LogSolver first(registry_, Points());
+  LogSolver second(registry_, Points());
+  const LogSolverResult a = first.Run(log);
+  const LogSolverResult b = second.Run(log);
+  EXPECT_EQ(a.trajectory, b.trajectory);
+  EXPECT_EQ(Json(first.graph()), Json(second.graph()));
+}
+
+TEST_F(LogSolverTest, PointsOfBrokenLogs) {
+  LogSolver empty(registry_, Points());
+  EXPECT_TRUE(empty.Run(Log()).trajectory.empty());
+  Log log = Office(40);
+  for (Scan& scan : log.scans) {
+    scan.ranges.assign(scan.ranges.size(), 0.0f);
+  }
+  log.scans[3].ranges.clear();
+  LogSolver solver(registry_, Points());
+  const LogSolverResult result = solver.Run(log);
+  ASSERT_EQ(result.trajectory.size(), 40u);
+  for (std::size_t i = 0; i < 40; ++i) {
+    EXPECT_LT((result.trajectory[i] - log.scans[i].odometry).norm(), 1e-6) << i;
+  }
+}
+
+TEST_F(LogSolverTest, PointsTakeTheirOwnHierarchyOnly) {
+  LogSolverOptions options = Points();
+  options.hierarchy = "line_ransac/orientation_mixture/orientation_relation";
+  LogSolver solver(registry_, options);
+  EXPECT_EQ(solver.Run(Office(60)).trajectory.size(), 60u);
+  // Segments' detectors find nothing to read.
+  options.hierarchy = "orientation_mixture/orientation_relation";
+  EXPECT_THROW(LogSolver(registry_, options), Error);
+}
+
+TEST_F(LogSolverTest, WrongHierarchyIsRefused) {
+  LogSolverOptions options;
+  options.hierarchy = "no_such_detector";
+  EXPECT_THROW(LogSolver(registry_, options), Error);
+  options.hierarchy = "orientation_relation/orientation_mixture";
+  EXPECT_THROW(LogSolver(registry_, options), Error);
+  options.hierarchy = "orientation_mixture";
+  options.detector_parameters["orientation_mixture"]["sigma_deg"] = -1.0;
+  EXPECT_THROW(LogSolver(registry_, options), Error);
+}
+
+}  // namespace
+}  // namespace plumbline

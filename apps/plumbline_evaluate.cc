@@ -130,6 +130,14 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
   options.maximum_offset = FLAGS_maximum_wall_offset;
   const MapTruthEvaluation evaluation =
       EvaluateMap(map, truth, alignment, options);
+  Json poses;
+  if (!trajectory.empty()) {
+    const PoseErrors errors = EvaluatePoses(trajectory, truth, alignment);
+    PrintRow("position error", "m", errors.position);
+    PrintRow("heading error", "deg", errors.heading_deg);
+    poses = Json{{"position_m", ToJson(errors.position)},
+                 {"heading_deg", ToJson(errors.heading_deg)}};
+  }
   const std::size_t found =
       evaluation.walls.size() - evaluation.missed_walls.size();
   PrintRow("wall direction error", "deg", evaluation.direction_error_deg);
@@ -146,6 +154,14 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
   PrintAngles("false orientations", evaluation.false_orientations_deg);
   std::printf("duplicate orientations: %d\n",
               evaluation.duplicate_orientations);
+  std::printf("bend error: %.3f deg", evaluation.bend_error_deg);
+  const char* separator = " (";
+  for (const DirectionResult& direction : evaluation.directions) {
+    std::printf("%s%.2f %+.3f", separator, direction.angle_deg,
+                direction.error_deg);
+    separator = ", ";
+  }
+  std::printf("%s\n", evaluation.directions.empty() ? "" : ")");
   const ClosureEvaluation closures =
       EvaluateClosures(map, truth, alignment, options);
   std::printf(
@@ -166,7 +182,14 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
     }
     walls.push_back(row);
   }
+  Json directions = Json::array();
+  for (const DirectionResult& direction : evaluation.directions) {
+    directions.push_back({{"angle_deg", direction.angle_deg},
+                          {"length_m", direction.length},
+                          {"error_deg", direction.error_deg}});
+  }
   return Json{{"file", FLAGS_truth},
+              {"poses", poses},
               {"map", FLAGS_map},
               {"alignment",
                {evaluation.alignment[0], evaluation.alignment[1],
@@ -183,6 +206,8 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
               {"missed_orientations_deg", evaluation.missed_orientations_deg},
               {"false_orientations_deg", evaluation.false_orientations_deg},
               {"duplicate_orientations", evaluation.duplicate_orientations},
+              {"directions", directions},
+              {"bend_error_deg", evaluation.bend_error_deg},
               {"closures",
                {{"right", closures.right},
                 {"near", closures.near},

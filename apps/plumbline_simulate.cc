@@ -5,6 +5,7 @@
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/cli/progress.h>
+#include <plumbline/apps/simulation/bent_world.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/apps/simulation/world.h>
@@ -26,20 +27,26 @@ namespace {
 const plumbline::LaserModel kLaser;
 const plumbline::OdometryOptions kOdometry;
 const plumbline::DriveOptions kDrive;
+const plumbline::BentOptions kBent;
 
 }  // namespace
 
 DEFINE_string(world, "",
               "Building: office, killian_like, oblique, symmetric, parallel, "
-              "or a world file. Graph: S1 to S6.");
+              "bent, bent_niches, or a world file. Graph: S1 to S6.");
 DEFINE_uint64(seed, 1,
               "Draws the dimensions of a built-in world, the sway of the robot "
               "and all noise.");
 DEFINE_double(size, 1.0,
-              "Multiplies the blocks of a built-in world both ways.");
+              "Multiplies the blocks of a built-in world both ways, or the "
+              "length of bent corridors.");
 PLUMBLINE_FLAG_RANGE(size, 0.01, 100);
 DEFINE_double(rotation, 0.0, "Turns the whole world by so many degrees.");
 PLUMBLINE_FLAG_RANGE(rotation, -360, 360);
+
+DEFINE_double(bend_deg, kBent.bend_deg,
+              "bent, bent_niches: degrees at which the two corridors meet.");
+PLUMBLINE_FLAG_RANGE(bend_deg, -60, 60);
 
 DEFINE_double(position_noise, -1.0,
               "S1 to S6: largest error of initial positions on x and y, m; -1: "
@@ -124,14 +131,23 @@ World LoadWorld() {
   if (std::find(names.begin(), names.end(), FLAGS_world) != names.end()) {
     return MakeWorld(FLAGS_world, FLAGS_seed, FLAGS_size);
   }
+  if (FLAGS_world == "bent" || FLAGS_world == "bent_niches") {
+    BentOptions options =
+        FLAGS_world == "bent" ? BentOptions() : NichesOptions();
+    options.bend_deg = FLAGS_bend_deg;
+    options.length.low *= FLAGS_size;
+    options.length.high *= FLAGS_size;
+    return MakeBentWorld(options, FLAGS_seed);
+  }
   std::ifstream file(FLAGS_world);
   // A directory opens but does not read.
   if (!file || (file.peek(), file.bad())) {
     throw Error(
         "--world", 0,
         "'" + FLAGS_world + "' is no built-in world and no readable file",
-        "office, killian_like, oblique, symmetric, parallel, S1 to S6 or a "
-        "world file");
+        "office, killian_like, oblique, symmetric, parallel, bent, "
+        "bent_niches, "
+        "S1 to S6 or a world file");
   }
   return ReadWorld(file, FLAGS_world);
 }
@@ -288,7 +304,7 @@ int main(int argc, char** argv) {
       "plumbline_simulate --world=office --seed=7 --output=office.clf "
       "--truth=office.truth.json";
   info.groups = {
-      {"World", {"world", "seed", "size", "rotation"}},
+      {"World", {"world", "seed", "size", "rotation", "bend_deg"}},
       {"Graphs", {"position_noise", "distance_noise", "outliers"}},
       {"Output",
        {"output", "truth", "relations", "save_world", "quiet", "verbose"}},

@@ -201,6 +201,9 @@ struct Wall {
   std::vector<std::pair<double, double>> covered;
   double matched = 0.0;
   double direction_sum = 0.0;
+  // Of segments of at least the minimum length: how long, and how far turned.
+  double long_matched = 0.0;
+  double turn_sum = 0.0;
   double offset_sum = 0.0;
 };
 
@@ -384,6 +387,22 @@ Pose2 AlignTrajectory(const std::vector<TimedPose>& trajectory,
   return FitRigidTransform(from, to);
 }
 
+PoseErrors EvaluatePoses(const std::vector<TimedPose>& trajectory,
+                         const MapTruth& truth, const Pose2& alignment) {
+  const TrajectoryIndex index(trajectory);
+  std::vector<double> positions;
+  std::vector<double> headings;
+  for (const TimedPose& timed : truth.poses) {
+    const int match = index.Find(timed.timestamp, 1e-3);
+    if (match < 0) continue;
+    const Pose2 pose = Compose(alignment, trajectory[match].pose);
+    positions.push_back((pose - timed.pose).head<2>().norm());
+    headings.push_back(
+        std::abs(RadToDeg(NormalizeAngle(pose[2] - timed.pose[2]))));
+  }
+  return {ComputeStatistics(positions), ComputeStatistics(headings)};
+}
+
 MapTruthEvaluation EvaluateMap(const StraightMap& map, const MapTruth& truth,
                                const Pose2& alignment,
                                const MapTruthOptions& options) {
@@ -460,8 +479,12 @@ MapTruthEvaluation EvaluateMap(const StraightMap& map, const MapTruth& truth,
       nearest->covered.emplace_back(nearest_along - 0.5 * step,
                                     nearest_along + 0.5 * step);
       nearest->matched += step;
-      nearest->direction_sum +=
-          step * std::abs(RadToDeg(NormalizeAxial(pose[2] - nearest->angle)));
+      const double turn = RadToDeg(NormalizeAxial(pose[2] - nearest->angle));
+      nearest->direction_sum += step * std::abs(turn);
+      if (length >= options.minimum_length) {
+        nearest->long_matched += step;
+        nearest->turn_sum += step * turn;
+      }
       nearest->offset_sum += step * nearest_offset;
     }
     if (length < options.minimum_length) continue;
@@ -505,6 +528,30 @@ MapTruthEvaluation EvaluateMap(const StraightMap& map, const MapTruth& truth,
   if (seen_length > 0.0) evaluation.recall = found_length / seen_length;
   evaluation.direction_error_deg = ComputeStatistics(direction_errors);
   evaluation.offset_error = ComputeStatistics(offset_errors);
+
+  for (std::size_t d = 0; d < truth.orientations_deg.size(); ++d) {
+    DirectionResult result;
+    result.angle_deg = truth.orientations_deg[d];
+    for (std::size_t i = 0; i < walls.size(); ++i) {
+      if (truth.walls[i].orientation != static_cast<int>(d)) continue;
+      result.length += walls[i].long_matched;
+      result.error_deg += walls[i].turn_sum;
+    }
+    if (!(result.length > 0.0)) continue;
+    result.error_deg /= result.length;
+    evaluation.directions.push_back(result);
+  }
+  double directed_length = 0.0;
+  for (const DirectionResult& direction : evaluation.directions) {
+    directed_length += direction.length;
+  }
+  for (const DirectionResult& a : evaluation.directions) {
+    for (const DirectionResult& b : evaluation.directions) {
+      if (std::min(a.length, b.length) < 0.1 * directed_length) continue;
+      evaluation.bend_error_deg =
+          std::max(evaluation.bend_error_deg, a.error_deg - b.error_deg);
+    }
+  }
 
   std::vector<int> matches(truth.orientations_deg.size(), 0);
   for (const MapOrientation& orientation : map.orientations) {

@@ -95,6 +95,16 @@ Pose2 FitRigidTransform(const std::vector<Pose2>& from,
 Pose2 AlignTrajectory(const std::vector<TimedPose>& trajectory,
                       const MapTruth& truth);
 
+/// Errors of a trajectory, moved by an alignment, at the true poses with the
+/// same time stamps (to a millisecond).
+struct PoseErrors {
+  ErrorStatistics position;     ///< m
+  ErrorStatistics heading_deg;  ///< degrees, absolute
+};
+
+PoseErrors EvaluatePoses(const std::vector<TimedPose>& trajectory,
+                         const MapTruth& truth, const Pose2& alignment);
+
 struct MapTruthOptions {
   /// Shorter walls (by what was seen of them) are not asked for, and shorter
   /// map segments are not called false, m.
@@ -127,6 +137,18 @@ struct WallResult {
   double offset_error = 0.0;
 };
 
+/// The walls of one direction of the building against the map.
+struct DirectionResult {
+  /// Direction of the truth, degrees, and the length of the map's walls that
+  /// match walls of this direction, m (only of walls of at least the minimum
+  /// length).
+  double angle_deg = 0.0;
+  double length = 0.0;
+  /// How far these are turned counter-clockwise on average, weighted by length,
+  /// degrees.
+  double error_deg = 0.0;
+};
+
 /// A map against the truth.
 struct MapTruthEvaluation {
   /// World pose of the map frame that was used.
@@ -156,6 +178,13 @@ struct MapTruthEvaluation {
   std::vector<double> missed_orientations_deg;
   /// Orientation features beyond the first that match a direction.
   int duplicate_orientations = 0;
+  /// Directions of the building that walls of the map match, in the truth's
+  /// order.
+  std::vector<DirectionResult> directions;
+  /// How far the map bends the building, degrees: the largest difference
+  /// between the errors of two directions that have at least a tenth of the
+  /// length each.
+  double bend_error_deg = 0.0;
 };
 
 /// Compares a map, moved by `alignment`, with the truth. Segments that live

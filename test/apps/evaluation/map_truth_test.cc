@@ -319,6 +319,41 @@ TEST(MapTruthTest, Orientations) {
   EXPECT_THAT(result.missed_orientations_deg, ElementsAre(90));
 }
 
+TEST(MapTruthTest, ABendIsTheDifferenceOfDirectionsErrors) {
+  MapTruth truth;
+  truth.orientations_deg = {0, 5};
+  truth.walls = {MakeWall(0, 0, 0, 10, 0, 0),
+                 MakeWall(1, 10, 0, 10 + 10 * std::cos(DegToRad(5)),
+                          10 * std::sin(DegToRad(5)), 1)};
+  StraightMap map;
+  map.segments = {MakeSegment(1, 0, 0, 0.4, 0, 10),
+                  MakeSegment(2, 10, 0, 4.1, 0, 10),
+                  // Too short to say anything about a direction.
+                  MakeSegment(3, 5, 0, 4.9, 0, 0.5)};
+  const MapTruthEvaluation evaluation = EvaluateMap(map, truth, Pose2::Zero());
+  ASSERT_EQ(evaluation.directions.size(), 2u);
+  EXPECT_NEAR(evaluation.directions[0].error_deg, 0.4, 1e-9);
+  EXPECT_NEAR(evaluation.directions[1].error_deg, -0.9, 1e-9);
+  EXPECT_NEAR(evaluation.directions[1].length, 10.0, 0.1);
+  EXPECT_NEAR(evaluation.bend_error_deg, 1.3, 1e-9);
+}
+
+TEST(MapTruthTest, PosesAgainstTheTruth) {
+  MapTruth truth;
+  std::vector<TimedPose> trajectory(3);
+  for (int i = 0; i < 3; ++i) {
+    trajectory[i].timestamp = i;
+    trajectory[i].pose = Pose2(i, 0, 0);
+    truth.poses.push_back(trajectory[i]);
+  }
+  truth.poses[2].pose = Pose2(5, 4, DegToRad(6));
+  truth.poses[1].timestamp = 1.5;
+  const PoseErrors errors = EvaluatePoses(trajectory, truth, Pose2::Zero());
+  EXPECT_EQ(errors.position.count, 2u);
+  EXPECT_NEAR(errors.position.mean, 2.5, 1e-12);
+  EXPECT_NEAR(errors.heading_deg.maximum, 6.0, 1e-9);
+}
+
 TEST(MapTruthTest, NothingAgainstNothing) {
   const MapTruthEvaluation result =
       EvaluateMap(StraightMap(), MapTruth(), Pose2::Zero());

@@ -4,7 +4,6 @@
 # own, so that whoever wants one component needs only what that one needs.
 include(CMakePackageConfigHelpers)
 
-set(PLUMBLINE_COMPONENTS factors core detectors frontend plumbline)
 set(cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/plumbline)
 
 foreach(component ${PLUMBLINE_COMPONENTS})
@@ -17,7 +16,8 @@ foreach(component ${PLUMBLINE_COMPONENTS})
   export(EXPORT plumbline-${component} NAMESPACE plumbline::
     FILE ${PROJECT_BINARY_DIR}/plumbline-${component}-targets.cmake)
   if(NOT component STREQUAL plumbline)
-    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${component}/
+    plumbline_component_folder(${component} folder)
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/
       DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/plumbline/${component}
       COMPONENT development FILES_MATCHING PATTERN "*.h")
   endif()
@@ -55,5 +55,12 @@ plumbline_pkg_config(plumbline-detectors "Structure detectors"
   "plumbline-core" "-L\${libdir} -lplumbline_detectors")
 plumbline_pkg_config(plumbline-frontend "Log readers and laser front-end"
   "plumbline-core zlib" "-L\${libdir} -lplumbline_frontend -lbz2")
-plumbline_pkg_config(plumbline "All libraries of plumbline"
-  "plumbline-detectors plumbline-frontend" "")
+plumbline_pkg_config(plumbline-pipeline "From scans or a graph to a map"
+  "plumbline-detectors plumbline-frontend" "-L\${libdir} -lplumbline_pipeline")
+set(all plumbline-pipeline)
+if(PLUMBLINE_BUILD_OUTPUTS)
+  plumbline_pkg_config(plumbline-outputs "Floor plans, grids, pictures and reports of a map"
+    "plumbline-detectors plumbline-frontend cairo" "-L\${libdir} -lplumbline_outputs")
+  string(APPEND all " plumbline-outputs")
+endif()
+plumbline_pkg_config(plumbline "All libraries of plumbline" "${all}" "")

@@ -30,12 +30,13 @@ that simulate buildings and measure how good a map is.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libplumbline-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libceres-dev (>= 2.1), libeigen3-dev (>= 3.3), zlib1g-dev, libbz2-dev")
+  "libceres-dev (>= 2.1), libeigen3-dev (>= 3.3), zlib1g-dev, libbz2-dev, libcairo2-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
 "relations between walls, points and directions for Ceres Solver
 Cost functions, manifolds and losses for use in a ceres::Problem, and the
-libraries around them: graph, detectors of structure, expectation maximization
-and laser front-end, with CMake and pkg-config files.")
+libraries around them: graph, detectors of structure, expectation maximization,
+laser front-end, the way from a log to a map, and floor plans and grids of it,
+with CMake and pkg-config files.")
 
 # Copyright and changelog, where Debian's policy wants them.
 string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)

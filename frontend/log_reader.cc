@@ -1,6 +1,13 @@
+#include <plumbline/core/error.h>
 #include <plumbline/frontend/log_reader.h>
 
 namespace plumbline {
+namespace {
+
+// So much of a log is shown to the readers.
+constexpr std::size_t kRecognizedBytes = std::size_t{1} << 16;
+
+}  // namespace
 
 const LogReaderType* RecognizeLog(const Registry& registry,
                                   std::string_view prefix) {
@@ -10,6 +17,23 @@ const LogReaderType* RecognizeLog(const Registry& registry,
     }
   }
   return nullptr;
+}
+
+Log ReadLog(const std::string& path, const Registry& registry,
+            const LaserOptions& options) {
+  InputStream input(path);
+  const LogReaderType* reader =
+      RecognizeLog(registry, input.Peek(kRecognizedBytes));
+  if (reader == nullptr) {
+    std::string names;
+    for (const LogReaderType* known : registry.All<LogReaderType>()) {
+      names += (names.empty() ? "" : ", ") + known->name;
+    }
+    throw Error(input.name(), 0, "is no log of a known format",
+                names.empty() ? "log readers in the registry"
+                              : "a log for one of the readers " + names);
+  }
+  return reader->read(&input, options);
 }
 
 }  // namespace plumbline

@@ -46,6 +46,13 @@ struct LogReaderType {
 const LogReaderType* RecognizeLog(const Registry& registry,
                                   std::string_view prefix);
 
+/// Reads the log `path` ("-": standard input), whatever its format and
+/// compression, with the reader that recognizes it. Throws Error when the file
+/// cannot be read, no reader of the registry (RegisterBuiltinLogReaders)
+/// recognizes it, or there is no scan in it.
+Log ReadLog(const std::string& path, const Registry& registry,
+            const LaserOptions& options = {});
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_FRONTEND_LOG_READER_H_

@@ -7,10 +7,10 @@ file(RENAME ${WORK}/staging ${PREFIX})
 
 file(GLOB_RECURSE exported ${PREFIX}/*.cmake ${PREFIX}/*.pc)
 list(LENGTH exported count)
-# 5 components with a file for each configuration where there is an archive,
-# config, version, 5 for pkg-config.
-if(count LESS 15)
-  message(FATAL_ERROR "${PREFIX}: exported ${exported}: expected at least 15 files")
+# 7 components with a file for each configuration where there is an archive,
+# config, version, 7 for pkg-config.
+if(count LESS 21)
+  message(FATAL_ERROR "${PREFIX}: exported ${exported}: expected at least 21 files")
 endif()
 foreach(file ${exported})
   file(READ ${file} text)
@@ -24,8 +24,12 @@ foreach(file ${exported})
 endforeach()
 
 # Every public header, and no other.
-foreach(component factors core detectors frontend)
-  file(GLOB in_tree RELATIVE ${SOURCE}/${component} ${SOURCE}/${component}/*.h)
+foreach(component factors core detectors frontend pipeline outputs)
+  set(folder ${component})
+  if(NOT EXISTS ${SOURCE}/${component})
+    set(folder apps/${component})
+  endif()
+  file(GLOB in_tree RELATIVE ${SOURCE}/${folder} ${SOURCE}/${folder}/*.h)
   file(GLOB_RECURSE installed RELATIVE ${PREFIX}/include/plumbline/${component}
     ${PREFIX}/include/plumbline/${component}/*)
   if(NOT in_tree STREQUAL installed)

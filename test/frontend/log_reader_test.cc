@@ -1,4 +1,6 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <plumbline/core/error.h>
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/log_reader.h>
 
@@ -55,6 +57,34 @@ TEST(LogReaderTest, BuiltinCarmen) {
   EXPECT_EQ(log.scans[0].timestamp, 17.5);
   // At or above the maximum range there is no return.
   EXPECT_EQ(log.scans[0].ranges, (std::vector<float>{1.0f, 0.0f}));
+}
+
+TEST(LogReaderTest, ReadsALogOfAnyKnownFormat) {
+  Registry registry;
+  const std::string office =
+      std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/office.clf.gz";
+  const auto refusal = [&registry](const std::string& path) -> std::string {
+    try {
+      ReadLog(path, registry);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(refusal(office), ::testing::HasSubstr("expected log readers"));
+  RegisterBuiltinLogReaders(&registry);
+  EXPECT_GT(ReadLog(office, registry).scans.size(), 1000u);
+  LaserOptions options;
+  options.laser_max_range = 1.0;
+  const Log near = ReadLog(office, registry, options);
+  for (const float range : near.scans[0].ranges) {
+    EXPECT_LT(range, 1.0f);
+  }
+  EXPECT_THAT(refusal(std::string(PLUMBLINE_SOURCE_DIR) + "/LICENSE"),
+              ::testing::EndsWith(
+                  "LICENSE: is no log of a known format: expected a log for "
+                  "one of the readers carmen"));
+  EXPECT_THAT(refusal("no/such.log"), ::testing::HasSubstr("no/such.log"));
 }
 
 }  // namespace

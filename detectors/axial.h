@@ -62,7 +62,7 @@ struct AxialMixtureOptions {
 
 /// Finds the directions in a set of axial samples that come from a few
 /// Gaussians of unknown number over clutter, after the manner of Ponsa and Roca
-/// 2002 (method.md, section 6):
+/// 2002 (core/method.md, section 6):
 ///
 /// 1. Outliers. Clutter is a Poisson process of uniform direction whose marks,
 ///    the samples' weights, grow with length up to 3 m. Windows of several

@@ -19,8 +19,8 @@ struct CenterClusterOptions {
   int minimum_support = 2;
 };
 
-/// Common centres of the "circle" features of a level (method.md, section 6):
-/// clusters their centres and makes a virtual "point" one level up at the
+/// Common centres of the "circle" features of a level (core/method.md, section
+/// 6): clusters their centres and makes a virtual "point" one level up at the
 /// centre of gravity of each cluster, with point_point_coincidence constraints
 /// (expected (0, 0)) from the circles.
 ///
@@ -30,7 +30,7 @@ struct CenterClusterOptions {
 /// that is left to whoever makes circles.
 ///
 /// Centres of single circles say nothing on their own and are there to be seen
-/// in a row by line_ransac on the next level (method.md, Table 1).
+/// in a row by line_ransac on the next level (core/method.md, Table 1).
 class CenterCluster : public StructureDetector {
  public:
   /// `name` is the one under which the detector is registered.

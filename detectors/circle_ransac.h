@@ -9,10 +9,11 @@
 
 namespace plumbline {
 
-/// Circles through connected "point" features of a level (method.md, section
-/// 6): makes virtual "circle" features one level up with point_circle_distance
-/// constraints (expected 0) of the standard deviation sigma. See SearchCurves
-/// for how they are found and DetectCurves for how they are extended.
+/// Circles through connected "point" features of a level (core/method.md,
+/// section 6): makes virtual "circle" features one level up with
+/// point_circle_distance constraints (expected 0) of the standard deviation
+/// sigma. See SearchCurves for how they are found and DetectCurves for how they
+/// are extended.
 class CircleRansac : public StructureDetector {
  public:
   /// Options as those of the search for curves.

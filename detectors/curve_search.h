@@ -58,8 +58,8 @@ struct FoundCurve {
 };
 
 /// Finds the lines and circles in a graph of points, by RANSAC over
-/// interconnected points (method.md, section 6). Each point supports at most
-/// one of the result; claimed points support none and count for nothing.
+/// interconnected points (core/method.md, section 6). Each point supports at
+/// most one of the result; claimed points support none and count for nothing.
 ///
 /// 1. Hypotheses. From each point the neighbourhood along the edges is grown;
 ///    pairs and triples of it are drawn, and the best line and the best circle

@@ -11,7 +11,7 @@ namespace plumbline {
 constexpr double kPointsLoopTolerance = 3e-4;
 
 /// The hierarchy (MakeHierarchy) that is looked for in a graph with these types
-/// of raw features when nothing is asked for (method.md, section 5):
+/// of raw features when nothing is asked for (core/method.md, section 5):
 ///
 ///   point          line_ransac,circle_ransac /
 ///                  center_cluster,orientation_mixture / orientation_relation

@@ -9,12 +9,12 @@
 
 namespace plumbline {
 
-/// Lines through connected "point" features of a level (method.md, section 6):
-/// makes virtual "line" features one level up, anchored at the middle of their
-/// points, with point_line_distance constraints (expected 0) of the standard
-/// deviation sigma. See SearchCurves for how they are found and DetectCurves
-/// for how they are extended. Virtual points (circle centres) are connected as
-/// PointGraph says.
+/// Lines through connected "point" features of a level (core/method.md, section
+/// 6): makes virtual "line" features one level up, anchored at the middle of
+/// their points, with point_line_distance constraints (expected 0) of the
+/// standard deviation sigma. See SearchCurves for how they are found and
+/// DetectCurves for how they are extended. Virtual points (circle centres) are
+/// connected as PointGraph says.
 class LineRansac : public StructureDetector {
  public:
   /// Options as those of the search for curves.

@@ -26,12 +26,12 @@ struct OrientationMixtureOptions {
   AxialMixtureOptions mixture;
 };
 
-/// Orientations of segments and lines (method.md, section 6): reads features of
-/// the types "segment" and "line" of a level, and of those below that have no
-/// orientation yet, and makes virtual "orientation" features one level up, tied
-/// by the relations segment_orientation and line_orientation (expected 0). So
-/// walls (level 0 or 1) and rows of columns (level 2 or 3) have directions in
-/// common when the detector stands above both.
+/// Orientations of segments and lines (core/method.md, section 6): reads
+/// features of the types "segment" and "line" of a level, and of those below
+/// that have no orientation yet, and makes virtual "orientation" features one
+/// level up, tied by the relations segment_orientation and line_orientation
+/// (expected 0). So walls (level 0 or 1) and rows of columns (level 2 or 3)
+/// have directions in common when the detector stands above both.
 ///
 /// A "rectangle" is tied by rectangle_orientation in both its directions
 /// (expected 0 and pi/2), where they have an orientation; its walls speak for

@@ -31,10 +31,10 @@ struct OrientationRelationOptions {
   int max_relations = 4;
 };
 
-/// Relations between the "orientation" features of a level (method.md, section
-/// 6): orientation_orientation constraints with the expected angle nearest to
-/// the present one, in (-pi/2, pi/2]. Pairs that a live constraint relates are
-/// left alone.
+/// Relations between the "orientation" features of a level (core/method.md,
+/// section 6): orientation_orientation constraints with the expected angle
+/// nearest to the present one, in (-pi/2, pi/2]. Pairs that a live constraint
+/// relates are left alone.
 ///
 /// Virtual orientations are few, so all of a level are looked at even when the
 /// scope lists features: an orientation belongs to the whole building.

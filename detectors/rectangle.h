@@ -34,12 +34,12 @@ struct RectangleOptions {
   double max_side = 60.0;
 };
 
-/// Rectangles of walls (method.md, Table 1, row 4): rooms seen from inside,
-/// blocks seen from outside. Reads the "segment" and "line" features of a level
-/// and makes virtual "rectangle" features one level up, tied by the relations
-/// segment_rectangle and line_rectangle with the expected value (0, phi), phi
-/// the side. A side may consist of several walls in a line, and a wall may be
-/// on sides of several rectangles.
+/// Rectangles of walls (core/method.md, Table 1, row 4): rooms seen from
+/// inside, blocks seen from outside. Reads the "segment" and "line" features of
+/// a level and makes virtual "rectangle" features one level up, tied by the
+/// relations segment_rectangle and line_rectangle with the expected value (0,
+/// phi), phi the side. A side may consist of several walls in a line, and a
+/// wall may be on sides of several rectangles.
 ///
 /// Where walls meet at right angles is a corner. Four corners that are joined
 /// by walls in turn make a candidate; a rectangle is fitted to the walls of its

@@ -61,8 +61,8 @@ struct KeyScanRecord {
 
 /// What grows a graph from key scans: the part of the front-end that depends on
 /// the kind of raw features. Only the last robot pose is kept; what the poses
-/// before it knew is in the measurements between features (method.md, section
-/// 7).
+/// before it knew is in the measurements between features (core/method.md,
+/// section 7).
 class GraphBuilder {
  public:
   virtual ~GraphBuilder() = default;

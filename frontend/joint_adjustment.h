@@ -39,8 +39,8 @@ struct JointAdjustmentOptions {
 };
 
 /// Joint adjustment of poses, walls and structure: the last word of the scans
-/// on the map (ours; method.md, section 7, ends with finding the scans again on
-/// a map that stays as it is).
+/// on the map (ours; core/method.md, section 7, ends with finding the scans
+/// again on a map that stays as it is).
 ///
 /// The poses of key scans, which the front-end had marginalized out one by
 /// one, come back into the graph. They are bound to each other by refined

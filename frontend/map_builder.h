@@ -41,8 +41,8 @@ struct MapBuilderOptions {
   double relation_floor_angle = DegToRad(0.3);
 };
 
-/// Grows a graph of segments from scans (method.md, section 7, steps 1 to 4):
-/// predicts, associates by distance in the graph, corrects the robot alone,
+/// Grows a graph of segments from scans (core/method.md, section 7, steps 1 to
+/// 4): predicts, associates by distance in the graph, corrects the robot alone,
 /// adds what is new. What marginalized poses knew is in the relations between
 /// segments.
 class MapBuilder final : public GraphBuilder {

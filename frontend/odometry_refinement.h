@@ -87,8 +87,8 @@ struct RefinedScan {
   bool odometry_only = false;
 };
 
-/// Refines odometry by matching each scan with the last key scans (method.md,
-/// section 7, step 0).
+/// Refines odometry by matching each scan with the last key scans
+/// (core/method.md, section 7, step 0).
 class OdometryRefiner {
  public:
   /// Starts with nothing seen.

@@ -53,9 +53,9 @@ struct PointMapBuilderOptions {
   double min_distance = 0.1;
 };
 
-/// Grows a graph of points from scans (method.md, section 7, with points as
-/// level 0): a scan is cut into straight surfaces, points of the map near the
-/// robot are looked for on them, the robot alone is corrected, and where a
+/// Grows a graph of points from scans (core/method.md, section 7, with points
+/// as level 0): a scan is cut into straight surfaces, points of the map near
+/// the robot are looked for on them, the robot alone is corrected, and where a
 /// surface has no points yet it gets some. The map has distances between points
 /// and nothing else, few a point; what marginalized poses knew is in them.
 class PointMapBuilder final : public GraphBuilder {

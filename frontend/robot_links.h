@@ -15,8 +15,8 @@ namespace plumbline {
 
 /// The robot as it moves through a graph: its last pose, the only one that is
 /// kept, and how well that is known relative to the features that it is linked
-/// to (method.md, section 7, step 1). The poses before it are marginalized out
-/// into these covariances.
+/// to (core/method.md, section 7, step 1). The poses before it are marginalized
+/// out into these covariances.
 class RobotLinks {
  public:
   /// Covariances (3x3; m, rad) of the robot's pose relative to each feature, in

@@ -96,7 +96,7 @@ struct ExperimentResult {
 /// "S1" to "S6", "R1", "R2", "B1".
 const std::vector<std::string>& ExperimentNames();
 
-/// Runs an experiment of method.md, section 8.
+/// Runs an experiment of core/method.md, section 8.
 ///
 ///   S1  with structure, without, and with the true structure given (oracle)
 ///   S2  S1 from initial noise of 0.05 to 0.3 m

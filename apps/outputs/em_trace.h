@@ -13,8 +13,8 @@ namespace plumbline {
 /// A row of em_trace.csv.
 struct EmTraceRow {
   EmPhase phase;
-  /// Mean distance of the features' positions to the truth (method.md, section
-  /// 8), m; none where the truth is not known.
+  /// Mean distance of the features' positions to the truth (core/method.md,
+  /// section 8), m; none where the truth is not known.
   std::optional<double> mean_position_error;
 };
 

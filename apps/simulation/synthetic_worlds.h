@@ -77,13 +77,13 @@ struct SyntheticWorld {
 /// "S1" to "S6".
 const std::vector<std::string>& SyntheticWorldNames();
 
-/// The noise and outliers that method.md, section 8 gives a world. S2 starts
-/// from its largest initial noise, 0.3 m, and S3 has its larger distance noise,
-/// 0.1 m.
+/// The noise and outliers that core/method.md, section 8 gives a world. S2
+/// starts from its largest initial noise, 0.3 m, and S3 has its larger distance
+/// noise, 0.1 m.
 SyntheticOptions DefaultSyntheticOptions(const std::string& name);
 
-/// The paper's synthetic worlds as graphs (method.md, section 8). The layout is
-/// fixed; `seed` draws the noise and what belongs to no structure.
+/// The paper's synthetic worlds as graphs (core/method.md, section 8). The
+/// layout is fixed; `seed` draws the noise and what belongs to no structure.
 ///
 ///   S1 to S4  572 points and 1193 distances: a building of four rooms, each
 ///             with a round hall. Seven corridors (two walls 1.5 m apart, so 14

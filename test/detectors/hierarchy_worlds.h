@@ -28,7 +28,7 @@ struct TrueFeature {
   std::vector<double> at;
 };
 
-// Small worlds of which the structure is known (method.md, Table 1). Three
+// Small worlds of which the structure is known (core/method.md, Table 1). Three
 // robot poses that are known measure everything, so the map has its place and
 // is rigid; structure is what the detectors have to find.
 class HierarchyWorld {

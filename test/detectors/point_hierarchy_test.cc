@@ -13,7 +13,7 @@
 namespace plumbline {
 namespace {
 
-// Hierarchies over points (method.md, Table 1) in the whole loop.
+// Hierarchies over points (core/method.md, Table 1) in the whole loop.
 class PointHierarchyTest : public ::testing::Test {
  protected:
   PointHierarchyTest() { RegisterBuiltins(&registry_); }

@@ -17,7 +17,7 @@
 namespace plumbline {
 
 // Points on walls and columns, with distances between near ones: a world of
-// the kind of the main experiment with points (method.md, section 8, S1).
+// the kind of the main experiment with points (core/method.md, section 8, S1).
 class PointWorld {
  public:
   using Position = std::array<double, 2>;

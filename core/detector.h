@@ -6,10 +6,17 @@
 #include <plumbline/core/transaction.h>
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
 namespace plumbline {
+
+/// What a detector searched, refused and why, by name ("pairs searched",
+/// "pairs refused: no overlap"): for traces and whoever wonders why something
+/// was not found.
+using DetectionCounts = std::map<std::string, std::int64_t>;
 
 /// Where to look for structure.
 struct DetectionScope {
@@ -26,6 +33,18 @@ struct DetectionScope {
   /// For detectors that draw random numbers; the same seed gives the same
   /// proposal.
   std::uint64_t seed = 1;
+  /// Asked now and then by detectors that may take longer than a second; may be
+  /// empty. Once it has returned true, what Detect returns is not used.
+  std::function<bool()> stop;
+  /// Where the detector counts what it does; null when nobody asks.
+  DetectionCounts* counts = nullptr;
+
+  /// True when Detect shall return at once.
+  bool ShouldStop() const { return stop && stop(); }
+  /// Adds to a count, which is there from then on even when `number` is 0.
+  void Count(const std::string& name, std::int64_t number) const {
+    if (counts != nullptr) (*counts)[name] += number;
+  }
 };
 
 /// Reads the features of one level and proposes what is seen in them: virtual

@@ -344,6 +344,14 @@ const std::vector<FeatureId>& Graph::VirtualFeatures(int level) const {
   return found == virtual_features_.end() ? none : found->second;
 }
 
+std::vector<int> Graph::VirtualLevels() const {
+  std::vector<int> levels;
+  for (const auto& [level, ids] : virtual_features_) {
+    if (!ids.empty()) levels.push_back(level);
+  }
+  return levels;
+}
+
 std::vector<const Feature*> Graph::Features() const {
   std::vector<const Feature*> features;
   features.reserve(num_features_);

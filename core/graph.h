@@ -73,6 +73,8 @@ class Graph {
   /// of the graph. A feature's level and whether it is virtual must not be
   /// changed once it is in the graph.
   const std::vector<FeatureId>& VirtualFeatures(int level) const;
+  /// The levels that have virtual features, ascending.
+  std::vector<int> VirtualLevels() const;
 
   /// How many there are now; of constraints, broken ones included.
   std::size_t num_features() const { return num_features_; }

@@ -1,6 +1,5 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <plumbline/core/builtins.h>
 #include <plumbline/core/em.h>
 #include <plumbline/core/error.h>
 #include <plumbline/factors/angle.h>
@@ -14,70 +13,12 @@
 #include <utility>
 #include <vector>
 
+#include "core/em_test_util.h"
+
 namespace plumbline {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-
-// A detector made of a function.
-class TestDetector : public StructureDetector {
- public:
-  using Function = std::function<Transaction(const Graph&, const Registry&,
-                                             const DetectionScope&)>;
-  TestDetector(std::string name, int support, Function detect,
-               bool keeps_followers = false)
-      : name_(std::move(name)),
-        support_(support),
-        keeps_followers_(keeps_followers),
-        detect_(std::move(detect)) {}
-  const std::string& name() const override { return name_; }
-  int minimum_support() const override { return support_; }
-  bool keeps_followers() const override { return keeps_followers_; }
-  Transaction Detect(const Graph& graph, const Registry& registry,
-                     const DetectionScope& scope) const override {
-    return detect_(graph, registry, scope);
-  }
-
- private:
-  std::string name_;
-  int support_;
-  bool keeps_followers_;
-  Function detect_;
-};
-
-Feature Orientation(const Registry& registry, double angle, int level = 1) {
-  Feature feature;
-  feature.type = &registry.GetFeature("orientation");
-  feature.level = level;
-  feature.is_virtual = true;
-  feature.parameters[0] = angle;
-  return feature;
-}
-
-Constraint Structure(const Registry& registry, const std::string& relation,
-                     FeatureId a, FeatureId b, double expected,
-                     double sigma_degrees) {
-  Constraint constraint;
-  constraint.type = &registry.GetRelation(relation);
-  constraint.features = {a, b};
-  constraint.expected = Eigen::VectorXd::Constant(1, expected);
-  const double sigma = DegToRad(sigma_degrees);
-  constraint.information = Eigen::MatrixXd::Constant(1, 1, 1 / (sigma * sigma));
-  constraint.kind = ConstraintClass::kStructure;
-  return constraint;
-}
-
-bool HasLive(const Graph& graph, FeatureId id, const std::string& relation) {
-  for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
-    const Constraint& constraint = graph.GetConstraint(constraint_id);
-    if (constraint.state == ConstraintState::kLive &&
-        constraint.type->name == relation) {
-      return true;
-    }
-  }
-  return false;
-}
 
 // Ties every free segment within 6 degrees of one of the directions to an
 // orientation there; tolerance 0.5 degrees.
@@ -136,48 +77,8 @@ Transaction RightAngles(const Graph& graph, const Registry& registry,
   return transaction;
 }
 
-class EmTest : public ::testing::Test {
+class EmTest : public WallsTest {
  protected:
-  EmTest() {
-    RegisterBuiltinRelations(&registry_);
-    Feature robot;
-    robot.type = &registry_.GetFeature("pose");
-    robot.fixed = true;
-    Transaction transaction;
-    transaction.AddFeature(robot);
-    robot_ = graph_.Apply(transaction).features[0];
-  }
-
-  // A segment seen from the fixed robot in this direction, to 1 cm and 1
-  // degree.
-  FeatureId AddSegment(double degrees) {
-    Feature segment;
-    segment.type = &registry_.GetFeature("segment");
-    const double n = static_cast<double>(segments_.size());
-    segment.parameters = {n, 1.0, DegToRad(degrees)};
-    Constraint seen;
-    seen.type = &registry_.GetRelation("pose_pose");
-    seen.expected = Eigen::Vector3d(n, 1.0, DegToRad(degrees));
-    const double sigma = DegToRad(1.0);
-    seen.information =
-        Eigen::Vector3d(1e4, 1e4, 1.0 / (sigma * sigma)).asDiagonal();
-    Transaction transaction;
-    seen.features = {robot_, transaction.AddFeature(segment)};
-    transaction.AddConstraint(seen);
-    const TransactionResult result = graph_.Apply(transaction);
-    segments_.push_back(result.features[0]);
-    sightings_.push_back(result.constraints[0]);
-    return segments_.back();
-  }
-
-  // The robot now sees the i-th segment in this direction.
-  void Turn(std::size_t i, double degrees) {
-    const Constraint& seen = graph_.GetConstraint(sightings_[i]);
-    Eigen::VectorXd expected = seen.expected;
-    expected[2] = DegToRad(degrees);
-    graph_.UpdateConstraint(seen.id, expected, seen.information);
-  }
-
   void Add(int level, const std::string& name, int support,
            TestDetector::Function detect) {
     const auto size = static_cast<std::size_t>(level) + 1;
@@ -209,18 +110,6 @@ class EmTest : public ::testing::Test {
     return Count(relation, ConstraintState::kBroken);
   }
 
-  double Direction(FeatureId segment) const {
-    return RadToDeg(graph_.GetFeature(segment).parameters[2]);
-  }
-  double Angle(FeatureId orientation) const {
-    return RadToDeg(graph_.GetFeature(orientation).parameters[0]);
-  }
-
-  Registry registry_;
-  Graph graph_;
-  FeatureId robot_ = kNoId;
-  std::vector<FeatureId> segments_;
-  std::vector<ConstraintId> sightings_;
   Hierarchy hierarchy_;
   std::vector<EmPhase> trace_;
   // In this order: the session outlives the orchestrator.
@@ -995,100 +884,6 @@ TEST(EmDeterminismTest, SameInputSameBytes) {
   SecondBuilding first;
   SecondBuilding second;
   EXPECT_EQ(first.Run(), second.Run());
-}
-
-class HierarchyTest : public ::testing::Test {
- protected:
-  HierarchyTest() {
-    RegisterBuiltinRelations(&registry_);
-    Register("lines", {"point"}, {"line"});
-    Register("circles", {"point"}, {"circle"});
-    Register("centres", {"circle"}, {"point"});
-    Register("orientations", {"segment", "line"}, {"orientation"});
-    Register("relations", {"orientation"}, {});
-  }
-
-  void Register(const std::string& name, std::vector<std::string> reads,
-                std::vector<std::string> makes) {
-    DetectorType type;
-    type.name = name;
-    type.reads = std::move(reads);
-    type.makes = std::move(makes);
-    type.defaults = {{"sigma", 0.5}, {"support", 2.0}};
-    type.make = [this, name](const DetectorParameters& parameters) {
-      if (parameters.count("typo") > 0) {
-        throw PLUMBLINE_ERROR("unknown parameter typo", "sigma or support");
-      }
-      given_[name] = parameters;
-      return std::make_unique<TestDetector>(name, 1, nullptr);
-    };
-    registry_.Register(std::move(type));
-  }
-
-  std::string MessageOf(const std::string& description,
-                        const std::vector<std::string>& raw) {
-    try {
-      MakeHierarchy(description, registry_, raw, {});
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "no error";
-  }
-
-  Registry registry_;
-  std::map<std::string, DetectorParameters> given_;
-};
-
-TEST_F(HierarchyTest, ReadsLevelsAndNames) {
-  const Hierarchy hierarchy =
-      MakeHierarchy("lines, circles/centres,orientations/relations", registry_,
-                    {"point"}, {});
-  ASSERT_EQ(hierarchy.size(), 3u);
-  ASSERT_EQ(hierarchy[0].size(), 2u);
-  EXPECT_EQ(hierarchy[0][1]->name(), "circles");
-  ASSERT_EQ(hierarchy[1].size(), 2u);
-  EXPECT_EQ(hierarchy[1][0]->name(), "centres");
-  ASSERT_EQ(hierarchy[2].size(), 1u);
-}
-
-TEST_F(HierarchyTest, EmptyMeansNoDetectors) {
-  EXPECT_TRUE(MakeHierarchy("", registry_, {"point"}, {}).empty());
-}
-
-TEST_F(HierarchyTest, ParametersOverrideDefaults) {
-  MakeHierarchy("lines/orientations", registry_, {"point"},
-                {{"lines", {{"sigma", 0.1}}}, {"centres", {{"sigma", 9.0}}}});
-  EXPECT_EQ(given_["lines"],
-            (DetectorParameters{{"sigma", 0.1}, {"support", 2.0}}));
-  EXPECT_EQ(given_["orientations"],
-            (DetectorParameters{{"sigma", 0.5}, {"support", 2.0}}));
-  EXPECT_THROW(
-      MakeHierarchy("lines", registry_, {"point"}, {{"lines", {{"typo", 1}}}}),
-      Error);
-  EXPECT_THROW(MakeHierarchy("lines", registry_, {"point"}, {{"line", {}}}),
-               Error);
-}
-
-TEST_F(HierarchyTest, UnknownNamesListTheDetectors) {
-  EXPECT_THAT(MessageOf("line/orientations", {"point"}),
-              HasSubstr("unknown detector 'line': expected one of lines, "));
-  EXPECT_THAT(MessageOf("lines,/orientations", {"point"}),
-              HasSubstr("unknown detector ''"));
-  EXPECT_THAT(MessageOf("lines//relations", {"point"}),
-              HasSubstr("unknown detector ''"));
-}
-
-TEST_F(HierarchyTest, MisplacedDetectorsListWhatFitsWhere) {
-  EXPECT_THAT(MessageOf("lines/orientations", {"segment"}),
-              HasSubstr("detector 'lines' has nothing to read at level 0: "
-                        "expected level 0 (segment): orientations"));
-  EXPECT_THAT(
-      MessageOf("lines/centres", {"point"}),
-      HasSubstr("detector 'centres' has nothing to read at level 1: expected "
-                "level 0 (point): circles, lines; level 1 (line): "
-                "orientations"));
-  EXPECT_THAT(MessageOf("orientations/relations/relations", {"segment"}),
-              HasSubstr("level 2 (nothing): none"));
 }
 
 }  // namespace

@@ -1,0 +1,87 @@
+#ifndef PLUMBLINE_CORE_HYPOTHESIS_MEMORY_H_
+#define PLUMBLINE_CORE_HYPOTHESIS_MEMORY_H_
+
+#include <plumbline/core/em_options.h>
+#include <plumbline/core/graph.h>
+
+#include <Eigen/Core>
+#include <limits>
+#include <map>
+#include <set>
+#include <vector>
+
+namespace plumbline {
+
+/// What was broken and may not simply come again.
+///
+/// A hypothesis is remembered by what it said: relation, expected value and
+/// features. Virtual features come again under other ids, so a hypothesis on
+/// one is the same when the type is, and when the remembered feature's value
+/// in the place of the new one changes the whitened error by no more than
+/// EmOptions::reproposal_sigmas. Its own error is taken after the map has
+/// relaxed without it (MeasureRelaxedErrors).
+///
+/// It is let in again only when its error has fallen by more than
+/// reproposal_sigmas since, and only max_breaks times. A raw feature may have
+/// max_breaks_per_feature hypotheses of one relation broken, whatever their
+/// values. So what can be added is bounded, and the loop of EM ends.
+class HypothesisMemory {
+ public:
+  /// The graph is not owned and must outlive the memory. Of the options, those
+  /// on proposing again are read.
+  HypothesisMemory(const Graph* graph, const EmOptions& options);
+
+  /// Enters a structure constraint of the graph that was broken, or one that a
+  /// detector is about to take back.
+  void Remember(const Constraint& constraint);
+
+  /// To be called while a feature that leaves the graph is still valid. A raw
+  /// one takes its hypotheses along, a virtual one is kept by its value.
+  void OnFeatureRemoved(const Feature& feature);
+
+  /// Takes the errors of the hypotheses entered since the last call, at the
+  /// present state: that of a solve without them.
+  void MeasureRelaxedErrors();
+
+  /// False when this was broken before and nothing speaks for trying it again.
+  /// `features` are the constraint's, in its order; those of a proposal have no
+  /// id yet. Sizes must fit the relation.
+  bool MayBeProposed(const Constraint& constraint,
+                     const std::vector<const Feature*>& features) const;
+
+ private:
+  // A broken hypothesis, by what it said.
+  struct Hypothesis {
+    const RelationType* relation = nullptr;
+    std::vector<FeatureId> features;
+    Eigen::VectorXd expected;
+    Eigen::MatrixXd information;
+    // Norm of the whitened error, that is in standard deviations, once the map
+    // had been solved without it.
+    double error = std::numeric_limits<double>::infinity();
+    int breaks = 0;
+  };
+  // By the first raw feature; what is between virtual ones alone is under
+  // kNoId.
+  using HypothesesByFeature = std::map<FeatureId, std::vector<Hypothesis>>;
+
+  const Feature* Recall(FeatureId id) const;
+  std::vector<const Feature*> RecallAll(
+      const std::vector<FeatureId>& ids) const;
+  bool SaysTheSame(const Hypothesis& hypothesis, const Constraint& constraint,
+                   const std::vector<const Feature*>& features) const;
+
+  const Graph* graph_;
+  double reproposal_sigmas_;
+  int max_breaks_;
+  int max_breaks_per_feature_;
+  HypothesesByFeature hypotheses_;
+  // Keys of hypotheses that were broken and not measured since.
+  std::set<FeatureId> unmeasured_;
+  // Virtual features that are gone, as they were last.
+  std::map<FeatureId, Feature> dropped_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_CORE_HYPOTHESIS_MEMORY_H_

@@ -1,0 +1,249 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/proposal_filter.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/factors/information.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+// The features of a graph and those that a proposal would add.
+class ProposedFeatures {
+ public:
+  ProposedFeatures(const Graph* graph, const std::vector<Feature>* added)
+      : graph_(graph), added_(added) {}
+
+  // Null when there is none.
+  const Feature* Find(FeatureId id) const {
+    if (!Transaction::IsProvisional(id)) return graph_->FindFeature(id);
+    const std::size_t index = Transaction::ProvisionalIndex(id);
+    return index < added_->size() ? &(*added_)[index] : nullptr;
+  }
+
+  // Those of a constraint that are there and have a type.
+  std::vector<const Feature*> Of(const Constraint& constraint) const {
+    std::vector<const Feature*> features;
+    for (const FeatureId id : constraint.features) {
+      const Feature* feature = Find(id);
+      if (feature != nullptr && feature->type != nullptr) {
+        features.push_back(feature);
+      }
+    }
+    return features;
+  }
+
+ private:
+  const Graph* graph_;
+  const std::vector<Feature>* added_;
+};
+
+// True when the numbers fit the relation and each other, so that the error can
+// be computed.
+bool IsWellFormed(const Constraint& constraint,
+                  const std::vector<const Feature*>& between) {
+  if (constraint.type == nullptr) return false;
+  const RelationType& type = *constraint.type;
+  const Eigen::Index size = type.residual_size;
+  return between.size() == constraint.features.size() &&
+         between.size() == type.feature_types.size() &&
+         constraint.expected.size() == size &&
+         constraint.information.rows() == size &&
+         IsValidInformation(constraint.information);
+}
+
+// Takes out the added features that have too little support, and those that
+// lose theirs by it.
+class SupportedPart {
+ public:
+  SupportedPart(const std::vector<Feature>& features,
+                const std::vector<Constraint>& constraints)
+      : constraints_(constraints),
+        is_kept_(features.size(), true),
+        is_out_(constraints.size(), false),
+        constraints_on_(features.size()) {
+    for (std::size_t c = 0; c < constraints.size(); ++c) {
+      ForEachAdded(constraints[c],
+                   [&](std::size_t i) { constraints_on_[i].push_back(c); });
+    }
+  }
+
+  void Reduce(const std::vector<Feature>& features,
+              const ProposedFeatures& proposed,
+              const StructureDetector& detector, const SupportPolicy& policy) {
+    std::set<std::size_t> unchecked;
+    for (std::size_t i = 0; i < features.size(); ++i) unchecked.insert(i);
+    while (!unchecked.empty()) {
+      const std::size_t i = *unchecked.begin();
+      unchecked.erase(unchecked.begin());
+      if (!is_kept_[i] || features[i].fixed ||
+          policy.MayBeAdded(detector, Transaction::ProvisionalId(i),
+                            SupportOf(i, features[i].level, proposed))) {
+        continue;
+      }
+      is_kept_[i] = false;
+      for (const std::size_t c : constraints_on_[i]) {
+        is_out_[c] = true;
+        ForEachAdded(constraints_[c],
+                     [&](std::size_t other) { unchecked.insert(other); });
+      }
+    }
+  }
+
+  bool IsFeatureKept(std::size_t i) const { return is_kept_[i]; }
+  bool IsConstraintKept(std::size_t c) const { return !is_out_[c]; }
+
+ private:
+  // Calls function(index) for the features of a constraint that are new.
+  template <typename Function>
+  void ForEachAdded(const Constraint& constraint,
+                    const Function& function) const {
+    for (const FeatureId id : constraint.features) {
+      if (!Transaction::IsProvisional(id)) continue;
+      const std::size_t index = Transaction::ProvisionalIndex(id);
+      if (index < is_kept_.size()) function(index);
+    }
+  }
+
+  FeatureSupport SupportOf(std::size_t i, int level,
+                           const ProposedFeatures& proposed) const {
+    FeatureSupport support;
+    for (const std::size_t c : constraints_on_[i]) {
+      if (is_out_[c]) continue;
+      const Constraint& constraint = constraints_[c];
+      support.structure.push_back(&constraint);
+      if (std::any_of(constraint.features.begin(), constraint.features.end(),
+                      [&](FeatureId id) {
+                        const Feature* feature = proposed.Find(id);
+                        return feature != nullptr && feature->level < level;
+                      })) {
+        support.from_below.push_back(&constraint);
+      }
+    }
+    return support;
+  }
+
+  const std::vector<Constraint>& constraints_;
+  std::vector<bool> is_kept_;
+  std::vector<bool> is_out_;
+  // By feature, the indices of its constraints.
+  std::vector<std::vector<std::size_t>> constraints_on_;
+};
+
+// A transaction of what is kept of new features and constraints; moves from
+// them.
+Transaction MakeTransaction(const SupportedPart& part,
+                            std::vector<Feature>* features,
+                            std::vector<Constraint>* constraints) {
+  Transaction transaction;
+  std::map<FeatureId, FeatureId> new_ids;
+  for (std::size_t i = 0; i < features->size(); ++i) {
+    if (!part.IsFeatureKept(i)) continue;
+    new_ids[Transaction::ProvisionalId(i)] =
+        transaction.AddFeature(std::move((*features)[i]));
+  }
+  for (std::size_t c = 0; c < constraints->size(); ++c) {
+    if (!part.IsConstraintKept(c)) continue;
+    Constraint& constraint = (*constraints)[c];
+    for (FeatureId& id : constraint.features) {
+      const auto found = new_ids.find(id);
+      if (found != new_ids.end()) id = found->second;
+    }
+    transaction.AddConstraint(std::move(constraint));
+  }
+  return transaction;
+}
+
+}  // namespace
+
+ProposalFilter::ProposalFilter(
+    const Graph* graph,
+    const std::map<std::string, RelationPrior>& relation_priors,
+    const HypothesisMemory* memory, const SupportPolicy* support)
+    : graph_(graph),
+      relation_priors_(relation_priors),
+      memory_(memory),
+      support_(support) {}
+
+Transaction ProposalFilter::Filter(Transaction proposal,
+                                   const StructureDetector& detector) const {
+  std::vector<Feature>& features = proposal.added_features();
+  for (Feature& feature : features) {
+    feature.is_virtual = true;
+    if (feature.source.empty()) feature.source = detector.name();
+  }
+  const ProposedFeatures proposed(graph_, &features);
+  std::vector<Constraint> constraints;
+  for (Constraint& constraint : proposal.added_constraints()) {
+    if (!ApplyPrior(&constraint)) continue;
+    const std::vector<const Feature*> between = proposed.Of(constraint);
+    if (IsWellFormed(constraint, between) &&
+        (IsThere(constraint) || !memory_->MayBeProposed(constraint, between))) {
+      continue;
+    }
+    if (constraint.source.empty()) constraint.source = detector.name();
+    constraints.push_back(std::move(constraint));
+  }
+  SupportedPart part(features, constraints);
+  part.Reduce(features, proposed, detector, *support_);
+
+  Transaction accepted = MakeTransaction(part, &features, &constraints);
+  for (const FeatureId id : proposal.removed_features()) {
+    accepted.RemoveFeature(id);
+  }
+  for (const ConstraintId id : proposal.removed_constraints()) {
+    accepted.RemoveConstraint(id);
+  }
+  for (const ConstraintId id : proposal.broken_constraints()) {
+    accepted.BreakConstraint(id);
+  }
+  return accepted;
+}
+
+// Gives a proposal the tolerances that are known beforehand; false when it is
+// not expected at all.
+bool ProposalFilter::ApplyPrior(Constraint* constraint) const {
+  if (constraint->type == nullptr) return true;
+  const auto found = relation_priors_.find(constraint->type->name);
+  if (found == relation_priors_.end()) return true;
+  const std::vector<double>& sigmas = found->second.sigmas;
+  if (!found->second.is_expected) return false;
+  if (sigmas.empty()) return true;
+  const auto rows = static_cast<Eigen::Index>(sigmas.size());
+  if (rows != constraint->type->residual_size) {
+    throw PLUMBLINE_ERROR(
+        "prior of " + found->first + " has " + std::to_string(rows) + " sigmas",
+        std::to_string(constraint->type->residual_size));
+  }
+  constraint->information =
+      Eigen::Map<const Eigen::VectorXd>(sigmas.data(), rows)
+          .cwiseAbs2()
+          .cwiseInverse()
+          .asDiagonal();
+  return true;
+}
+
+// True when a live constraint says the same already.
+bool ProposalFilter::IsThere(const Constraint& constraint) const {
+  const std::vector<ConstraintId>* fewest = nullptr;
+  for (const FeatureId id : constraint.features) {
+    if (graph_->FindFeature(id) == nullptr) return false;
+    const auto& constraints = graph_->ConstraintsOf(id);
+    if (fewest == nullptr || constraints.size() < fewest->size()) {
+      fewest = &constraints;
+    }
+  }
+  return fewest != nullptr &&
+         std::any_of(fewest->begin(), fewest->end(), [&](ConstraintId id) {
+           const Constraint& other = *graph_->FindConstraint(id);
+           return other.state == ConstraintState::kLive &&
+                  other.type == constraint.type &&
+                  other.features == constraint.features &&
+                  other.expected == constraint.expected;
+         });
+}
+
+}  // namespace plumbline

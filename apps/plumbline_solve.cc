@@ -207,26 +207,26 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
     // What comes after the last scan: its steps are not known beforehand.
     std::unique_ptr<Progress> finishing;
     std::int64_t steps = 0;
-    result = solver.Run(
-        log,
-        [&](std::size_t done, std::size_t total) {
-          progress.Update(static_cast<std::int64_t>(done));
-          if (done % 500 == 0 || done == total) {
-            Detail("%zu of %zu scans in %.1f s", done, total,
-                   Now() - begin_solving);
-          }
-          if (done == total) {
-            progress.Finish();
-            finishing = std::make_unique<Progress>("adjusting", "steps", 0);
-          }
-        },
-        [&] {
-          if (finishing != nullptr) finishing->Update(++steps);
-          return InterruptRequested();
-        },
-        [&](const char* step) {
-          Detail("%s, after %.1f s", step, Now() - begin_solving);
-        });
+    RunControl control;
+    control.progress = [&](std::size_t done, std::size_t total) {
+      progress.Update(static_cast<std::int64_t>(done));
+      if (done % 500 == 0 || done == total) {
+        Detail("%zu of %zu scans in %.1f s", done, total,
+               Now() - begin_solving);
+      }
+      if (done == total) {
+        progress.Finish();
+        finishing = std::make_unique<Progress>("adjusting", "steps", 0);
+      }
+    };
+    control.stop = [&] {
+      if (finishing != nullptr) finishing->Update(++steps);
+      return InterruptRequested();
+    };
+    control.step = [&](const char* step) {
+      Detail("%s, after %.1f s", step, Now() - begin_solving);
+    };
+    result = solver.Run(log, control);
   }
   for (const EmPhase& phase : solver.trace()) TellPhase(phase);
   summary.scans = static_cast<std::int64_t>(result.trajectory.size());
@@ -317,9 +317,8 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
       if (feature->level == 0) raw.insert(feature->type->name);
     }
     options.em.full_weight_test = FullWeightTestFromFlags(raw);
-    if (raw.count("point") > 0) {
-      options.em.loop_tolerance = kPointsLoopTolerance;
-    }
+    const double tolerance = ProfileOf(raw).graph_loop_tolerance;
+    if (tolerance > 0.0) options.em.loop_tolerance = tolerance;
     hierarchy = MakeHierarchy(
         options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
         registry, {raw.begin(), raw.end()}, options.detector_parameters);

@@ -255,7 +255,7 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
     RefuseForPoints("refine", "full", "returns vote for segments");
   }
   options.structure = FLAGS_structure;
-  options.hierarchy = FLAGS_hierarchy;
+  options.hierarchy = ParseHierarchy(FLAGS_hierarchy);
 
   auto set = [&](const std::string& detector, const std::string& name,
                  double value) {
@@ -288,9 +288,9 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.point_builder.association_depth = FLAGS_association_depth;
   options.session.delta_mode = FLAGS_delta_mode;
   options.em.delta_threshold = FLAGS_delta_threshold;
-  options.em.full_weight_test =
-      FLAGS_full_weight_test == "true" ||
-      (FLAGS_full_weight_test == "auto" && FLAGS_features == "points");
+  options.em.full_weight_test = FLAGS_full_weight_test == "true" ||
+                                (FLAGS_full_weight_test == "auto" &&
+                                 ProfileOf(options.features).full_weight_test);
   options.em.max_iterations = FLAGS_em_max_iterations;
   options.em.seed = FLAGS_seed;
   options.em_every = FLAGS_em_every;
@@ -323,7 +323,7 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
 
 bool FullWeightTestFromFlags(const std::set<std::string>& raw_feature_types) {
   if (FLAGS_full_weight_test != "auto") return FLAGS_full_weight_test == "true";
-  return raw_feature_types.count("point") > 0;
+  return ProfileOf(raw_feature_types).full_weight_test;
 }
 
 InitialGuessOptions InitialGuessOptionsFromFlags() {

@@ -8,18 +8,6 @@
 namespace plumbline {
 namespace {
 
-std::vector<std::string> Split(const std::string& text, char separator) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == separator) {
-      parts.emplace_back();
-    } else if (c != ' ' && c != '\t' && c != '\n' && c != '\r') {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
-
 bool Intersects(const std::vector<std::string>& names,
                 const std::set<std::string>& set) {
   return std::any_of(
@@ -51,22 +39,19 @@ std::string WhatFitsWhere(const Registry& registry,
 }  // namespace
 
 Hierarchy MakeHierarchy(
-    const std::string& description, const Registry& registry,
+    const HierarchySpec& spec, const Registry& registry,
     const std::vector<std::string>& raw_feature_types,
     const std::map<std::string, DetectorParameters>& parameters) {
   for (const auto& entry : parameters) registry.GetDetector(entry.first);
   Hierarchy hierarchy;
-  const std::vector<std::string> levels = Split(description, '/');
-  if (levels.size() == 1 && levels[0].empty()) return hierarchy;
-
   // Types that each level can hold, as far as it is known.
   std::vector<std::set<std::string>> types = {
       {raw_feature_types.begin(), raw_feature_types.end()}};
-  for (const std::string& level_description : levels) {
+  for (const std::vector<std::string>& names : spec.levels) {
     const std::size_t level = hierarchy.size();
     hierarchy.emplace_back();
     std::set<std::string> made;
-    for (const std::string& name : Split(level_description, ',')) {
+    for (const std::string& name : names) {
       const DetectorType& type = registry.GetDetector(name);
       if (!Intersects(type.reads, types[level])) {
         throw PLUMBLINE_ERROR("detector '" + name +

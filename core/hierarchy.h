@@ -2,6 +2,7 @@
 #define PLUMBLINE_CORE_HIERARCHY_H_
 
 #include <plumbline/core/detector.h>
+#include <plumbline/core/hierarchy_spec.h>
 #include <plumbline/core/registry.h>
 
 #include <map>
@@ -14,14 +15,13 @@ namespace plumbline {
 /// Detectors by the level whose features they read: hierarchy[0] reads level 0.
 using Hierarchy = std::vector<std::vector<std::unique_ptr<StructureDetector>>>;
 
-/// Parses "a,b/c/d" (levels by '/', detectors of a level by ',') and makes the
-/// detectors with their parameters (by detector name; what is missing is the
-/// default). An empty description gives no detectors. A level holds what the
-/// detectors of the level below make, level 0 holds `raw_feature_types`. Throws
-/// Error with the list of detectors when a name is unknown, and with the list
-/// of what fits where when a detector reads nothing that its level can hold.
+/// Makes the detectors with their parameters (by detector name; what is missing
+/// is the default). A level holds what the detectors of the level below make,
+/// level 0 holds `raw_feature_types`. Throws Error with the list of detectors
+/// when a name is unknown, and with the list of what fits where when a detector
+/// reads nothing that its level can hold.
 Hierarchy MakeHierarchy(
-    const std::string& description, const Registry& registry,
+    const HierarchySpec& spec, const Registry& registry,
     const std::vector<std::string>& raw_feature_types,
     const std::map<std::string, DetectorParameters>& parameters);
 

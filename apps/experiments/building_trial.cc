@@ -45,7 +45,7 @@ BuildingTrial RunBuildingTrial(const World& world,
   const MapTruth truth = ReadMapTruth(&truth_text);
 
   LogSolver solver(registry, options);
-  const LogSolverResult result = solver.Run(log, nullptr, stop);
+  const LogSolverResult result = solver.Run(log, {nullptr, stop, nullptr});
   if (result.interrupted) {
     trial.is_stopped = true;
     return trial;

@@ -770,7 +770,8 @@ void RunLog(const std::string& log_file, const std::string& relations_file,
       solver_options.em.seed = options.seed;
       LogSolver solver(registry, solver_options);
       const double begin = Seconds();
-      const LogSolverResult solved = solver.Run(log, nullptr, options.stop);
+      const LogSolverResult solved =
+          solver.Run(log, {nullptr, options.stop, nullptr});
       const double seconds = Seconds() - begin;
       if (solved.interrupted) return;
       std::vector<TimedPose> trajectory(solved.trajectory.size());
@@ -992,8 +993,8 @@ SyntheticRun RunOnWorld(const Registry& registry,
   em_options.loop_tolerance = kPointsLoopTolerance;
   em_options.seed = options.seed;
   EmOrchestrator em(world->graph.get(), session.get(), registry,
-                    MakeHierarchy(options.hierarchy, registry, {"point"},
-                                  options.detector_parameters),
+                    MakeHierarchy(ParseHierarchy(options.hierarchy), registry,
+                                  {"point"}, options.detector_parameters),
                     em_options);
   run.start_error = error();
   run.phases.push_back({0, -1, "start", run.start_error});

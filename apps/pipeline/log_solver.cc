@@ -1,77 +1,21 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/stopwatch.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/pipeline/log_solver.h>
 
-#include <algorithm>
-#include <chrono>
 #include <string>
 #include <utility>
 
 namespace plumbline {
 namespace {
 
-double Now() {
-  return std::chrono::duration<double>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
+constexpr char kSameWallDetector[] = "same_wall";
 
-std::string RawType(const LogSolverOptions& options) {
-  return options.features == RawFeatures::kPoints ? "point" : "segment";
-}
-
-std::string HierarchyOf(const LogSolverOptions& options) {
-  return options.hierarchy.empty() ? DefaultHierarchy({RawType(options)})
-                                   : options.hierarchy;
-}
-
-// The constraints from the robot that an EM step while replaying reaches at
-// most: points are bound to farther ones than segments, and there are more.
-constexpr int kPointEmDepth = 1;
-
-// The detectors of lines and circles have the synthetic worlds' noise of
-// decimetres as defaults. A point of a log is placed across its wall by many
-// returns, to a centimetre. Walls go on behind open doors, and a row of points
-// is a wall of its own when it is a hand's breadth from another.
-DetectorParameters CurvesOfALog() {
-  return {{"tolerance", 0.1}, {"gate", 0.06}, {"max_gap", 2.5}, {"reach", 2.0}};
-}
-
-// What points cannot do is off.
-LogSolverOptions Settle(LogSolverOptions options) {
-  if (options.features == RawFeatures::kPoints) {
-    options.global_association = false;
-    options.complete_walls = false;
-    if (options.refine == Refinement::kFull) options.refine = Refinement::kMap;
-    for (const char* detector : {"line_ransac", "circle_ransac"}) {
-      // What was given stays.
-      for (const auto& parameter : CurvesOfALog()) {
-        options.detector_parameters[detector].insert(parameter);
-      }
-    }
-    options.em_depth = std::min(options.em_depth, kPointEmDepth);
-  }
-  return options;
-}
-
-// With same_wall as the last detector of level 0, unless it is there.
-std::string WithSameWall(std::string hierarchy) {
-  if (hierarchy.find("same_wall") != std::string::npos) return hierarchy;
-  const std::size_t end = std::min(hierarchy.find('/'), hierarchy.size());
-  hierarchy.insert(end, end > 0 ? ",same_wall" : "same_wall");
-  return hierarchy;
-}
+// An EM step on the way takes in the whole of a small map when it has grown by
+// more than this.
+constexpr std::size_t kSmallMapGrowth = 10;
 
 }  // namespace
-
-std::unique_ptr<GraphBuilder> MakeGraphBuilder(const LogSolverOptions& options,
-                                               Graph* graph,
-                                               const Registry& registry) {
-  if (options.features == RawFeatures::kPoints) {
-    return std::make_unique<PointMapBuilder>(graph, registry,
-                                             options.point_builder);
-  }
-  return std::make_unique<MapBuilder>(graph, registry, options.builder);
-}
 
 KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
                     const std::vector<ScanPoint>& returns) {
@@ -85,21 +29,243 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
   return key;
 }
 
-LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
-    : registry_(registry), options_(Settle(options)) {
-  Hierarchy hierarchy;
-  if (options_.structure) {
-    hierarchy =
-        MakeHierarchy(HierarchyOf(options_), registry_, {RawType(options_)},
-                      options_.detector_parameters);
+// What the stages share once all scans are in.
+struct LogSolver::Context {
+  const std::vector<Scan>& scans;
+  const RunControl& control;
+  LogSolverResult result;
+  // As the scans were found again last.
+  std::vector<Pose2> keys;
+
+  void Begin(const char* step) const {
+    if (control.step) control.step(step);
   }
+  // Once it was time to stop, it stays so.
+  bool IsStopped() {
+    if (!result.interrupted && control.stop && control.stop()) {
+      result.interrupted = true;
+    }
+    return result.interrupted;
+  }
+};
+
+LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
+    : registry_(registry),
+      profile_(ProfileOf(options.features)),
+      options_(WithProfile(profile_, options)),
+      refiner_(options_.odometry) {
   session_ =
       std::make_unique<SolverSession>(&graph_, registry_, options_.session);
-  em_ = std::make_unique<EmOrchestrator>(&graph_, session_.get(), registry_,
-                                         std::move(hierarchy), options_.em);
+  em_ = std::make_unique<EmOrchestrator>(
+      &graph_, session_.get(), registry_,
+      options_.structure ? MakeDetectors(HierarchyOfOptions()) : Hierarchy(),
+      options_.em);
+  builder_ = profile_.make_builder(options_, &graph_, registry_);
 }
 
 LogSolver::~LogSolver() = default;
+
+HierarchySpec LogSolver::HierarchyOfOptions() const {
+  return options_.hierarchy.empty() ? DefaultHierarchy({profile_.feature_type})
+                                    : options_.hierarchy;
+}
+
+Hierarchy LogSolver::MakeDetectors(const HierarchySpec& spec) const {
+  return MakeHierarchy(spec, registry_, {profile_.feature_type},
+                       options_.detector_parameters);
+}
+
+void LogSolver::RequireUnfinished() const {
+  if (is_finished_) {
+    throw PLUMBLINE_ERROR("the log of this solver is solved",
+                          "a new solver for each log");
+  }
+}
+
+Pose2 LogSolver::AddScan(Scan scan) {
+  RequireUnfinished();
+  scans_.push_back(std::move(scan));
+  TakeScan(scans_.back());
+  if (builder_->records().empty()) return refined_.back().pose;
+  return refined_.back().is_key
+             ? builder_->robot()
+             : Compose(builder_->robot(), refined_.back().since_key.mean);
+}
+
+void LogSolver::TakeScan(const Scan& scan) {
+  const Stopwatch watch;
+  double em_seconds = 0.0;
+  refined_.push_back(refiner_.Process(scan));
+  ++scans_since_em_;
+  if (refined_.back().is_key) {
+    const int index = static_cast<int>(refined_.size()) - 1;
+    builder_->AddScan(
+        MakeKeyScan(index, scan, refined_.back(), refiner_.points()));
+    if (options_.em_every > 0 && scans_since_em_ >= options_.em_every) {
+      scans_since_em_ = 0;
+      const ScopedTimer timer(&em_seconds);
+      RunEmNearRobot();
+    }
+  }
+  const double seconds = watch.Seconds();
+  scan_seconds_.push_back(static_cast<float>(seconds));
+  frontend_seconds_ += seconds - em_seconds;
+}
+
+void LogSolver::RunEmNearRobot() {
+  builder_->WriteRobot();
+  const std::size_t features = graph_.num_features();
+  if (features < static_cast<std::size_t>(options_.small_map) &&
+      features > features_at_last_global_ + kSmallMapGrowth) {
+    features_at_last_global_ = features;
+    em_->Iterate();
+  } else {
+    const std::vector<FeatureId> scope =
+        builder_->Neighborhood(options_.em_depth);
+    em_->Iterate(&scope);
+  }
+  builder_->ReadRobot();
+}
+
+std::vector<Pose2> LogSolver::KeyPoses() const {
+  if (options_.refine != Refinement::kNone) {
+    return RelocalizeKeyScans(graph_, builder_->records(),
+                              options_.relocalization);
+  }
+  std::vector<Pose2> poses;
+  for (const KeyScanRecord& record : builder_->records()) {
+    poses.push_back(record.pose);
+  }
+  return poses;
+}
+
+std::vector<Pose2> LogSolver::Trajectory() const {
+  RequireUnfinished();
+  return InterpolateScans(refined_, builder_->records(), KeyPoses());
+}
+
+LogSolverResult LogSolver::Run(const Log& log, const RunControl& control) {
+  RequireUnfinished();
+  if (!refined_.empty()) {
+    throw PLUMBLINE_ERROR("scans were added before Run",
+                          "Finish, or a new solver");
+  }
+  refined_.reserve(log.scans.size());
+  scan_seconds_.reserve(log.scans.size());
+  for (const Scan& scan : log.scans) {
+    if (control.stop && control.stop()) break;
+    TakeScan(scan);
+    if (control.progress) control.progress(refined_.size(), log.scans.size());
+  }
+  return FinishWith(log.scans, control);
+}
+
+LogSolverResult LogSolver::Finish(const RunControl& control) {
+  RequireUnfinished();
+  return FinishWith(scans_, control);
+}
+
+LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
+                                      const RunControl& control) {
+  is_finished_ = true;
+  Context context{scans, control, {}, {}};
+  context.result.interrupted = refined_.size() < scans.size();
+  FindStructure(&context);
+  CloseLoops(&context);
+  FindScansAgain(&context);
+  CompleteWalls(&context);
+  AdjustJointly(&context);
+
+  LogSolverResult& result = context.result;
+  result.detect_seconds =
+      before_closing_.detect_seconds + em_->totals().detect_seconds;
+  result.solve_seconds =
+      before_closing_.solve_seconds + em_->totals().solve_seconds;
+  result.frontend_seconds = frontend_seconds_;
+  result.scan_seconds = std::move(scan_seconds_);
+  result.key_scans = static_cast<std::int64_t>(builder_->records().size());
+  result.wide_searches = refiner_.wide_searches();
+  result.refused_matches = refiner_.refusals();
+  result.feature_matches = builder_->num_matches();
+  result.features_created = builder_->num_created();
+  result.records = builder_->records();
+  result.refined = std::move(refined_);
+  scans_ = {};
+  return std::move(context.result);
+}
+
+void LogSolver::RunEm(Context* context) {
+  const EmReport report = em_->Run(context->control.stop);
+  context->result.em.iterations += report.iterations;
+  context->result.em.converged = report.converged;
+}
+
+void LogSolver::FindStructure(Context* context) {
+  context->Begin("structure of the whole map");
+  builder_->WriteRobot();
+  context->result.initial_cost = session_->Cost();
+  TraceEm();
+  RunEm(context);
+}
+
+void LogSolver::CloseLoops(Context* context) {
+  if (!options_.structure || !options_.global_association ||
+      context->IsStopped()) {
+    return;
+  }
+  context->Begin("closing of loops");
+  BeginClosing();
+  RunEm(context);
+}
+
+void LogSolver::FindScansAgain(Context* context) {
+  builder_->ReadRobot();
+  context->result.final_cost = session_->Cost();
+  context->IsStopped();
+  const ScopedTimer timer(&context->result.relocalization_seconds);
+  context->keys = KeyPoses();
+  context->result.trajectory =
+      InterpolateScans(refined_, builder_->records(), context->keys);
+}
+
+void LogSolver::CompleteWalls(Context* context) {
+  if (!options_.complete_walls || options_.refine == Refinement::kNone ||
+      context->IsStopped()) {
+    return;
+  }
+  context->Begin("walls seen by glimpses");
+  LogSolverResult& result = context->result;
+  Transaction walls;
+  {
+    const ScopedTimer timer(&result.completion_seconds);
+    walls = FindGlimpsedWalls(graph_, registry_, context->scans,
+                              result.trajectory, options_.completion);
+  }
+  result.glimpsed_walls =
+      static_cast<std::int64_t>(walls.added_features().size());
+  if (walls.empty()) return;
+  graph_.Apply(std::move(walls));
+  RunEm(context);
+  FindScansAgain(context);
+}
+
+void LogSolver::AdjustJointly(Context* context) {
+  if (options_.refine != Refinement::kFull || context->IsStopped()) return;
+  context->Begin("joint adjustment of poses and walls");
+  LogSolverResult& result = context->result;
+  const ScopedTimer timer(&result.adjustment_seconds);
+  JointAdjustment adjustment(&graph_, session_.get(), registry_, context->scans,
+                             refined_, builder_->records(), context->keys,
+                             builder_->robot_id(), options_.adjustment);
+  adjustment.Adjust(context->control.stop);
+  RunEm(context);
+  context->IsStopped();
+  result.final_cost = session_->Cost();
+  result.trajectory =
+      InterpolateScans(refined_, builder_->records(), adjustment.KeyPoses());
+  result.scan_relations = adjustment.num_relations();
+  result.wall_votes = adjustment.num_votes();
+}
 
 void LogSolver::BeginClosing() {
   const Eigen::Vector3d scale(1.0 / options_.closing_position_scale,
@@ -117,11 +283,12 @@ void LogSolver::BeginClosing() {
   EmOptions options = options_.em;
   options.break_share = options_.closing_break_share;
   before_closing_ = em_->totals();
-  em_ = std::make_unique<EmOrchestrator>(
-      &graph_, session_.get(), registry_,
-      MakeHierarchy(WithSameWall(HierarchyOf(options_)), registry_,
-                    {RawType(options_)}, options_.detector_parameters),
-      options);
+  HierarchySpec hierarchy = HierarchyOfOptions();
+  if (!hierarchy.Contains(kSameWallDetector)) {
+    hierarchy.Add(0, kSameWallDetector);
+  }
+  em_ = std::make_unique<EmOrchestrator>(&graph_, session_.get(), registry_,
+                                         MakeDetectors(hierarchy), options);
   TraceEm();
 }
 
@@ -130,151 +297,6 @@ void LogSolver::TraceEm() {
     phase.iteration += before_closing_.iterations;
     trace_.push_back(std::move(phase));
   });
-}
-
-LogSolverResult LogSolver::Run(
-    const Log& log,
-    const std::function<void(std::size_t, std::size_t)>& progress,
-    const std::function<bool()>& stop,
-    const std::function<void(const char*)>& step) {
-  const auto begin_step = [&step](const char* name) {
-    if (step) step(name);
-  };
-  LogSolverResult result;
-  OdometryRefiner refiner(options_.odometry);
-  const std::unique_ptr<GraphBuilder> builder =
-      MakeGraphBuilder(options_, &graph_, registry_);
-  std::vector<RefinedScan> refined;
-  refined.reserve(log.scans.size());
-  result.scan_seconds.reserve(log.scans.size());
-
-  double em_seconds = 0.0;
-  int since_em = 0;
-  std::size_t features_at_last_global = 0;
-  const double begin = Now();
-  for (std::size_t i = 0; i < log.scans.size(); ++i) {
-    if (stop && stop()) {
-      result.interrupted = true;
-      break;
-    }
-    const double scan_begin = Now();
-    const Scan& scan = log.scans[i];
-    refined.push_back(refiner.Process(scan));
-    ++since_em;
-    if (refined.back().is_key) {
-      builder->AddScan(MakeKeyScan(static_cast<int>(i), scan, refined.back(),
-                                   refiner.points()));
-      if (options_.em_every > 0 && since_em >= options_.em_every) {
-        since_em = 0;
-        const double em_begin = Now();
-        builder->WriteRobot();
-        if (graph_.num_features() <
-                static_cast<std::size_t>(options_.small_map) &&
-            graph_.num_features() > features_at_last_global + 10) {
-          features_at_last_global = graph_.num_features();
-          em_->Iterate();
-        } else {
-          const std::vector<FeatureId> scope =
-              builder->Neighborhood(options_.em_depth);
-          em_->Iterate(&scope);
-        }
-        builder->ReadRobot();
-        em_seconds += Now() - em_begin;
-      }
-    }
-    result.scan_seconds.push_back(static_cast<float>(Now() - scan_begin));
-    if (progress) progress(i + 1, log.scans.size());
-  }
-  result.frontend_seconds = Now() - begin - em_seconds;
-
-  builder->WriteRobot();
-  result.initial_cost = session_->Cost();
-  TraceEm();
-  begin_step("structure of the whole map");
-  result.em = em_->Run(stop);
-  if (options_.structure && options_.global_association &&
-      !result.interrupted && !(stop && stop())) {
-    begin_step("closing of loops");
-    BeginClosing();
-    const EmReport closing = em_->Run(stop);
-    result.em.iterations += closing.iterations;
-    result.em.converged = closing.converged;
-  }
-  builder->ReadRobot();
-  result.final_cost = session_->Cost();
-  if (stop && stop()) result.interrupted = true;
-
-  std::vector<Pose2> keys;
-  auto trajectory = [&] {
-    const double relocalization_begin = Now();
-    keys.clear();
-    if (options_.refine != Refinement::kNone) {
-      keys = RelocalizeKeyScans(graph_, builder->records(),
-                                options_.relocalization);
-    } else {
-      for (const KeyScanRecord& record : builder->records()) {
-        keys.push_back(record.pose);
-      }
-    }
-    std::vector<Pose2> poses =
-        InterpolateScans(refined, builder->records(), keys);
-    result.relocalization_seconds += Now() - relocalization_begin;
-    return poses;
-  };
-  result.trajectory = trajectory();
-
-  if (options_.complete_walls && options_.refine != Refinement::kNone &&
-      !result.interrupted) {
-    begin_step("walls seen by glimpses");
-    const double completion_begin = Now();
-    Transaction walls = FindGlimpsedWalls(
-        graph_, registry_, log.scans, result.trajectory, options_.completion);
-    result.glimpsed_walls =
-        static_cast<std::int64_t>(walls.added_features().size());
-    result.completion_seconds = Now() - completion_begin;
-    if (!walls.empty()) {
-      graph_.Apply(std::move(walls));
-      const EmReport again = em_->Run(stop);
-      result.em.iterations += again.iterations;
-      result.em.converged = again.converged;
-      builder->ReadRobot();
-      result.final_cost = session_->Cost();
-      result.trajectory = trajectory();
-      if (stop && stop()) result.interrupted = true;
-    }
-  }
-
-  if (options_.refine == Refinement::kFull && !result.interrupted) {
-    begin_step("joint adjustment of poses and walls");
-    const double adjustment_begin = Now();
-    JointAdjustment adjustment(&graph_, session_.get(), registry_, log.scans,
-                               refined, builder->records(), keys,
-                               builder->robot_id(), options_.adjustment);
-    adjustment.Adjust(stop);
-    const EmReport again = em_->Run(stop);
-    result.em.iterations += again.iterations;
-    result.em.converged = again.converged;
-    if (stop && stop()) result.interrupted = true;
-    result.final_cost = session_->Cost();
-    result.trajectory =
-        InterpolateScans(refined, builder->records(), adjustment.KeyPoses());
-    result.scan_relations = adjustment.num_relations();
-    result.wall_votes = adjustment.num_votes();
-    result.adjustment_seconds = Now() - adjustment_begin;
-  }
-  result.detect_seconds =
-      before_closing_.detect_seconds + em_->totals().detect_seconds;
-  result.solve_seconds =
-      before_closing_.solve_seconds + em_->totals().solve_seconds;
-
-  result.key_scans = static_cast<std::int64_t>(builder->records().size());
-  result.wide_searches = refiner.wide_searches();
-  result.refused_matches = refiner.refusals();
-  result.feature_matches = builder->num_matches();
-  result.features_created = builder->num_created();
-  result.records = builder->records();
-  result.refined = std::move(refined);
-  return result;
 }
 
 }  // namespace plumbline

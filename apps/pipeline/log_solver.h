@@ -3,6 +3,7 @@
 
 #include <plumbline/core/em.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/core/hierarchy_spec.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/session.h>
 #include <plumbline/frontend/graph_builder.h>
@@ -13,6 +14,8 @@
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/wall_completion.h>
+#include <plumbline/pipeline/raw_features.h>
+#include <plumbline/pipeline/run_control.h>
 
 #include <functional>
 #include <map>
@@ -32,20 +35,13 @@ enum class Refinement {
   kFull,
 };
 
-/// Raw features that a log's scans become: level 0 of the hierarchy.
-enum class RawFeatures {
-  kSegments,
-  kPoints,
-};
-
 struct LogSolverOptions {
-  /// With points there are no walls at level 0 and hence no global association,
-  /// no completion of walls, and no refinement further than Refinement::kMap.
+  /// What a kind cannot do is off, whatever stands below (RawFeatureProfile).
   RawFeatures features = RawFeatures::kSegments;
   /// Find structure. False: measurements only.
   bool structure = true;
-  /// Detectors by level (MakeHierarchy); empty: DefaultHierarchy.
-  std::string hierarchy;
+  /// Detectors by level; empty: DefaultHierarchy.
+  HierarchySpec hierarchy;
   std::map<std::string, DetectorParameters> detector_parameters;
   OdometryRefinementOptions odometry;
   /// Of segments, and of points.
@@ -81,12 +77,16 @@ struct LogSolverOptions {
   int small_map = 150;
 };
 
+/// What solving a log came to; the map itself is the solver's graph.
 struct LogSolverResult {
   /// One a scan of the log, map frame.
   std::vector<Pose2> trajectory;
   EmReport em;
   CostReport initial_cost;
   CostReport final_cost;
+  /// Scans without the EM steps between them; detecting and solving of all EM
+  /// steps; finding scans again; completing walls; adjusting jointly, with the
+  /// EM that follows.
   double frontend_seconds = 0.0;
   double detect_seconds = 0.0;
   double solve_seconds = 0.0;
@@ -114,19 +114,20 @@ struct LogSolverResult {
   std::vector<KeyScanRecord> records;
 };
 
-/// What grows the graph from a log's scans, by options.features. The graph and
-/// registry must outlive it.
-std::unique_ptr<GraphBuilder> MakeGraphBuilder(const LogSolverOptions& options,
-                                               Graph* graph,
-                                               const Registry& registry);
-
 /// A scan as a GraphBuilder takes it: `refined` and `returns` are what odometry
 /// refinement made of the scan with this index.
 KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
                     const std::vector<ScanPoint>& returns);
 
-/// Replays a log: front-end, EM steps near the robot on the way, EM on the
-/// whole map at the end, and every scan found again on the final map.
+/// Turns the scans of a log into a map: front-end and EM steps near the robot
+/// scan by scan, then, once all are in, EM on the whole map, closing of loops,
+/// completion of walls and joint adjustment.
+///
+///     LogSolver solver(registry, {});
+///     for (...) robot = solver.AddScan(scan);    // the map so far: graph()
+///     const LogSolverResult result = solver.Finish();
+///
+/// Run does all of it for a log that is there. A solver solves one log.
 class LogSolver {
  public:
   /// The registry must outlive the solver and have the built-ins. Throws Error
@@ -134,31 +135,73 @@ class LogSolver {
   LogSolver(const Registry& registry, const LogSolverOptions& options);
   ~LogSolver();
 
-  /// `progress` (may be null) is called with the scans done and in all; `stop`
-  /// (may be null) ends the replay when it returns true; `step` (may be null)
-  /// is told, in a few words, of each step after the last scan as it begins.
-  LogSolverResult Run(
-      const Log& log,
-      const std::function<void(std::size_t, std::size_t)>& progress = nullptr,
-      const std::function<bool()>& stop = nullptr,
-      const std::function<void(const char*)>& step = nullptr);
+  /// Takes the next scan and returns the robot's pose as it is known now (map
+  /// frame). The cost does not depend on the size of the map. A copy of the
+  /// scan is kept until Finish. Throws Error after Finish or Run.
+  Pose2 AddScan(Scan scan);
 
+  /// A pose for every scan so far, found again on the map as it stands (with
+  /// Refinement::kNone as it was when the scan came in). Cost: linear in the
+  /// scans. Throws Error after Finish or Run: the result has it.
+  std::vector<Pose2> Trajectory() const;
+
+  /// Does what is left once all scans are in. Throws Error when called again.
+  LogSolverResult Finish(const RunControl& control = {});
+
+  /// AddScan for each scan of the log, which is not copied, then Finish: the
+  /// same bytes. Throws Error when scans were added before.
+  LogSolverResult Run(const Log& log, const RunControl& control = {});
+
+  /// The map as it stands: after any scan, and after Finish.
   const Graph& graph() const { return graph_; }
   const SolverSession& session() const { return *session_; }
   /// Rows of em_trace.csv: the EM on the whole map at the end.
   const std::vector<EmPhase>& trace() const { return trace_; }
 
  private:
+  struct Context;
+
+  void RequireUnfinished() const;
+  // A scan by itself: key scans enter the map, now and then with an EM step.
+  void TakeScan(const Scan& scan);
+  void RunEmNearRobot();
+
+  // The stages once all scans are in, in order.
+  LogSolverResult FinishWith(const std::vector<Scan>& scans,
+                             const RunControl& control);
+  void FindStructure(Context* context);
+  void CloseLoops(Context* context);
+  void FindScansAgain(Context* context);
+  void CompleteWalls(Context* context);
+  void AdjustJointly(Context* context);
+
+  void RunEm(Context* context);
   // Loosens the relations between features and lets closures be proposed.
   void BeginClosing();
   // Rows of the trace, counted on over both orchestrators.
   void TraceEm();
+  HierarchySpec HierarchyOfOptions() const;
+  Hierarchy MakeDetectors(const HierarchySpec& spec) const;
+  std::vector<Pose2> KeyPoses() const;
 
   const Registry& registry_;
+  const RawFeatureProfile& profile_;
   LogSolverOptions options_;
   Graph graph_;
   std::unique_ptr<SolverSession> session_;
   std::unique_ptr<EmOrchestrator> em_;
+  OdometryRefiner refiner_;
+  std::unique_ptr<GraphBuilder> builder_;
+  // Of AddScan; empty with Run.
+  std::vector<Scan> scans_;
+  // One per scan.
+  std::vector<RefinedScan> refined_;
+  std::vector<float> scan_seconds_;
+  double frontend_seconds_ = 0.0;
+  // Since the last EM step near the robot.
+  int scans_since_em_ = 0;
+  std::size_t features_at_last_global_ = 0;
+  bool is_finished_ = false;
   // Of the orchestrator that was there before closing began.
   EmReport before_closing_;
   std::vector<EmPhase> trace_;

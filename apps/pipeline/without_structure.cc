@@ -64,7 +64,7 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
   if (!options.structure || result.records.empty()) return map;
   Graph graph;
   const std::unique_ptr<GraphBuilder> builder =
-      MakeGraphBuilder(options, &graph, registry);
+      ProfileOf(options.features).make_builder(options, &graph, registry);
   std::vector<ScanPoint> points;
   for (const KeyScanRecord& record : result.records) {
     const Scan& scan = scans[static_cast<std::size_t>(record.scan)];

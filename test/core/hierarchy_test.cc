@@ -48,7 +48,7 @@ class HierarchyTest : public ::testing::Test {
   std::string MessageOf(const std::string& description,
                         const std::vector<std::string>& raw) {
     try {
-      MakeHierarchy(description, registry_, raw, {});
+      MakeHierarchy(ParseHierarchy(description), registry_, raw, {});
     } catch (const Error& error) {
       return error.what();
     }
@@ -60,9 +60,9 @@ class HierarchyTest : public ::testing::Test {
 };
 
 TEST_F(HierarchyTest, ReadsLevelsAndNames) {
-  const Hierarchy hierarchy =
-      MakeHierarchy("lines, circles/centres,orientations/relations", registry_,
-                    {"point"}, {});
+  const Hierarchy hierarchy = MakeHierarchy(
+      ParseHierarchy("lines, circles/centres,orientations/relations"),
+      registry_, {"point"}, {});
   ASSERT_EQ(hierarchy.size(), 3u);
   ASSERT_EQ(hierarchy[0].size(), 2u);
   EXPECT_EQ(hierarchy[0][1]->name(), "circles");
@@ -72,20 +72,22 @@ TEST_F(HierarchyTest, ReadsLevelsAndNames) {
 }
 
 TEST_F(HierarchyTest, EmptyMeansNoDetectors) {
-  EXPECT_TRUE(MakeHierarchy("", registry_, {"point"}, {}).empty());
+  EXPECT_TRUE(
+      MakeHierarchy(ParseHierarchy(""), registry_, {"point"}, {}).empty());
 }
 
 TEST_F(HierarchyTest, ParametersOverrideDefaults) {
-  MakeHierarchy("lines/orientations", registry_, {"point"},
+  MakeHierarchy(ParseHierarchy("lines/orientations"), registry_, {"point"},
                 {{"lines", {{"sigma", 0.1}}}, {"centres", {{"sigma", 9.0}}}});
   EXPECT_EQ(given_["lines"],
             (DetectorParameters{{"sigma", 0.1}, {"support", 2.0}}));
   EXPECT_EQ(given_["orientations"],
             (DetectorParameters{{"sigma", 0.5}, {"support", 2.0}}));
-  EXPECT_THROW(
-      MakeHierarchy("lines", registry_, {"point"}, {{"lines", {{"typo", 1}}}}),
-      Error);
-  EXPECT_THROW(MakeHierarchy("lines", registry_, {"point"}, {{"line", {}}}),
+  EXPECT_THROW(MakeHierarchy(ParseHierarchy("lines"), registry_, {"point"},
+                             {{"lines", {{"typo", 1}}}}),
+               Error);
+  EXPECT_THROW(MakeHierarchy(ParseHierarchy("lines"), registry_, {"point"},
+                             {{"line", {}}}),
                Error);
 }
 

@@ -10,18 +10,21 @@
 namespace plumbline {
 namespace {
 
+std::string TextFor(const std::set<std::string>& raw) {
+  return FormatHierarchy(DefaultHierarchy(raw));
+}
+
 TEST(DefaultHierarchyTest, ByRawFeatures) {
-  EXPECT_EQ(DefaultHierarchy({}), "");
-  EXPECT_EQ(DefaultHierarchy({"pose"}), "");
-  EXPECT_EQ(DefaultHierarchy({"segment", "pose"}),
+  EXPECT_EQ(TextFor({}), "");
+  EXPECT_EQ(TextFor({"pose"}), "");
+  EXPECT_EQ(TextFor({"segment", "pose"}),
             "orientation_mixture/orientation_relation");
-  EXPECT_EQ(DefaultHierarchy({"line"}),
-            "orientation_mixture/orientation_relation");
-  EXPECT_EQ(DefaultHierarchy({"point", "pose"}),
+  EXPECT_EQ(TextFor({"line"}), "orientation_mixture/orientation_relation");
+  EXPECT_EQ(TextFor({"point", "pose"}),
             "line_ransac,circle_ransac/center_cluster,orientation_mixture/"
             "orientation_relation");
-  EXPECT_EQ(DefaultHierarchy({"circle"}), "center_cluster");
-  EXPECT_EQ(DefaultHierarchy({"point", "segment"}),
+  EXPECT_EQ(TextFor({"circle"}), "center_cluster");
+  EXPECT_EQ(TextFor({"point", "segment"}),
             "line_ransac,circle_ransac,orientation_mixture/"
             "center_cluster,orientation_mixture,orientation_relation/"
             "orientation_relation");
@@ -37,10 +40,9 @@ TEST(DefaultHierarchyTest, EveryOneCanBeMade) {
     for (std::size_t i = 0; i < types.size(); ++i) {
       if ((subset >> i) % 2 == 1) raw.insert(types[i]);
     }
-    const std::string description = DefaultHierarchy(raw);
-    SCOPED_TRACE(description);
-    EXPECT_NO_THROW(
-        MakeHierarchy(description, registry, {raw.begin(), raw.end()}, {}));
+    SCOPED_TRACE(TextFor(raw));
+    EXPECT_NO_THROW(MakeHierarchy(DefaultHierarchy(raw), registry,
+                                  {raw.begin(), raw.end()}, {}));
   }
 }
 

@@ -48,10 +48,10 @@ TEST_P(HierarchyTest, FindsAllAndNothingElse) {
     // As plumbline_solve has it.
     options.full_weight_test =
         std::count(the_case.raw.begin(), the_case.raw.end(), "point") > 0;
-    EmOrchestrator em(
-        &graph, &session, registry_,
-        MakeHierarchy(the_case.hierarchy, registry_, the_case.raw, {}),
-        options);
+    EmOrchestrator em(&graph, &session, registry_,
+                      MakeHierarchy(ParseHierarchy(the_case.hierarchy),
+                                    registry_, the_case.raw, {}),
+                      options);
     const EmReport report = em.Run();
     EXPECT_TRUE(report.converged);
     EXPECT_THAT(CompareWithTruth(graph, world.truth()), IsEmpty());

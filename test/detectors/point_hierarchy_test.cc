@@ -20,8 +20,9 @@ class PointHierarchyTest : public ::testing::Test {
 
   EmReport Run(const std::string& hierarchy, Graph* graph) const {
     SolverSession session(graph, registry_, {});
-    EmOrchestrator em(graph, &session, registry_,
-                      MakeHierarchy(hierarchy, registry_, {"point"}, {}), {});
+    EmOrchestrator em(
+        graph, &session, registry_,
+        MakeHierarchy(ParseHierarchy(hierarchy), registry_, {"point"}, {}), {});
     return em.Run();
   }
 
@@ -108,10 +109,10 @@ TEST_F(PointHierarchyTest, CirclesFirst) {
   }
   graph.Apply(std::move(transaction));
   SolverSession session(&graph, registry_, {});
-  EmOrchestrator em(
-      &graph, &session, registry_,
-      MakeHierarchy("center_cluster/line_ransac", registry_, {"circle"}, {}),
-      {});
+  EmOrchestrator em(&graph, &session, registry_,
+                    MakeHierarchy(ParseHierarchy("center_cluster/line_ransac"),
+                                  registry_, {"circle"}, {}),
+                    {});
   EXPECT_TRUE(em.Run().converged);
   const std::map<std::pair<std::string, int>, int> expected = {
       {{"point", 1}, 6}, {{"line", 2}, 1}};

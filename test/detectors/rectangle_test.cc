@@ -406,8 +406,10 @@ TEST_F(RectangleTest, GoesWithASide) {
   graph_->Apply(std::move(measurements));
   ASSERT_EQ(Found(Detect()).size(), 1u);
   SolverSession session(graph_.get(), registry_, {});
-  EmOrchestrator em(graph_.get(), &session, registry_,
-                    MakeHierarchy("rectangle", registry_, {"segment"}, {}), {});
+  EmOrchestrator em(
+      graph_.get(), &session, registry_,
+      MakeHierarchy(ParseHierarchy("rectangle"), registry_, {"segment"}, {}),
+      {});
   EXPECT_TRUE(em.Run().converged);
   EXPECT_TRUE(graph_->VirtualFeatures(1).empty());
   // Without the false wall it would have stayed.
@@ -420,9 +422,10 @@ TEST_F(RectangleTest, GoesWithASide) {
                                constraint->information);
     }
   }
-  EmOrchestrator again(graph_.get(), &session, registry_,
-                       MakeHierarchy("rectangle", registry_, {"segment"}, {}),
-                       {});
+  EmOrchestrator again(
+      graph_.get(), &session, registry_,
+      MakeHierarchy(ParseHierarchy("rectangle"), registry_, {"segment"}, {}),
+      {});
   EXPECT_TRUE(again.Run().converged);
   EXPECT_EQ(graph_->VirtualFeatures(1).size(), 1u);
 }

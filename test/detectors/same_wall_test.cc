@@ -97,8 +97,8 @@ class SameWallTest : public ::testing::Test {
     EmOptions options;
     options.break_share = 0.25;
     EmOrchestrator em(&graph_, &session, registry_,
-                      MakeHierarchy("same_wall", registry_, {"segment"},
-                                    {{"same_wall", parameters}}),
+                      MakeHierarchy(ParseHierarchy("same_wall"), registry_,
+                                    {"segment"}, {{"same_wall", parameters}}),
                       options);
     return em.Run();
   }

@@ -171,10 +171,12 @@ TEST_F(StructurePriorTest, IsWhatTheLoopWorksWith) {
     std::map<std::string, DetectorParameters> parameters;
     if (!text.empty()) ApplyStructurePrior(Read(text), &options, &parameters);
     SolverSession session(graph, registry_, {});
-    EmOrchestrator em(graph, &session, registry_,
-                      MakeHierarchy("orientation_mixture/orientation_relation",
-                                    registry_, {"segment"}, parameters),
-                      options);
+    EmOrchestrator em(
+        graph, &session, registry_,
+        MakeHierarchy(
+            ParseHierarchy("orientation_mixture/orientation_relation"),
+            registry_, {"segment"}, parameters),
+        options);
     em.Run();
     std::map<std::string, std::vector<double>> sigmas;
     for (const Constraint* constraint : graph->Constraints()) {
@@ -217,10 +219,10 @@ TEST_F(StructurePriorTest, IsWhatTheLoopWorksWith) {
   EmOptions options;
   options.relation_priors["segment_orientation"].sigmas = {0.1, 0.1};
   SolverSession session(&wrong, registry_, {});
-  EmOrchestrator em(
-      &wrong, &session, registry_,
-      MakeHierarchy("orientation_mixture", registry_, {"segment"}, {}),
-      options);
+  EmOrchestrator em(&wrong, &session, registry_,
+                    MakeHierarchy(ParseHierarchy("orientation_mixture"),
+                                  registry_, {"segment"}, {}),
+                    options);
   EXPECT_THROW(em.Run(), Error);
 }
 

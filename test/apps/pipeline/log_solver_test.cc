@@ -52,11 +52,12 @@ TEST_F(LogSolverTest, SolvesTheStartOfALog) {
   const Log log = Office(250);
   LogSolver solver(registry_, {});
   std::size_t calls = 0;
-  const LogSolverResult result =
-      solver.Run(log, [&](std::size_t done, std::size_t all) {
-        EXPECT_EQ(done, ++calls);
-        EXPECT_EQ(all, 250u);
-      });
+  RunControl control;
+  control.progress = [&](std::size_t done, std::size_t all) {
+    EXPECT_EQ(done, ++calls);
+    EXPECT_EQ(all, 250u);
+  };
+  const LogSolverResult result = solver.Run(log, control);
   EXPECT_EQ(calls, 250u);
   EXPECT_FALSE(result.interrupted);
   ASSERT_EQ(result.trajectory.size(), 250u);
@@ -82,7 +83,7 @@ TEST_F(LogSolverTest, WithoutStructureThereAreMeasurementsOnly) {
   LogSolverOptions options;
   options.structure = false;
   // Not looked at.
-  options.hierarchy = "no_such_detector";
+  options.hierarchy = ParseHierarchy("no_such_detector");
   // The joint adjustment has other measurements than the replay.
   options.refine = Refinement::kMap;
   LogSolver solver(registry_, options);
@@ -137,6 +138,66 @@ TEST_F(LogSolverTest, SameBytesEveryTime) {
   const LogSolverResult b = second.Run(log);
   EXPECT_EQ(a.trajectory, b.trajectory);
   EXPECT_EQ(Json(first.graph()), Json(second.graph()));
+}
+
+TEST_F(LogSolverTest, ScanByScanIsTheSame) {
+  const Log log = Office(250);
+  LogSolver whole(registry_, {});
+  const LogSolverResult expected = whole.Run(log);
+  LogSolver solver(registry_, {});
+  std::vector<Pose2> poses;
+  for (const Scan& scan : log.scans) poses.push_back(solver.AddScan(scan));
+  const LogSolverResult result = solver.Finish();
+  EXPECT_EQ(result.trajectory, expected.trajectory);
+  EXPECT_EQ(Json(solver.graph()), Json(whole.graph()));
+  EXPECT_EQ(result.scan_seconds.size(), log.scans.size());
+  EXPECT_FALSE(result.interrupted);
+  // What was said at once was not far off what all scans together say.
+  ExpectFinite(poses);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_LT((poses[i] - result.trajectory[i]).norm(), 0.3) << i;
+  }
+}
+
+TEST_F(LogSolverTest, TheMapSoFarCanBeReadAtAnyTime) {
+  const Log log = Office(250);
+  LogSolver undisturbed(registry_, {});
+  const LogSolverResult expected = undisturbed.Run(log);
+  LogSolver solver(registry_, {});
+  EXPECT_TRUE(solver.Trajectory().empty());
+  std::size_t features = 0;
+  bool had_structure = false;
+  for (std::size_t i = 0; i < log.scans.size(); ++i) {
+    const Pose2 robot = solver.AddScan(log.scans[i]);
+    if (i % 50 != 20) continue;
+    EXPECT_GE(solver.graph().num_features(), features);
+    features = solver.graph().num_features();
+    had_structure = had_structure || !solver.graph().VirtualFeatures(1).empty();
+    const std::vector<Pose2> trajectory = solver.Trajectory();
+    ASSERT_EQ(trajectory.size(), i + 1);
+    ExpectFinite(trajectory);
+    EXPECT_LT((trajectory.back() - robot).norm(), 0.1) << i;
+  }
+  EXPECT_GT(features, 20u);
+  EXPECT_TRUE(had_structure);
+  // Reading changed nothing.
+  EXPECT_EQ(solver.Finish().trajectory, expected.trajectory);
+  EXPECT_EQ(Json(solver.graph()), Json(undisturbed.graph()));
+}
+
+TEST_F(LogSolverTest, ASolverSolvesOneLog) {
+  const Log log = Office(20);
+  LogSolver solver(registry_, {});
+  solver.AddScan(log.scans[0]);
+  EXPECT_THROW(solver.Run(log), Error);
+  EXPECT_EQ(solver.Finish().trajectory.size(), 1u);
+  EXPECT_THROW(solver.AddScan(log.scans[1]), Error);
+  EXPECT_THROW(solver.Trajectory(), Error);
+  EXPECT_THROW(solver.Finish(), Error);
+  EXPECT_THROW(solver.Run(log), Error);
+  // Nothing at all is a log, too.
+  LogSolver empty(registry_, {});
+  EXPECT_TRUE(empty.Finish().trajectory.empty());
 }
 
 // Closures of a graph by their state.
@@ -255,10 +316,12 @@ TEST_F(LogSolverTest, AFalseClosureIsBrokenAndTheMapReturns) {
   LogSolverOptions options;
   options.refine = Refinement::kMap;
   options.complete_walls = false;
-  options.hierarchy = "orientation_mixture/orientation_relation";
+  options.hierarchy =
+      ParseHierarchy("orientation_mixture/orientation_relation");
   LogSolver truthful(registry_, options);
   const LogSolverResult expected = truthful.Run(log);
-  options.hierarchy = "orientation_mixture,fooled/orientation_relation";
+  options.hierarchy =
+      ParseHierarchy("orientation_mixture,fooled/orientation_relation");
   LogSolver fooled(registry_, options);
   const LogSolverResult result = fooled.Run(log);
 
@@ -300,9 +363,10 @@ TEST_F(LogSolverTest, StoppedOnTheWay) {
     SCOPED_TRACE(scans);
     LogSolver solver(registry_, {});
     std::size_t done = 0;
-    const LogSolverResult result = solver.Run(
-        log, [&](std::size_t count, std::size_t) { done = count; },
-        [&] { return done >= scans; });
+    RunControl control;
+    control.progress = [&](std::size_t count, std::size_t) { done = count; };
+    control.stop = [&] { return done >= scans; };
+    const LogSolverResult result = solver.Run(log, control);
     EXPECT_TRUE(result.interrupted);
     EXPECT_EQ(result.trajectory.size(), scans);
     EXPECT_EQ(result.scan_seconds.size(), scans);
@@ -428,21 +492,24 @@ TEST_F(LogSolverTest, PointsOfBrokenLogs) {
 
 TEST_F(LogSolverTest, PointsTakeTheirOwnHierarchyOnly) {
   LogSolverOptions options = Points();
-  options.hierarchy = "line_ransac/orientation_mixture/orientation_relation";
+  options.hierarchy =
+      ParseHierarchy("line_ransac/orientation_mixture/orientation_relation");
   LogSolver solver(registry_, options);
   EXPECT_EQ(solver.Run(Office(60)).trajectory.size(), 60u);
   // Segments' detectors find nothing to read.
-  options.hierarchy = "orientation_mixture/orientation_relation";
+  options.hierarchy =
+      ParseHierarchy("orientation_mixture/orientation_relation");
   EXPECT_THROW(LogSolver(registry_, options), Error);
 }
 
 TEST_F(LogSolverTest, WrongHierarchyIsRefused) {
   LogSolverOptions options;
-  options.hierarchy = "no_such_detector";
+  options.hierarchy = ParseHierarchy("no_such_detector");
   EXPECT_THROW(LogSolver(registry_, options), Error);
-  options.hierarchy = "orientation_relation/orientation_mixture";
+  options.hierarchy =
+      ParseHierarchy("orientation_relation/orientation_mixture");
   EXPECT_THROW(LogSolver(registry_, options), Error);
-  options.hierarchy = "orientation_mixture";
+  options.hierarchy = ParseHierarchy("orientation_mixture");
   options.detector_parameters["orientation_mixture"]["sigma_deg"] = -1.0;
   EXPECT_THROW(LogSolver(registry_, options), Error);
 }

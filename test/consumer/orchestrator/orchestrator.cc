@@ -83,8 +83,9 @@ int main() {
   plumbline::SolverSession session(&graph, registry, {});
   plumbline::EmOrchestrator em(
       &graph, &session, registry,
-      plumbline::MakeHierarchy("orientation_mixture/orientation_relation",
-                               registry, {"segment"}, {}),
+      plumbline::MakeHierarchy(
+          plumbline::ParseHierarchy("orientation_mixture/orientation_relation"),
+          registry, {"segment"}, {}),
       {});
   const double before = WorstDirection(graph);
   const plumbline::EmReport report = em.Run();

@@ -1,0 +1,21 @@
+#ifndef PLUMBLINE_PIPELINE_RUN_CONTROL_H_
+#define PLUMBLINE_PIPELINE_RUN_CONTROL_H_
+
+#include <cstddef>
+#include <functional>
+
+namespace plumbline {
+
+/// What is asked and told while a log or a graph is solved. Each may be null.
+struct RunControl {
+  /// Told the scans done and the scans in all, after every scan.
+  std::function<void(std::size_t done, std::size_t total)> progress;
+  /// Asked between steps: true ends the work early, with what there is whole.
+  std::function<bool()> stop;
+  /// Told, in a few words, of each step after the last scan as it begins.
+  std::function<void(const char* name)> step;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PIPELINE_RUN_CONTROL_H_

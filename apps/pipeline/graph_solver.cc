@@ -1,0 +1,79 @@
+#include <plumbline/detectors/default_hierarchy.h>
+#include <plumbline/pipeline/graph_solver.h>
+#include <plumbline/pipeline/raw_features.h>
+
+#include <set>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+std::set<std::string> RawTypes(const Graph& graph) {
+  std::set<std::string> types;
+  for (const Feature* feature : graph.Features()) {
+    if (feature->level == 0) types.insert(feature->type->name);
+  }
+  return types;
+}
+
+SessionOptions SessionOf(const GraphSolverOptions& options) {
+  SessionOptions session = options.session;
+  // Only structure is ever broken.
+  session.fast_removal = options.structure;
+  return session;
+}
+
+Hierarchy HierarchyOf(const GraphSolverOptions& options, const Graph& graph,
+                      const Registry& registry) {
+  if (!options.structure) return {};
+  const std::set<std::string> raw = RawTypes(graph);
+  return MakeHierarchy(
+      options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
+      registry, {raw.begin(), raw.end()}, options.detector_parameters);
+}
+
+EmOptions EmOf(const GraphSolverOptions& options, const Graph& graph) {
+  EmOptions em = options.em;
+  if (!options.structure) return em;
+  const RawFeatureProfile& profile = ProfileOf(RawTypes(graph));
+  em.full_weight_test =
+      options.full_weight_test.value_or(profile.full_weight_test);
+  if (em.loop_tolerance == 0.0) {
+    em.loop_tolerance = profile.graph_loop_tolerance;
+  }
+  return em;
+}
+
+}  // namespace
+
+GraphSolver::GraphSolver(const Registry& registry,
+                         const GraphSolverOptions& options, Graph* graph)
+    : GraphSolver(registry, options, HierarchyOf(options, *graph, registry),
+                  graph) {}
+
+GraphSolver::GraphSolver(const Registry& registry,
+                         const GraphSolverOptions& options, Hierarchy hierarchy,
+                         Graph* graph)
+    : session_(graph, registry, SessionOf(options)),
+      initial_cost_(session_.Cost()),
+      em_(graph, &session_, registry, std::move(hierarchy),
+          EmOf(options, *graph)) {}
+
+GraphSolverResult GraphSolver::Run(
+    const std::function<bool()>& stop,
+    const std::function<void(const EmPhase&)>& phase) {
+  GraphSolverResult result;
+  em_.SetTrace([&](const EmPhase& ended) {
+    result.trace.push_back(ended);
+    if (phase) phase(ended);
+  });
+  result.em = em_.Run(stop);
+  em_.SetTrace(nullptr);
+  result.initial_cost = initial_cost_;
+  result.final_cost = session_.Cost();
+  result.solves = session_.totals();
+  result.num_solves = session_.num_solves();
+  return result;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,78 @@
+#ifndef PLUMBLINE_PIPELINE_GRAPH_SOLVER_H_
+#define PLUMBLINE_PIPELINE_GRAPH_SOLVER_H_
+
+#include <plumbline/core/em.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/core/hierarchy_spec.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/core/session.h>
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+struct GraphSolverOptions {
+  /// Find structure. False: measurements only.
+  bool structure = true;
+  /// Detectors by level; empty: DefaultHierarchy of the raw features.
+  HierarchySpec hierarchy;
+  std::map<std::string, DetectorParameters> detector_parameters;
+  SessionOptions session;
+  /// Its full_weight_test is passed over; a loop_tolerance of 0 stands for that
+  /// of the raw features' profile (RawFeatureProfile).
+  EmOptions em;
+  /// EmOptions::full_weight_test; unset: that of the raw features' profile.
+  std::optional<bool> full_weight_test;
+};
+
+/// What solving a graph came to; the map itself is in the graph.
+struct GraphSolverResult {
+  EmReport em;
+  CostReport initial_cost;
+  CostReport final_cost;
+  /// All solves together, and how many they were.
+  SolveReport solves;
+  int num_solves = 0;
+  /// Rows of em_trace.csv.
+  std::vector<EmPhase> trace;
+};
+
+/// Finds the structure of a graph of features and measurements and solves it
+/// with that structure, from where its features stand (MakeInitialGuess places
+/// them).
+class GraphSolver {
+ public:
+  /// The registry and graph must outlive the solver. Throws Error when options
+  /// do not fit the graph.
+  GraphSolver(const Registry& registry, const GraphSolverOptions& options,
+              Graph* graph);
+
+  /// Before anything is optimized.
+  const CostReport& initial_cost() const { return initial_cost_; }
+
+  /// Runs EM until it has converged. `stop` (may be null) is asked between
+  /// steps and ends the work early when it returns true; `phase` (may be null)
+  /// is told of each phase as it has ended.
+  GraphSolverResult Run(
+      const std::function<bool()>& stop = nullptr,
+      const std::function<void(const EmPhase&)>& phase = nullptr);
+
+  const SolverSession& session() const { return session_; }
+
+ private:
+  // The hierarchy first: what does not fit is refused before the work.
+  GraphSolver(const Registry& registry, const GraphSolverOptions& options,
+              Hierarchy hierarchy, Graph* graph);
+
+  SolverSession session_;
+  CostReport initial_cost_;
+  EmOrchestrator em_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PIPELINE_GRAPH_SOLVER_H_

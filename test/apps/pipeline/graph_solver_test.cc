@@ -1,0 +1,115 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/graph_json.h>
+#include <plumbline/detectors/builtins.h>
+#include <plumbline/detectors/default_hierarchy.h>
+#include <plumbline/pipeline/graph_solver.h>
+
+#include <sstream>
+#include <string>
+
+#include "detectors/point_world.h"
+
+namespace plumbline {
+namespace {
+
+class GraphSolverTest : public ::testing::Test {
+ protected:
+  GraphSolverTest() { RegisterBuiltins(&registry_); }
+
+  void Build(Graph* graph) const {
+    PointWorld world(1);
+    world.AddCorridors();
+    world.Build(registry_, 0.25, 0.05, 5, graph);
+  }
+
+  static std::string Json(const Graph& graph) {
+    std::ostringstream output;
+    WriteGraphJson(graph, output);
+    return output.str();
+  }
+
+  static int CountVirtual(const Graph& graph) {
+    int count = 0;
+    for (const Feature* feature : graph.Features()) {
+      if (feature->is_virtual) ++count;
+    }
+    return count;
+  }
+
+  Registry registry_;
+};
+
+TEST_F(GraphSolverTest, IsTheLoopWithWhatThePointsAskFor) {
+  Graph by_hand;
+  Build(&by_hand);
+  SolverSession session(&by_hand, registry_, {});
+  EmOptions em_options;
+  em_options.full_weight_test = true;
+  em_options.loop_tolerance = kPointsLoopTolerance;
+  EmOrchestrator em(
+      &by_hand, &session, registry_,
+      MakeHierarchy(DefaultHierarchy({"point"}), registry_, {"point"}, {}),
+      em_options);
+  const EmReport expected = em.Run();
+
+  Graph graph;
+  Build(&graph);
+  GraphSolver solver(registry_, {}, &graph);
+  EXPECT_GT(solver.initial_cost().total(), 0.0);
+  int phases = 0;
+  const GraphSolverResult result =
+      solver.Run(nullptr, [&phases](const EmPhase&) { ++phases; });
+  EXPECT_EQ(Json(graph), Json(by_hand));
+  EXPECT_EQ(result.em.iterations, expected.iterations);
+  EXPECT_TRUE(result.em.converged);
+  EXPECT_EQ(result.initial_cost.total(), solver.initial_cost().total());
+  EXPECT_EQ(result.final_cost.total(), session.Cost().total());
+  EXPECT_EQ(result.num_solves, session.num_solves());
+  EXPECT_EQ(static_cast<int>(result.trace.size()), phases);
+  EXPECT_GT(phases, 5);
+  EXPECT_GT(CountVirtual(graph), 20);
+
+  // Somebody else's test of weights is another map.
+  Graph other;
+  Build(&other);
+  GraphSolverOptions options;
+  options.full_weight_test = false;
+  GraphSolver(registry_, options, &other).Run();
+  EXPECT_NE(Json(other), Json(graph));
+}
+
+TEST_F(GraphSolverTest, WithoutStructure) {
+  Graph graph;
+  Build(&graph);
+  GraphSolverOptions options;
+  options.structure = false;
+  // Not looked at.
+  options.hierarchy = ParseHierarchy("no_such_detector");
+  const GraphSolverResult result =
+      GraphSolver(registry_, options, &graph).Run();
+  EXPECT_EQ(CountVirtual(graph), 0);
+  EXPECT_LT(result.final_cost.total(), result.initial_cost.total());
+  EXPECT_EQ(result.final_cost.structure, 0.0);
+}
+
+TEST_F(GraphSolverTest, StopsEarly) {
+  Graph graph;
+  Build(&graph);
+  int asked = 0;
+  const GraphSolverResult result =
+      GraphSolver(registry_, {}, &graph).Run([&asked] { return ++asked > 3; });
+  EXPECT_FALSE(result.em.converged);
+  EXPECT_GE(result.trace.size(), 1u);
+}
+
+TEST_F(GraphSolverTest, WrongHierarchyIsRefused) {
+  Graph graph;
+  Build(&graph);
+  GraphSolverOptions options;
+  options.hierarchy = ParseHierarchy("orientation_mixture");
+  EXPECT_THROW(GraphSolver(registry_, options, &graph), Error);
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -432,7 +432,8 @@ TEST(ExamplesPageTest, ReadmeQuotesFilesThatAreBuilt) {
       ::testing::IsSupersetOf(
           {"test/consumer/bare_problem/CMakeLists.txt [target]",
            "test/consumer/bare_problem/bare_problem.cc [bare problem]",
-           "test/consumer/orchestrator/orchestrator.cc [orchestrator]"}));
+           "test/consumer/log_to_floor_plan/log_to_floor_plan.cc [log to floor "
+           "plan]"}));
 }
 
 #ifdef PLUMBLINE_DOXYGEN

@@ -4,8 +4,10 @@
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/evaluation/closure_truth.h>
+#include <plumbline/apps/evaluation/map_evaluation.h>
 #include <plumbline/apps/evaluation/map_truth.h>
 #include <plumbline/apps/evaluation/relations.h>
+#include <plumbline/apps/evaluation/trajectory_alignment.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/tum.h>
@@ -115,31 +117,15 @@ void PrintIds(const std::vector<Id>& ids) {
   std::printf("\n");
 }
 
-Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
-  const MapTruth truth = ReadMapTruth(FLAGS_truth);
-  const StraightMap map = ReadStraightMap(FLAGS_map);
-  Pose2 alignment = Pose2::Zero();
-  if (!trajectory.empty()) {
-    alignment = AlignTrajectory(trajectory, truth);
-  } else if (!truth.poses.empty()) {
-    // The map's frame is then taken to be that of the first scan.
-    alignment = truth.poses.front().pose;
-  }
-  MapTruthOptions options;
-  options.minimum_length = FLAGS_minimum_wall_length;
-  options.maximum_offset = FLAGS_maximum_wall_offset;
-  const MapTruthEvaluation evaluation =
-      EvaluateMap(map, truth, alignment, options);
-  Json poses;
-  if (!trajectory.empty()) {
-    const PoseErrors errors = EvaluatePoses(trajectory, truth, alignment);
-    PrintRow("position error", "m", errors.position);
-    PrintRow("heading error", "deg", errors.heading_deg);
-    poses = Json{{"position_m", ToJson(errors.position)},
-                 {"heading_deg", ToJson(errors.heading_deg)}};
-  }
-  const std::size_t found =
-      evaluation.walls.size() - evaluation.missed_walls.size();
+// Prints how far the poses are off and returns it.
+Json TellPoses(const PoseErrors& errors) {
+  PrintRow("position error", "m", errors.position);
+  PrintRow("heading error", "deg", errors.heading_deg);
+  return Json{{"position_m", ToJson(errors.position)},
+              {"heading_deg", ToJson(errors.heading_deg)}};
+}
+
+void PrintMap(const MapTruthEvaluation& evaluation, std::size_t found) {
   PrintRow("wall direction error", "deg", evaluation.direction_error_deg);
   PrintRow("wall offset error", "m", evaluation.offset_error);
   std::printf("walls: %zu of %zu found; recall %.4f, precision %.4f (length)\n",
@@ -162,16 +148,11 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
     separator = ", ";
   }
   std::printf("%s\n", evaluation.directions.empty() ? "" : ")");
-  const ClosureEvaluation closures =
-      EvaluateClosures(map, truth, alignment, options);
-  std::printf(
-      "closures: %d right, %d of a door and its wall, %d wrong; broken: %d "
-      "right, %d wrong; revisits closed: %d of %d\n",
-      closures.right, closures.near, closures.wrong, closures.broken_right,
-      closures.broken_wrong, closures.closed_revisits, closures.revisits);
+}
 
-  Json walls = Json::array();
-  for (const WallResult& wall : evaluation.walls) {
+Json WallsToJson(const std::vector<WallResult>& walls) {
+  Json rows = Json::array();
+  for (const WallResult& wall : walls) {
     Json row{{"id", wall.id},
              {"seen_m", wall.seen},
              {"covered_m", wall.covered},
@@ -180,14 +161,62 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
       row["direction_error_deg"] = wall.direction_error_deg;
       row["offset_error_m"] = wall.offset_error;
     }
-    walls.push_back(row);
+    rows.push_back(row);
   }
-  Json directions = Json::array();
-  for (const DirectionResult& direction : evaluation.directions) {
-    directions.push_back({{"angle_deg", direction.angle_deg},
-                          {"length_m", direction.length},
-                          {"error_deg", direction.error_deg}});
+  return rows;
+}
+
+Json DirectionsToJson(const std::vector<DirectionResult>& directions) {
+  Json rows = Json::array();
+  for (const DirectionResult& direction : directions) {
+    rows.push_back({{"angle_deg", direction.angle_deg},
+                    {"length_m", direction.length},
+                    {"error_deg", direction.error_deg}});
   }
+  return rows;
+}
+
+// Prints the loop closures against the truth and returns them.
+Json TellClosures(const ClosureEvaluation& closures) {
+  std::printf(
+      "closures: %d right, %d of a door and its wall, %d wrong; broken: %d "
+      "right, %d wrong; revisits closed: %d of %d\n",
+      closures.right, closures.near, closures.wrong, closures.broken_right,
+      closures.broken_wrong, closures.closed_revisits, closures.revisits);
+  return Json{{"right", closures.right},
+              {"near", closures.near},
+              {"wrong", closures.wrong},
+              {"broken_right", closures.broken_right},
+              {"broken_wrong", closures.broken_wrong},
+              {"wrong_pairs", closures.wrong_pairs},
+              {"revisits", closures.revisits},
+              {"closed_revisits", closures.closed_revisits}};
+}
+
+Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
+  const MapTruth truth = ReadMapTruth(FLAGS_truth);
+  const StraightMap map = ReadStraightMap(FLAGS_map);
+  Pose2 alignment = Pose2::Zero();
+  if (!trajectory.empty()) {
+    alignment = AlignTrajectory(trajectory, truth);
+  } else if (!truth.poses.empty()) {
+    // The map's frame is then taken to be that of the first scan.
+    alignment = truth.poses.front().pose;
+  }
+  MapTruthOptions options;
+  options.minimum_length = FLAGS_minimum_wall_length;
+  options.maximum_offset = FLAGS_maximum_wall_offset;
+  const MapTruthEvaluation evaluation =
+      EvaluateMap(map, truth, alignment, options);
+  Json poses;
+  if (!trajectory.empty()) {
+    poses = TellPoses(EvaluatePoses(trajectory, truth, alignment));
+  }
+  const std::size_t found =
+      evaluation.walls.size() - evaluation.missed_walls.size();
+  PrintMap(evaluation, found);
+  const Json closures =
+      TellClosures(EvaluateClosures(map, truth, alignment, options));
   return Json{{"file", FLAGS_truth},
               {"poses", poses},
               {"map", FLAGS_map},
@@ -206,18 +235,10 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
               {"missed_orientations_deg", evaluation.missed_orientations_deg},
               {"false_orientations_deg", evaluation.false_orientations_deg},
               {"duplicate_orientations", evaluation.duplicate_orientations},
-              {"directions", directions},
+              {"directions", DirectionsToJson(evaluation.directions)},
               {"bend_error_deg", evaluation.bend_error_deg},
-              {"closures",
-               {{"right", closures.right},
-                {"near", closures.near},
-                {"wrong", closures.wrong},
-                {"broken_right", closures.broken_right},
-                {"broken_wrong", closures.broken_wrong},
-                {"wrong_pairs", closures.wrong_pairs},
-                {"revisits", closures.revisits},
-                {"closed_revisits", closures.closed_revisits}}},
-              {"walls", walls}};
+              {"closures", closures},
+              {"walls", WallsToJson(evaluation.walls)}};
 }
 
 int UsageError(const std::string& message) {

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_APPS_EVALUATION_CLOSURE_TRUTH_H_
 #define PLUMBLINE_APPS_EVALUATION_CLOSURE_TRUTH_H_
 
+#include <plumbline/apps/evaluation/map_evaluation.h>
 #include <plumbline/apps/evaluation/map_truth.h>
 #include <plumbline/factors/pose2.h>
 

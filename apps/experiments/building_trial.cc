@@ -1,3 +1,5 @@
+#include <plumbline/apps/evaluation/map_truth.h>
+#include <plumbline/apps/evaluation/trajectory_alignment.h>
 #include <plumbline/apps/experiments/building_trial.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>

@@ -2,7 +2,7 @@
 #define PLUMBLINE_APPS_EXPERIMENTS_BUILDING_TRIAL_H_
 
 #include <plumbline/apps/evaluation/closure_truth.h>
-#include <plumbline/apps/evaluation/map_truth.h>
+#include <plumbline/apps/evaluation/map_evaluation.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/registry.h>

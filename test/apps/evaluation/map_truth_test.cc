@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <plumbline/apps/evaluation/map_evaluation.h>
 #include <plumbline/apps/evaluation/map_truth.h>
+#include <plumbline/apps/evaluation/trajectory_alignment.h>
 #include <plumbline/core/error.h>
 
 #include <cmath>

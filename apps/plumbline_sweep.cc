@@ -12,6 +12,7 @@
 #include <plumbline/apps/sweep/sweep_table.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/stopwatch.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -185,12 +186,11 @@ class FolderLock {
                   std::string("cannot be written: ") + std::strerror(errno),
                   "a writable folder");
     }
-    using Clock = std::chrono::steady_clock;
-    const Clock::time_point begin = Clock::now();
+    const Stopwatch watch;
     bool is_told = false;
     while (flock(descriptor_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK &&
            !InterruptRequested()) {
-      if (!is_told && Clock::now() - begin > std::chrono::seconds(2)) {
+      if (!is_told && watch.Seconds() > 2.0) {
         Remark(
             "%s: another sweep, or what is left of one, is at work here; "
             "waiting until it ends",

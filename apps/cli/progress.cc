@@ -15,8 +15,9 @@ DEFINE_bool(verbose, false, "Print what is being done, a line a step");
 namespace plumbline {
 namespace {
 
-constexpr std::chrono::milliseconds kPatience(1000);
-constexpr std::chrono::milliseconds kInterval(200);
+// s
+constexpr double kPatience = 1.0;
+constexpr double kInterval = 0.2;
 
 // There is a bar on the terminal.
 bool bar_is_shown = false;
@@ -121,26 +122,23 @@ Progress::Progress(std::string title, std::string unit, std::int64_t total)
     : title_(std::move(title)),
       unit_(std::move(unit)),
       total_(total),
-      enabled_(!FLAGS_quiet && isatty(STDERR_FILENO) != 0),
-      start_(Clock::now()),
-      last_shown_(start_) {}
+      enabled_(!FLAGS_quiet && isatty(STDERR_FILENO) != 0) {}
 
 Progress::~Progress() { Finish(); }
 
 void Progress::Update(std::int64_t done) {
   if (!enabled_) return;
-  const Clock::time_point now = Clock::now();
-  if (now - start_ < kPatience) return;
-  if (visible_ && now - last_shown_ < kInterval) return;
-  const std::chrono::duration<double> elapsed = now - start_;
+  const double elapsed = watch_.Seconds();
+  if (elapsed < kPatience) return;
+  if (visible_ && elapsed - last_shown_ < kInterval) return;
   // One column is left free: some terminals wrap when the last one is used.
-  const std::string line = ProgressLine(title_, unit_, done, total_,
-                                        elapsed.count(), TerminalColumns() - 1);
+  const std::string line =
+      ProgressLine(title_, unit_, done, total_, elapsed, TerminalColumns() - 1);
   std::fprintf(stderr, "\r\033[K%s", line.c_str());
   std::fflush(stderr);
   visible_ = true;
   bar_is_shown = true;
-  last_shown_ = now;
+  last_shown_ = elapsed;
 }
 
 void Progress::Finish() {

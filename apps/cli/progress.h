@@ -1,7 +1,8 @@
 #ifndef PLUMBLINE_APPS_CLI_PROGRESS_H_
 #define PLUMBLINE_APPS_CLI_PROGRESS_H_
 
-#include <chrono>
+#include <plumbline/core/stopwatch.h>
+
 #include <cstdint>
 #include <string>
 
@@ -39,15 +40,14 @@ class Progress {
   void Finish();
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   std::string title_;
   std::string unit_;
   std::int64_t total_;
   bool enabled_;
   bool visible_ = false;
-  Clock::time_point start_;
-  Clock::time_point last_shown_;
+  Stopwatch watch_;
+  // s on the watch.
+  double last_shown_ = 0.0;
 };
 
 }  // namespace plumbline

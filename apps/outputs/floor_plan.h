@@ -13,6 +13,7 @@
 
 namespace plumbline {
 
+/// What is one wall in a plan, and what is drawn of it.
 struct FloorPlanOptions {
   /// Faces whose directions differ by more are never one, rad.
   double merge_angle = DegToRad(3.0);

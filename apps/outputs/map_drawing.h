@@ -80,6 +80,7 @@ struct MapDrawing {
   std::string title;
 };
 
+/// How a map is drawn.
 struct MapDrawingOptions {
   /// Length of the picture's longer side, px, 200 to 20000. Line widths and
   /// letters grow with it.

@@ -30,16 +30,6 @@ std::string RoundedUp(double value) {
   return text;
 }
 
-std::vector<Vector2d> BeamDirections(const Scan& scan) {
-  std::vector<Vector2d> beams(scan.ranges.size());
-  for (std::size_t i = 0; i < beams.size(); ++i) {
-    const double angle =
-        scan.start_angle + static_cast<double>(i) * scan.angle_step;
-    beams[i] = Vector2d(std::cos(angle), std::sin(angle));
-  }
-  return beams;
-}
-
 }  // namespace
 
 OccupancyGrid::OccupancyGrid(const Vector2d& low, const Vector2d& high,
@@ -150,12 +140,6 @@ void OccupancyGrid::Clear(int column0, int row0, int column1, int row1,
 void OccupancyGrid::AddScan(const Scan& scan, const Pose2& pose) {
   const Pose2 laser = Compose(pose, scan.laser_offset);
   if (!laser.allFinite()) return;
-  if (scan.ranges.size() != beams_.size() || scan.start_angle != start_angle_ ||
-      scan.angle_step != angle_step_) {
-    beams_ = BeamDirections(scan);
-    start_angle_ = scan.start_angle;
-    angle_step_ = scan.angle_step;
-  }
   // 0 is the mark of cells that no scan counted.
   if (++scan_ == 0) ++scan_;
 
@@ -168,12 +152,13 @@ void OccupancyGrid::AddScan(const Scan& scan, const Pose2& pose) {
   const int column = static_cast<int>(std::floor(start[0]));
   const int row = static_cast<int>(std::floor(start[1]));
   rays_.clear();
-  for (std::size_t i = 0; i < beams_.size(); ++i) {
+  const std::vector<Vector2d>& beams = beams_.Of(scan);
+  for (std::size_t i = 0; i < beams.size(); ++i) {
     double range = scan.ranges[i];
     if (!(range >= options_.minimum_range)) continue;
     const bool is_hit = range <= options_.usable_range;
     range = std::min(range, options_.usable_range);
-    const Vector2d& beam = beams_[i];
+    const Vector2d& beam = beams[i];
     const double x = start[0] + range * (c * beam[0] - s * beam[1]);
     const double y = start[1] + range * (s * beam[0] + c * beam[1]);
     if (!(std::abs(x) < kFarthestCell && std::abs(y) < kFarthestCell)) continue;
@@ -220,14 +205,10 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
   }
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;
-  std::vector<Vector2d> beams;
+  BeamDirections directions;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Scan& scan = scans[i];
-    if (i == 0 || scan.ranges.size() != scans[i - 1].ranges.size() ||
-        scan.start_angle != scans[i - 1].start_angle ||
-        scan.angle_step != scans[i - 1].angle_step) {
-      beams = BeamDirections(scan);
-    }
+    const std::vector<Vector2d>& beams = directions.Of(scan);
     const Pose2 laser = Compose(poses[i], scan.laser_offset);
     if (!laser.allFinite()) continue;
     const double c = std::cos(laser[2]);

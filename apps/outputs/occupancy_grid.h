@@ -2,6 +2,7 @@
 #define PLUMBLINE_OUTPUTS_OCCUPANCY_GRID_H_
 
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/beam_directions.h>
 #include <plumbline/frontend/scan.h>
 
 #include <Eigen/Core>
@@ -14,6 +15,7 @@
 
 namespace plumbline {
 
+/// How a grid is made of scans.
 struct OccupancyOptions {
   /// Side of a cell, m.
   double resolution = 0.05;
@@ -90,10 +92,7 @@ class OccupancyGrid {
   /// Number of the present scan, from 1, modulo 2^16: a cell that was seen last
   /// exactly so many scans ago is passed over once.
   std::uint16_t scan_ = 0;
-  /// Directions of the beams of the last scan, in the laser's frame.
-  std::vector<Eigen::Vector2d> beams_;
-  double start_angle_ = 0.0;
-  double angle_step_ = 0.0;
+  BeamDirections beams_;
   /// Ends of the present scan's rays.
   struct Ray {
     int column, row;

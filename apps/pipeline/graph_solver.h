@@ -15,6 +15,7 @@
 
 namespace plumbline {
 
+/// How a graph is solved.
 struct GraphSolverOptions {
   /// Find structure. False: measurements only.
   bool structure = true;

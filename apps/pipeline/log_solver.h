@@ -35,6 +35,7 @@ enum class Refinement {
   kFull,
 };
 
+/// How a log is turned into a map.
 struct LogSolverOptions {
   /// What a kind cannot do is off, whatever stands below (RawFeatureProfile).
   RawFeatures features = RawFeatures::kSegments;

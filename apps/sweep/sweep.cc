@@ -3,10 +3,10 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/number_text.h>
+#include <plumbline/core/stopwatch.h>
 
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -389,18 +389,15 @@ std::optional<RunRecord> ExecuteRun(const SweepDefinition& definition,
   if (!fs::is_directory(run_folder)) {
     throw Error(run_folder, 0, "cannot be made", "a writable place");
   }
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point begin = Clock::now();
-  const auto seconds = [&] {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-  };
+  const Stopwatch watch;
   bool is_late = false;
   ChildOptions child;
   child.working_directory = definition.working_directory;
   child.environment = definition.environment;
   child.log = run_folder + "/log.txt";
   child.stop = [&] {
-    is_late = definition.time_limit > 0.0 && seconds() > definition.time_limit;
+    is_late =
+        definition.time_limit > 0.0 && watch.Seconds() > definition.time_limit;
     return is_late || (stop && stop());
   };
 
@@ -439,7 +436,7 @@ std::optional<RunRecord> ExecuteRun(const SweepDefinition& definition,
     if (record.reason.empty()) record.status = RunStatus::kDone;
   }
   if (record.status != RunStatus::kDone) record.figures.clear();
-  record.seconds = seconds();
+  record.seconds = watch.Seconds();
   WriteRecord(record, run_folder);
   return record;
 }

@@ -6,7 +6,8 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
+#include <streambuf>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -59,18 +60,89 @@ class TemporaryFile {
   std::string path_;
 };
 
-// Runs `write` on a stream to `file`; `path` is what messages name.
+// Writes to a descriptor and keeps why it failed: a std::ofstream forgets the
+// reason of a write in the middle of a large file.
+class DescriptorBuffer : public std::streambuf {
+ public:
+  explicit DescriptorBuffer(int descriptor)
+      : descriptor_(descriptor), buffer_(1 << 16) {
+    setp(buffer_.data(), buffer_.data() + buffer_.size());
+  }
+
+  // Of the first write that failed; 0 when none did.
+  int error_number() const { return error_number_; }
+
+ protected:
+  int_type overflow(int_type c) override {
+    if (!Flush()) return traits_type::eof();
+    if (!traits_type::eq_int_type(c, traits_type::eof())) {
+      sputc(traits_type::to_char_type(c));
+    }
+    return traits_type::not_eof(c);
+  }
+  int sync() override { return Flush() ? 0 : -1; }
+
+ private:
+  bool Flush() {
+    const char* begin = pbase();
+    while (error_number_ == 0 && begin < pptr()) {
+      const ssize_t count =
+          ::write(descriptor_, begin, static_cast<std::size_t>(pptr() - begin));
+      if (count >= 0) {
+        begin += count;
+      } else if (errno != EINTR) {
+        error_number_ = errno;
+      }
+    }
+    setp(buffer_.data(), buffer_.data() + buffer_.size());
+    return error_number_ == 0;
+  }
+
+  int descriptor_;
+  std::vector<char> buffer_;
+  int error_number_ = 0;
+};
+
+// Opens a file that exists for writing.
+class OpenFile {
+ public:
+  // Opening a pipe waits for its reader, for ever if none comes, unless
+  // O_NONBLOCK is given.
+  OpenFile(const std::string& file, const std::string& path)
+      : descriptor_(
+            open(file.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC | O_NONBLOCK)) {
+    if (descriptor_ < 0 && errno == ENXIO) {
+      throw Error(path, 0, "cannot open the pipe for writing: nobody reads it",
+                  "a file, or a pipe with a reader");
+    }
+    if (descriptor_ < 0) Fail(path, "open the file for writing", errno);
+    fcntl(descriptor_, F_SETFL, fcntl(descriptor_, F_GETFL) & ~O_NONBLOCK);
+  }
+  ~OpenFile() { close(descriptor_); }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+
+  int descriptor() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+// Runs `write` on a stream to `file`, all of which is on the disk afterwards;
+// `path` is what messages name.
 void WriteStream(const std::string& file, const std::string& path,
                  const std::function<void(std::ostream&)>& write) {
-  errno = 0;
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  if (!stream) Fail(path, "open the file for writing", errno);
+  const OpenFile open_file(file, path);
+  DescriptorBuffer buffer(open_file.descriptor());
+  std::ostream stream(&buffer);
   write(stream);
-  errno = 0;
   stream.flush();
-  if (!stream) Fail(path, "write the file", errno);
-  stream.close();
-  if (!stream) Fail(path, "write the file", errno);
+  if (!stream) Fail(path, "write the file", buffer.error_number());
+  // The data must be on the disk before the name is, or a crash could leave
+  // the new name with no content. Pipes and devices have no disk (EINVAL).
+  if (fsync(open_file.descriptor()) != 0 && errno != EINVAL && errno != EROFS) {
+    Fail(path, "write the file", errno);
+  }
 }
 
 }  // namespace
@@ -93,16 +165,6 @@ void WriteFileAtomically(const std::string& path,
   }
   TemporaryFile temporary(target);
   WriteStream(temporary.path(), path, write);
-  // The data must be on the disk before the name is, or a crash could leave
-  // the new name with no content.
-  const int descriptor = open(temporary.path().c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) Fail(path, "write the file", errno);
-  const int sync_status = fsync(descriptor);
-  const int sync_error = errno;
-  close(descriptor);
-  if (sync_status != 0 && sync_error != EINVAL) {
-    Fail(path, "write the file", sync_error);
-  }
   temporary.RenameTo(target.string());
 }
 

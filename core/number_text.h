@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <type_traits>
 
 namespace plumbline {
 
@@ -44,7 +46,7 @@ inline void AppendNumber(std::int64_t value, std::string* text) {
 }
 
 /// Reads all of `text` as a number, with or without a sign. False when it is
-/// not one or does not fit the type.
+/// not one or does not fit the type; what is too small for a double is 0.
 template <typename Number>
 bool ParseNumber(std::string_view text, Number* value) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') {
@@ -52,7 +54,17 @@ bool ParseNumber(std::string_view text, Number* value) {
   }
   const std::from_chars_result result =
       std::from_chars(text.data(), text.data() + text.size(), *value);
-  return result.ec == std::errc() && result.ptr == text.data() + text.size();
+  if (result.ptr != text.data() + text.size()) return false;
+  if constexpr (std::is_floating_point_v<Number>) {
+    // Too large otherwise.
+    if (result.ec == std::errc::result_out_of_range &&
+        text.find_first_of("eE") != std::string_view::npos &&
+        text[text.find_first_of("eE") + 1] == '-') {
+      *value = 0;
+      return true;
+    }
+  }
+  return result.ec == std::errc();
 }
 
 }  // namespace plumbline

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <exception>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -12,7 +13,8 @@ namespace plumbline {
 /// Calls function(i) for every i in [0, count), on up to `num_threads` threads
 /// (1 or less: on the caller's alone). Each call must write to a place of its
 /// own, so that the result does not depend on the number of threads. When calls
-/// throw, the exception of the smallest i is thrown in the end.
+/// throw, the exception of the smallest i is thrown in the end. Threads that
+/// the system does not grant are done without.
 template <typename Function>
 void ParallelFor(std::size_t count, int num_threads, const Function& function) {
   std::vector<std::exception_ptr> errors(count);
@@ -27,8 +29,12 @@ void ParallelFor(std::size_t count, int num_threads, const Function& function) {
     }
   };
   std::vector<std::thread> threads;
-  for (int t = 1; t < num_threads && static_cast<std::size_t>(t) < count; ++t) {
-    threads.emplace_back(work);
+  try {
+    for (int t = 1; t < num_threads && static_cast<std::size_t>(t) < count;
+         ++t) {
+      threads.emplace_back(work);
+    }
+  } catch (const std::system_error&) {
   }
   work();
   for (std::thread& thread : threads) thread.join();
@@ -36,6 +42,11 @@ void ParallelFor(std::size_t count, int num_threads, const Function& function) {
     if (error) std::rethrow_exception(error);
   }
 }
+
+/// How many of `wanted` threads (1 or more, the caller's among them) the system
+/// grants at this moment, found by a try. For libraries with threads of their
+/// own, which throw or abort when they get none.
+int GrantedThreads(int wanted);
 
 }  // namespace plumbline
 

@@ -15,7 +15,10 @@ constexpr double kIndexCell = 1.0;
 constexpr double kCoveragePiece = 0.1;
 
 std::int64_t CellKey(std::int64_t column, std::int64_t row) {
-  return (column << 32) ^ (row & 0xffffffff);
+  // Unsigned, since a negative column cannot be shifted.
+  return static_cast<std::int64_t>(
+      static_cast<std::uint64_t>(column) << 32 |
+      (static_cast<std::uint64_t>(row) & 0xffffffffu));
 }
 
 struct Wall {

@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <plumbline/core/atomic_file.h>
@@ -5,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -119,6 +121,40 @@ TEST_F(AtomicFileTest, AFullDeviceIsAnError) {
   EXPECT_THROW(
       WriteFileAtomically("/dev/full", [](std::ostream& out) { out << "x"; }),
       Error);
+}
+
+// Whether the failure comes when the file is flushed or long before.
+TEST_F(AtomicFileTest, AFullDeviceSaysWhy) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  for (const std::size_t size : {std::size_t{1}, std::size_t{10000000}}) {
+    try {
+      WriteFileAtomically("/dev/full", [size](std::ostream& out) {
+        out << std::string(size, 'x');
+        errno = 0;
+      });
+      ADD_FAILURE() << size;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), ::testing::HasSubstr("No space left")) << size;
+    }
+  }
+}
+
+TEST_F(AtomicFileTest, APipeWithoutAReaderIsRefused) {
+  const std::string path = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  try {
+    WriteFileAtomically(path, [](std::ostream& out) { out << "x"; });
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("nobody reads"));
+  }
+  const int reader = open(path.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  WriteFileAtomically(path, [](std::ostream& out) { out << "xyz"; });
+  char text[8];
+  EXPECT_EQ(read(reader, text, sizeof(text)), 3);
+  close(reader);
+  EXPECT_EQ(FilesInFolder(), 1);
 }
 
 TEST_F(AtomicFileTest, PermissionsFollowTheUmask) {

@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/parallel_for.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -34,6 +38,36 @@ TEST(ParallelForTest, TheFirstExceptionIsThrownAfterAllIsDone) {
     }
     EXPECT_EQ(calls, std::vector<int>(9, 1));
   }
+}
+
+TEST(ParallelForTest, GrantedThreads) {
+  for (const int threads : {1, 2, 9})
+    EXPECT_EQ(GrantedThreads(threads), threads);
+}
+
+// As many threads as there is room for do the work. (In a process of its own:
+// the limit stays.)
+TEST(ParallelForTest, ThreadsThatAreNotGrantedAreDoneWithout) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers take address space of their own";
+#endif
+  const auto work_in_little_room = [] {
+    std::ifstream pages("/proc/self/statm");
+    rlim_t size = 0;
+    pages >> size;
+    rlimit limit = {};
+    getrlimit(RLIMIT_AS, &limit);
+    // A few stacks of 8 MB.
+    limit.rlim_cur =
+        size * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + (rlim_t{40} << 20);
+    if (setrlimit(RLIMIT_AS, &limit) != 0) _exit(3);
+    std::atomic<int> calls{0};
+    ParallelFor(1000, 200, [&](std::size_t) { ++calls; });
+    if (calls != 1000) _exit(4);
+    const int granted = GrantedThreads(200);
+    _exit(granted >= 1 && granted < 200 ? 0 : 5);
+  };
+  EXPECT_EXIT(work_in_little_room(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

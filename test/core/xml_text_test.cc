@@ -11,5 +11,9 @@ TEST(XmlTextTest, EscapesWhatXmlReads) {
   EXPECT_EQ(EscapeXml("&amp;"), "&amp;amp;");
 }
 
+TEST(XmlTextTest, ReplacesWhatXmlCannotHold) {
+  EXPECT_EQ(EscapeXml("a\x01\xFF<"), "a\xEF\xBF\xBD\xEF\xBF\xBD&lt;");
+}
+
 }  // namespace
 }  // namespace plumbline

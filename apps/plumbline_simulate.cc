@@ -14,8 +14,10 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/core/text_file.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <sstream>
@@ -126,6 +128,9 @@ bool EndsWith(const std::string& text, const std::string& ending) {
          text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
 }
 
+// Bytes.
+constexpr std::size_t kLargestWorldFile = std::size_t{1} << 28;
+
 World LoadWorld() {
   const std::vector<std::string>& names = BuiltInWorlds();
   if (std::find(names.begin(), names.end(), FLAGS_world) != names.end()) {
@@ -139,9 +144,11 @@ World LoadWorld() {
     options.length.high *= FLAGS_size;
     return MakeBentWorld(options, FLAGS_seed);
   }
-  std::ifstream file(FLAGS_world);
-  // A directory opens but does not read.
-  if (!file || (file.peek(), file.bad())) {
+  try {
+    std::istringstream text(ReadTextFile(FLAGS_world, kLargestWorldFile));
+    return ReadWorld(text, FLAGS_world);
+  } catch (const Error& error) {
+    if (std::filesystem::is_regular_file(FLAGS_world)) throw;
     throw Error(
         "--world", 0,
         "'" + FLAGS_world + "' is no built-in world and no readable file",
@@ -149,7 +156,6 @@ World LoadWorld() {
         "bent_niches, "
         "S1 to S6 or a world file");
   }
-  return ReadWorld(file, FLAGS_world);
 }
 
 SimulatorOptions OptionsFromFlags() {

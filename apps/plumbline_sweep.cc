@@ -13,6 +13,7 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/stopwatch.h>
+#include <plumbline/core/utf8.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -90,6 +91,9 @@ DEFINE_bool(times, true,
 DEFINE_string(run, "",
               "Does only the run of this name of the sweep in --output_dir: "
               "what launchers start on other machines");
+DEFINE_bool(trust, false,
+            "Runs the command of a sweep.json that was not written in this "
+            "folder without asking");
 
 namespace plumbline {
 namespace {
@@ -171,6 +175,7 @@ SweepDefinition DefinitionFromFlags(const std::vector<std::string>& command) {
     definition.environment.emplace_back("PLUMBLINE_DATASETS", datasets);
   }
   definition.time_limit = FLAGS_time_limit;
+  CheckDefinition(definition, "--grid");
   return definition;
 }
 
@@ -320,9 +325,38 @@ int UsageError(const std::string& message) {
   return kExitUsage;
 }
 
+// A command that came with a folder is run only when somebody says so.
+void AskForTrust(const SweepDefinition& definition, const std::string& folder) {
+  if (FLAGS_trust || WasDefinedHere(folder)) return;
+  std::string command;
+  for (const std::vector<std::string>& words :
+       {definition.command, definition.evaluate}) {
+    if (words.empty()) continue;
+    command += "\n ";
+    for (const std::string& word : words) {
+      command += " " + PrintableUtf8(QuoteForShell(word));
+    }
+  }
+  if (isatty(STDIN_FILENO) && isatty(STDERR_FILENO)) {
+    std::fprintf(stderr,
+                 "%s/sweep.json was not written in this folder. It runs:%s\n"
+                 "Go on? [y/N] ",
+                 folder.c_str(), command.c_str());
+    std::string answer;
+    std::getline(std::cin, answer);
+    if (answer == "y" || answer == "Y" || answer == "yes") return;
+  }
+  throw Error(
+      folder + "/sweep.json", 0,
+      "was not written in this folder, and its command is not trusted:" +
+          command + "\n",
+      "the command behind --, or --trust");
+}
+
 int RunOne(const std::string& folder) {
   const std::optional<SweepDefinition> definition = ReadDefinition(folder);
   if (!definition) throw Error(folder, 0, "holds no sweep", "sweep.json");
+  AskForTrust(*definition, folder);
   for (const SweepRun& run : MakeRuns(*definition)) {
     if (run.name != FLAGS_run) continue;
     if (!ReadRecord(RunFolder(folder, run))) {
@@ -355,6 +389,7 @@ int Run(const std::vector<std::string>& command) {
     if (old_one) CheckSameRuns(*old_one, definition, folder);
   } else if (old_one) {
     definition = *old_one;
+    AskForTrust(definition, folder);
     if (FLAGS_time_limit > 0.0) definition.time_limit = FLAGS_time_limit;
   } else {
     return UsageError(
@@ -410,7 +445,7 @@ int main(int argc, char** argv) {
       {"Results",
        {"output_dir", "minimize", "maximize", "figures", "times", "quiet",
         "verbose"}},
-      {"Inner workings", {"run"}}};
+      {"Inner workings", {"run", "trust"}}};
   info.takes_arguments = true;
   const std::vector<std::string> command =
       plumbline::ParseFlags(info, argc, argv);

@@ -2,12 +2,14 @@
 #include <plumbline/apps/cli/detector_parameters.h>
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
+#include <plumbline/core/text_file.h>
 #include <plumbline/detectors/structure_prior.h>
 
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <set>
+#include <sstream>
 #include <string>
 #include <thread>
 
@@ -164,6 +166,9 @@ DEFINE_bool(list_plugins, false,
 namespace plumbline {
 namespace {
 
+// Bytes.
+constexpr std::size_t kLargestPrior = std::size_t{1} << 24;
+
 std::optional<double> ParseOptional(const std::string& flag,
                                     const std::string& text) {
   if (text.empty()) return std::nullopt;
@@ -304,13 +309,9 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
     }
   }
   if (!FLAGS_structure_prior.empty()) {
-    std::ifstream file(FLAGS_structure_prior);
-    if (!file) {
-      throw Error(FLAGS_structure_prior, 0, "cannot be opened",
-                  "a file that can be read");
-    }
+    std::istringstream text(ReadTextFile(FLAGS_structure_prior, kLargestPrior));
     ApplyStructurePrior(
-        ReadStructurePrior(file, FLAGS_structure_prior, registry), &options.em,
+        ReadStructurePrior(text, FLAGS_structure_prior, registry), &options.em,
         &options.detector_parameters);
   }
   options.refine = FLAGS_refine == "none"  ? Refinement::kNone
@@ -365,9 +366,15 @@ LaserOptions LaserOptionsFromFlags() {
 }
 
 int NumThreadsFromFlags() {
-  if (FLAGS_num_threads > 0) return FLAGS_num_threads;
-  const unsigned cores = std::thread::hardware_concurrency();
-  return cores > 0 ? static_cast<int>(cores) : 1;
+  // Asked for once: a run that began with fewer keeps to them.
+  static const int threads = [] {
+    const unsigned cores = std::thread::hardware_concurrency();
+    const int wanted = FLAGS_num_threads > 0 ? FLAGS_num_threads
+                       : cores > 0           ? static_cast<int>(cores)
+                                             : 1;
+    return GrantedThreads(wanted);
+  }();
+  return threads;
 }
 
 }  // namespace plumbline

@@ -28,6 +28,7 @@ DECLARE_double(ellipse_sigmas);
 DECLARE_uint64(seed);
 DECLARE_int32(num_threads);
 DECLARE_string(plugins);
+DECLARE_string(structure_prior);
 DECLARE_bool(list_plugins);
 
 namespace plumbline {

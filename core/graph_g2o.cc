@@ -2,6 +2,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/number_text.h>
+#include <plumbline/core/utf8.h>
 #include <plumbline/factors/angle.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <functional>
 #include <istream>
 #include <limits>
+#include <map>
 #include <ostream>
 #include <string_view>
 #include <unordered_map>
@@ -297,6 +299,7 @@ class Reader {
       : name_(name) {
     file_.options = options;
     for (const FeatureType* type : registry.features()) {
+      feature_types_[type->name] = type;
       vertex_tags_[type->g2o_tag] = {type, nullptr};
       for (const G2oVertexFormat& format : type->other_g2o_formats) {
         vertex_tags_[format.tag] = {type, &format};
@@ -323,10 +326,12 @@ class Reader {
       // The last line counts as ended unless the input ended before.
       file_.ends_with_line_feed = !input.eof();
       ++line_;
+      if (line_ == 1) RemoveByteOrderMark(&line);
       file_.lines.push_back({G2oLine::Kind::kText, line, kNoId});
       ReadLine(line);
     }
     if (input.bad()) throw Error(name_, line_, "cannot read on", "");
+    if (features_.empty() && unknown_ids_.empty()) NameVertices();
     Transaction transaction;
     AddFeatures(&transaction);
     std::vector<const Edge*> added = AddConstraints(&transaction);
@@ -616,6 +621,43 @@ class Reader {
     constraint.source = Source(fields_[4]);
   }
 
+  // Makes the vertices of a file that has edges only.
+  void NameVertices() {
+    // What each may be, the likeliest first.
+    std::map<std::int64_t, std::vector<std::string>> types;
+    for (const Edge& edge : edges_) {
+      const RelationType& type = *edge.constraint.type;
+      for (std::size_t i = 0; i < edge.file_ids.size(); ++i) {
+        const std::vector<std::string>& fitting = type.feature_types[i];
+        const auto [known, is_new] = types.emplace(edge.file_ids[i], fitting);
+        if (is_new) continue;
+        std::vector<std::string> both;
+        for (const std::string& name : known->second) {
+          if (std::count(fitting.begin(), fitting.end(), name) > 0) {
+            both.push_back(name);
+          }
+        }
+        if (both.empty()) {
+          Fail(edge.line,
+               "vertex " + std::to_string(edge.file_ids[i]) + " is a " +
+                   fitting[0] + " here and a " + known->second[0] + " above",
+               "one type");
+        }
+        known->second = both;
+      }
+    }
+    for (const auto& [file_id, names] : types) {
+      index_.emplace(file_id, features_.size());
+      Feature feature;
+      feature.type = feature_types_.at(names[0]);
+      feature.source = kDefaultSource;
+      file_.named_by_edges.push_back(first_feature_ +
+                                     static_cast<FeatureId>(features_.size()));
+      file_.file_ids.push_back(file_id);
+      features_.push_back(std::move(feature));
+    }
+  }
+
   // The index of the vertex with this id; features_.size() when its tag is
   // unknown.
   std::size_t FindVertex(int line, std::int64_t file_id) const {
@@ -728,6 +770,7 @@ class Reader {
   const std::string& name_;
   std::unordered_map<std::string, VertexTag> vertex_tags_;
   std::unordered_map<std::string, EdgeTag> edge_tags_;
+  std::unordered_map<std::string, const FeatureType*> feature_types_;
   int line_ = 0;
   std::vector<std::string_view> fields_;
   Above above_ = Above::kNothing;
@@ -780,6 +823,7 @@ class Writer {
   std::string Write() {
     if (file_ != nullptr) {
       MarkAttributes();
+      AppendNamedVertices();
       for (const G2oLine& line : file_->lines) AppendLine(line);
       if (!file_->ends_with_line_feed && !text_.empty()) text_.pop_back();
     }
@@ -829,6 +873,31 @@ class Writer {
       } else if (line.kind == G2oLine::Kind::kConstraintAttributes) {
         constraint_has_attributes_[static_cast<std::size_t>(line.id)] = true;
       }
+    }
+  }
+
+  // All or none, so that readers which want a vertex above its edges get it.
+  void AppendNamedVertices() {
+    bool has_changed = false;
+    for (const FeatureId id : file_->named_by_edges) {
+      const Feature* feature = graph_.FindFeature(id);
+      if (feature == nullptr) continue;
+      const G2oFile::Fingerprint now = FingerprintOf(*feature);
+      const G2oFile::Fingerprint& before = FingerprintInFile(*feature);
+      has_changed = has_changed || now.element != before.element ||
+                    now.attributes != before.attributes;
+    }
+    if (!has_changed) return;
+    for (const FeatureId id : file_->named_by_edges) {
+      const Feature* feature = graph_.FindFeature(id);
+      if (feature == nullptr) continue;
+      AppendVertex(*feature, nullptr, file_ids_[id], {}, &text_);
+      EndLine();
+      if (feature->fixed && !file_->was_fixed[static_cast<std::size_t>(id)]) {
+        AppendFix(file_ids_[id], &text_);
+        EndLine();
+      }
+      if (!IsPlain(*feature)) AppendAttributeLine(*feature);
     }
   }
 

@@ -67,6 +67,10 @@ struct G2oFile {
   std::vector<Fingerprint> feature_fingerprints;
   std::vector<Fingerprint> constraint_fingerprints;
   std::vector<bool> was_fixed;
+  /// Features without a line of their own, named by edges alone, in the order
+  /// of their ids in the file. They are where nobody has put them: all numbers
+  /// are 0.
+  std::vector<FeatureId> named_by_edges;
 };
 
 /// Reads g2o text into an empty graph: vertices and edges by the registry's
@@ -88,6 +92,10 @@ struct G2oFile {
 /// space, '%', control characters and a lone "-". Without such a line a feature
 /// is raw and a constraint a live measurement, both from the source "g2o".
 ///
+/// A file without any vertex has those that its edges name, as many files with
+/// relative poses do: each of the (first) type that suits its edges, at the
+/// origin, numbered in the order of ids.
+///
 /// An edge to a vertex with an unknown tag, and own lines of unknown vertices
 /// and edges, are kept verbatim like the unknown ones. Throws Error with
 /// `name`:line for dangling or duplicate ids, wrong counts, numbers that do not
@@ -101,10 +109,11 @@ G2oFile ReadG2o(std::istream& input, const std::string& name,
 /// Writes a graph as g2o text. With the `file` that it was read from, every
 /// line of it comes back as it was, byte for byte, but for the elements that
 /// have changed (same place, same tag), those that are gone (left out), and new
-/// ones (at the end; ids past all that the file uses). Without (null), features
-/// and then constraints in the order of ids. Numbers are written so that
-/// reading gives the same doubles; information matrices by their upper
-/// triangle.
+/// ones (at the end; ids past all that the file uses). Vertices that edges
+/// alone name come before all else once one of them has changed. Without
+/// (null), features and then constraints in the order of ids. Numbers are
+/// written so that reading gives the same doubles; information matrices by
+/// their upper triangle.
 void WriteG2o(const Graph& graph, const G2oFile* file, std::ostream& output);
 
 }  // namespace plumbline

@@ -1,7 +1,8 @@
 #include <plumbline/core/error.h>
+#include <plumbline/core/number_text.h>
+#include <plumbline/core/utf8.h>
 #include <plumbline/frontend/eight_numbers.h>
 
-#include <charconv>
 #include <cmath>
 
 namespace plumbline {
@@ -25,13 +26,11 @@ bool ParseEightNumbers(const InputStream& input, std::string_view line,
     line.remove_prefix(token.size());
     if (count == 0) *first_text = std::string(token);
     if (count < numbers->size()) {
-      const char* const end = token.data() + token.size();
-      const auto result = std::from_chars(token.data(), end, (*numbers)[count]);
-      if (result.ec != std::errc() || result.ptr != end ||
-          !std::isfinite((*numbers)[count])) {
+      double& number = (*numbers)[count];
+      if (!ParseNumber(token, &number) || !std::isfinite(number)) {
         throw Error(
             input.name(), input.line_number(),
-            "'" + std::string(token.substr(0, 40)) + "' is no finite number",
+            "'" + PrintableUtf8(token.substr(0, 40)) + "' is no finite number",
             expected);
       }
     }

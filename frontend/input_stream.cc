@@ -1,6 +1,7 @@
 #include <bzlib.h>
 #include <fcntl.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/utf8.h>
 #include <plumbline/frontend/input_stream.h>
 #include <poll.h>
 #include <sys/stat.h>
@@ -16,15 +17,18 @@ namespace plumbline {
 namespace {
 
 constexpr std::size_t kChunk = std::size_t{1} << 18;
+// Of as many bytes at once without any other it is plain that no text comes.
+constexpr std::size_t kManyZeros = std::size_t{1} << 14;
 
 // The bytes as they are stored: a file descriptor or a string.
 class StoredBytes {
  public:
-  StoredBytes(std::string name, int descriptor, bool owned,
+  StoredBytes(std::string name, int descriptor, bool owned, bool is_pipe,
               std::function<bool()> stop)
       : name_(std::move(name)),
         descriptor_(descriptor),
         owned_(owned),
+        is_pipe_(is_pipe),
         stop_(std::move(stop)) {
     buffer_.resize(kChunk);
   }
@@ -70,8 +74,9 @@ class StoredBytes {
  private:
   // Until there is something to read; false when it is time to stop.
   bool WaitForInput() const {
-    if (!stop_) return true;
-    while (!stop_()) {
+    // Reading a named pipe that nobody has opened to write ends at once.
+    if (!stop_ && !is_pipe_) return true;
+    while (!stop_ || !stop_()) {
       pollfd descriptor = {descriptor_, POLLIN, 0};
       const int ready = poll(&descriptor, 1, 200);
       // Errors are for read() to find.
@@ -83,6 +88,7 @@ class StoredBytes {
   std::string name_;
   int descriptor_ = -1;
   bool owned_ = false;
+  bool is_pipe_ = false;
   std::function<bool()> stop_;
   std::vector<char> buffer_;
   std::size_t begin_ = 0;
@@ -259,7 +265,9 @@ InputStream::InputStream(const std::string& path, std::function<bool()> stop)
   int descriptor = STDIN_FILENO;
   const bool owned = path != "-";
   if (owned) {
-    descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    // Opening a named pipe waits for who writes to it, deaf to `stop`, unless
+    // O_NONBLOCK is given.
+    descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (descriptor < 0) {
       throw Error(path, 0,
                   std::string("cannot be opened: ") + std::strerror(errno),
@@ -268,21 +276,35 @@ InputStream::InputStream(const std::string& path, std::function<bool()> stop)
   } else {
     name_ = "standard input";
   }
-  auto bytes =
-      std::make_unique<StoredBytes>(name_, descriptor, owned, std::move(stop));
   struct stat status = {};
-  if (fstat(descriptor, &status) == 0 && S_ISDIR(status.st_mode))
+  const bool is_known = fstat(descriptor, &status) == 0;
+  auto bytes = std::make_unique<StoredBytes>(
+      name_, descriptor, owned, is_known && S_ISFIFO(status.st_mode),
+      std::move(stop));
+  if (is_known && S_ISDIR(status.st_mode))
     throw Error(name_, 0, "is a directory", "a file");
+  if (owned) {
+    fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) & ~O_NONBLOCK);
+  }
   if (S_ISREG(status.st_mode)) size_ = status.st_size;
   unpacker_ = Unpacker::Create(std::move(bytes));
+  SkipByteOrderMark();
 }
 
 InputStream::InputStream(const std::string& name, std::string contents)
     : name_(name),
       unpacker_(
-          Unpacker::Create(std::make_unique<StoredBytes>(name, contents))) {}
+          Unpacker::Create(std::make_unique<StoredBytes>(name, contents))) {
+  SkipByteOrderMark();
+}
 
 InputStream::~InputStream() = default;
+
+void InputStream::SkipByteOrderMark() {
+  if (Peek(kByteOrderMark.size()) == kByteOrderMark) {
+    begin_ += kByteOrderMark.size();
+  }
+}
 
 bool InputStream::Fill() {
   if (begin_ > 0) {
@@ -347,10 +369,21 @@ std::string_view InputStream::Peek(std::size_t count) {
                           std::min(count, end_ - begin_));
 }
 
-std::string InputStream::ReadRest() {
+std::string InputStream::ReadRest(std::size_t limit) {
   std::string rest;
   do {
-    rest.append(buffer_.data() + begin_, end_ - begin_);
+    const std::string_view piece(buffer_.data() + begin_, end_ - begin_);
+    // Corrupt data may have some.
+    if (piece.size() >= kManyZeros &&
+        piece.find_first_not_of('\0') == std::string_view::npos) {
+      throw Error(name_, 0, "holds bytes that are zero", "text");
+    }
+    if (piece.size() > limit - rest.size()) {
+      throw Error(name_, 0,
+                  "holds more than " + std::to_string(limit >> 20) + " MiB",
+                  "less text");
+    }
+    rest.append(piece);
     begin_ = end_;
   } while (Fill());
   return rest;

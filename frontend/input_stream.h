@@ -13,7 +13,8 @@ namespace plumbline {
 
 /// Text input read line by line from a plain, gzip or bzip2 file, recognized
 /// by content and not by name. Files made of several compressed members are
-/// read through to their end.
+/// read through to their end. A byte order mark at the beginning is passed
+/// over.
 ///
 /// Compressed data that breaks off or is corrupt ends the input there: what
 /// was unpacked before is read as usual and damage() then says what happened.
@@ -52,8 +53,10 @@ class InputStream {
   std::string_view Peek(std::size_t count);
 
   /// Everything that was not consumed yet, for readers that want a
-  /// std::istream. Throws Error on a read error.
-  std::string ReadRest();
+  /// std::istream. Throws Error on a read error, for more than `limit` bytes
+  /// and for nothing but bytes that are zero: what is unpacked may be far
+  /// larger than the file, and a device may have no end.
+  std::string ReadRest(std::size_t limit = std::size_t{1} << 30);
 
   /// `progress` is called whenever more was unpacked, with the bytes taken from
   /// the file so far, as they are stored, and the file's size (0 when it is not
@@ -73,6 +76,8 @@ class InputStream {
 
  private:
   class Unpacker;
+
+  void SkipByteOrderMark();
 
   // Appends unpacked bytes to the buffer; false at the end.
   bool Fill();

@@ -1,9 +1,11 @@
 #include <gflags/gflags.h>
 #include <glog/logging.h>
 #include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/command_line.h>
 #include <plumbline/apps/cli/help.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/number_text.h>
+#include <plumbline/core/utf8.h>
 #include <plumbline/core/version.h>
 
 #include <algorithm>
@@ -96,13 +98,16 @@ std::string Directory(const std::string& path) {
 }
 
 std::vector<gflags::CommandLineFlagInfo> OwnFlagInfos() {
-  // glog's, gflags' and Ceres' flags come from other folders than ours.
-  static const std::string folder = Directory(__FILE__);
+  // glog's, gflags' and Ceres' flags come from other folders than apps, which
+  // holds this file's and those of the binaries.
+  static const std::string folder = Directory(Directory(__FILE__)) + "/";
   std::vector<gflags::CommandLineFlagInfo> all;
   gflags::GetAllFlags(&all);
   std::vector<gflags::CommandLineFlagInfo> own;
   for (gflags::CommandLineFlagInfo& info : all) {
-    if (Directory(info.filename) == folder) own.push_back(std::move(info));
+    if (info.filename.compare(0, folder.size(), folder) == 0) {
+      own.push_back(std::move(info));
+    }
   }
   std::sort(own.begin(), own.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
@@ -172,6 +177,25 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
                                        gflags::SET_FLAGS_DEFAULT);
   gflags::SetUsageMessage(info.summary);
   gflags::SetVersionString(kVersion);
+  // gflags keeps pointers to these.
+  static std::vector<std::string> words;
+  static std::vector<char*> pointers;
+  CommandLine command_line =
+      ReadCommandLine(std::vector<std::string>(argv + 1, argv + argc));
+  if (!command_line.problems.empty()) {
+    std::string problems;
+    for (const std::string& problem : command_line.problems) {
+      problems += problem + "\n";
+    }
+    ExitWithUsageError(info, problems);
+  }
+  words = std::move(command_line.arguments);
+  words.insert(words.begin(), argv[0]);
+  pointers.clear();
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+  argc = static_cast<int>(words.size());
+  argv = pointers.data();
   gflags::ParseCommandLineNonHelpFlags(&argc, &argv, /*remove_flags=*/true);
 
   if (FLAGS_help || FLAGS_helpshort) {
@@ -205,7 +229,7 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
   std::vector<std::string> arguments(argv + 1, argv + argc);
   if (!info.takes_arguments) {
     for (const std::string& argument : arguments) {
-      problems += argument +
+      problems += PrintableUtf8(argument) +
                   ": unexpected argument: expected flags only, as --name=value"
                   " (a bool as --name or --noname)\n";
     }
@@ -242,6 +266,10 @@ int RunMain(const std::function<int()>& run) {
     status = kExitInternal;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "internal error: %s\n", error.what());
+    status = kExitInternal;
+  } catch (...) {
+    // A plug-in may throw anything.
+    std::fprintf(stderr, "internal error: an exception of an unknown type\n");
     status = kExitInternal;
   }
   return status;

@@ -47,7 +47,8 @@ struct AppInfo {
   bool takes_arguments = false;
 };
 
-/// Parses the command line (and --flagfile, --fromenv), starts glog (warnings
+/// Parses the command line (and --flagfile, command_line.h; --fromenv), starts
+/// glog (warnings
 /// and worse, on stderr only) and catches Ctrl-C and SIGTERM. Returns the
 /// arguments that are no flags.
 ///

@@ -13,8 +13,10 @@ namespace {
 
 using Eigen::Vector2d;
 
-// Segments are sampled this densely, m.
+// Segments are sampled this densely, m, and no segment more often than that:
+// those of more than 1000 m are no walls.
 constexpr double kStep = 0.05;
+constexpr double kMostSamples = 20000.0;
 // Faces in line to this (m, degrees) are one.
 constexpr double kInLineOffset = 0.02;
 constexpr double kInLineAngleDeg = 0.05;
@@ -91,8 +93,8 @@ Placed Place(const MapSegment& segment, const std::vector<Face>& faces,
   placed.length = segment.end - segment.begin;
   if (!(placed.length > 0.0)) return placed;
   const double sine = std::sin(DegToRad(options.maximum_angle_deg));
-  const int samples =
-      std::max(1, static_cast<int>(std::ceil(placed.length / kStep)));
+  const int samples = static_cast<int>(
+      std::clamp(std::ceil(placed.length / kStep), 1.0, kMostSamples));
   // Samples by line.
   std::map<int, int> hits;
   for (int k = 0; k < samples; ++k) {

@@ -1,5 +1,6 @@
 #include <plumbline/apps/evaluation/map_truth.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/utf8.h>
 #include <plumbline/detectors/same_wall.h>
 
 #include <algorithm>
@@ -14,6 +15,8 @@ using Json = nlohmann::json;
 
 // Coordinates beyond it are garbage, m.
 constexpr double kAbsurdCoordinate = 1e7;
+// Bytes; a JSON document takes several times as much memory.
+constexpr std::size_t kLargestJson = std::size_t{1} << 28;
 
 // A value of a JSON document with the way to it, for messages.
 class Entry {
@@ -121,7 +124,7 @@ void ReadClosures(const Entry& root, StraightMap* map) {
 }
 
 Json ParseJson(InputStream* input, const std::string& expected) {
-  const std::string text = input->ReadRest();
+  const std::string text = input->ReadRest(kLargestJson);
   if (!input->damage().empty())
     throw Error(input->name(), 0, input->damage(), "a whole file");
   try {
@@ -131,6 +134,20 @@ Json ParseJson(InputStream* input, const std::string& expected) {
     const auto line = 1 + std::count(text.begin(), text.begin() + place, '\n');
     throw Error(input->name(), static_cast<int>(line), "is no valid JSON",
                 expected);
+  } catch (const Json::out_of_range& error) {
+    // "... number overflow parsing '1e400'"
+    const std::string what = error.what();
+    const std::size_t quote = what.find('\'');
+    const std::string number =
+        quote == std::string::npos
+            ? ""
+            : what.substr(quote + 1, what.rfind('\'') - quote - 1);
+    const std::size_t place = std::min(text.find(number), text.size());
+    const auto line = 1 + std::count(text.begin(), text.begin() + place, '\n');
+    throw Error(
+        input->name(), static_cast<int>(line),
+        PrintableUtf8(number.substr(0, 40)) + " is too large for a number",
+        "numbers up to 1.8e308");
   }
 }
 

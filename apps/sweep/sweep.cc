@@ -4,15 +4,20 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/number_text.h>
 #include <plumbline/core/stopwatch.h>
+#include <plumbline/core/text_file.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string_view>
 #include <system_error>
 
@@ -24,12 +29,25 @@ using Json = nlohmann::ordered_json;
 
 // Names of files may have 255 bytes; some are left for whoever copies folders.
 constexpr std::size_t kLongestName = 150;
+// Each run is held in memory, and has a folder.
+constexpr double kMostRuns = 1e6;
+// Bytes.
+constexpr std::size_t kLargestDefinition = std::size_t{1} << 26;
 
 bool ReadText(const std::string& path, std::string* text) {
   std::ifstream file(path, std::ios::binary);
   text->assign(std::istreambuf_iterator<char>(file),
                std::istreambuf_iterator<char>());
   return file.is_open() && !file.bad();
+}
+
+// Where a sweep.json is written: no other folder has both, and whoever sends an
+// archive does not know the second beforehand.
+Json PlaceOf(const std::string& folder) {
+  struct stat status = {};
+  stat(folder.c_str(), &status);
+  return {{"folder", folder},
+          {"inode", static_cast<std::uint64_t>(status.st_ino)}};
 }
 
 void WriteJson(const Json& json, const std::string& path) {
@@ -196,14 +214,56 @@ void WriteDefinition(const SweepDefinition& definition,
              {"evaluate", definition.evaluate},
              {"working_directory", definition.working_directory},
              {"environment", std::move(environment)},
-             {"time_limit", definition.time_limit}},
+             {"time_limit", definition.time_limit},
+             {"made_in", PlaceOf(folder)}},
             folder + "/sweep.json");
+}
+
+bool WasDefinedHere(const std::string& folder) {
+  std::string text;
+  if (!ReadText(folder + "/sweep.json", &text)) return false;
+  const Json json = Json::parse(text, nullptr, false);
+  return json.is_object() && json.contains("made_in") &&
+         json["made_in"] == PlaceOf(folder);
+}
+
+void CheckDefinition(const SweepDefinition& definition,
+                     const std::string& path) {
+  const auto require = [&](bool holds, const std::string& what,
+                           const std::string& expected) {
+    if (!holds) throw Error(path, 0, what, expected);
+  };
+  require(!definition.command.empty() && !definition.command[0].empty(),
+          "has no command", "a program and its arguments");
+  require(definition.trials >= 1, "has no trials", "at least 1");
+  require(definition.time_limit >= 0.0 && std::isfinite(definition.time_limit),
+          "has no time limit that makes sense", "seconds, or 0 for none");
+  double settings = 1.0;
+  double one_at_a_time = 1.0;
+  for (const SweepAxis& axis : definition.axes) {
+    require(!axis.flag.empty(), "has an axis without a name", "a flag");
+    require(!axis.values.empty(), "has no values of '" + axis.flag + "'",
+            "at least one");
+    const std::set<std::string> distinct(axis.values.begin(),
+                                         axis.values.end());
+    require(distinct.size() == axis.values.size(),
+            "has a value of '" + axis.flag + "' twice", "each once");
+    settings *= static_cast<double>(axis.values.size());
+    one_at_a_time += static_cast<double>(axis.values.size()) - 1.0;
+  }
+  const double runs =
+      (definition.one_at_a_time ? one_at_a_time : settings) * definition.trials;
+  if (runs > kMostRuns) {
+    std::string count;
+    AppendNumber(runs, &count);
+    throw Error(path, 0, "makes " + count + " runs", "a million at most");
+  }
 }
 
 std::optional<SweepDefinition> ReadDefinition(const std::string& folder) {
   const std::string path = folder + "/sweep.json";
-  std::string text;
-  if (!ReadText(path, &text)) return std::nullopt;
+  if (!fs::exists(path)) return std::nullopt;
+  const std::string text = ReadTextFile(path, kLargestDefinition);
   try {
     const Json json = Json::parse(text);
     SweepDefinition definition;
@@ -213,7 +273,17 @@ std::optional<SweepDefinition> ReadDefinition(const std::string& folder) {
            axis.at("values").get<std::vector<std::string>>()});
     }
     definition.one_at_a_time = json.at("one_at_a_time").get<bool>();
-    definition.trials = json.at("trials").get<int>();
+    // A number that does not fit would wrap around.
+    const Json& trials = json.at("trials");
+    if (!trials.is_number_integer() || trials < 1 ||
+        trials > std::numeric_limits<int>::max()) {
+      throw Error(path, 0, "trials are " + trials.dump(), "a whole number");
+    }
+    definition.trials = trials.get<int>();
+    if (!json.at("first_seed").is_number_integer()) {
+      throw Error(path, 0, "first_seed is " + json.at("first_seed").dump(),
+                  "a whole number");
+    }
     definition.first_seed = json.at("first_seed").get<std::uint64_t>();
     definition.seed_flag = json.at("seed_flag").get<std::string>();
     definition.command = json.at("command").get<std::vector<std::string>>();
@@ -224,6 +294,7 @@ std::optional<SweepDefinition> ReadDefinition(const std::string& folder) {
       definition.environment.emplace_back(name, value.get<std::string>());
     }
     definition.time_limit = json.at("time_limit").get<double>();
+    CheckDefinition(definition, path);
     return definition;
   } catch (const Json::exception& error) {
     throw Error(path, 0, std::string("cannot be read: ") + error.what(),

@@ -41,8 +41,20 @@ struct SweepDefinition {
 void WriteDefinition(const SweepDefinition& definition,
                      const std::string& folder);
 
-/// Reads it; none when there is none. Throws Error when it cannot be read.
+/// Reads it; none when there is none. Throws Error when it cannot be read or
+/// makes no sense (CheckDefinition).
 std::optional<SweepDefinition> ReadDefinition(const std::string& folder);
+
+/// Throws Error, naming `path`, unless the definition can be run: a command, a
+/// name and at least one value for every axis, no value twice, at least one
+/// trial, a time limit that is no less than 0, and a million runs at most.
+void CheckDefinition(const SweepDefinition& definition,
+                     const std::string& path);
+
+/// Whether the sweep.json of a folder was written there: a folder that was
+/// copied, moved or unpacked from an archive holds a command that somebody else
+/// may have chosen.
+bool WasDefinedHere(const std::string& folder);
 
 /// Throws Error unless runs of `old_one`, which were done in `folder`, can be
 /// taken for runs of `definition`: axes, trials and time limits may differ, all

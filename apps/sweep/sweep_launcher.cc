@@ -67,7 +67,21 @@ std::string WorkerCommand(const std::string& folder,
                           const LaunchOptions& options,
                           const std::string& name) {
   return QuoteForShell(options.program) +
-         " --output_dir=" + QuoteForShell(folder) + " --run=" + name;
+         " --output_dir=" + QuoteForShell(folder) + " --trust --run=" + name;
+}
+
+// The same for a shell without the character that all replacement strings of
+// GNU parallel begin with ({}, {#}, {=...=}); for words in single quotes.
+std::string WithoutBraces(const std::string& quoted) {
+  std::string command;
+  for (const char c : quoted) {
+    if (c == '{') {
+      command += "'\"$(printf '\\173')\"'";
+    } else {
+      command += c;
+    }
+  }
+  return command;
 }
 
 // In a process of its own: does a run and ends with an ExitStatus.
@@ -203,7 +217,9 @@ void LaunchWithParallel(const std::vector<SweepRun>& runs,
   }
   child.command.insert(child.command.end(), options.options.begin(),
                        options.options.end());
-  child.command.push_back(WorkerCommand(folder, options, "{}"));
+  // The only braces are those that the run's name replaces.
+  child.command.push_back(WithoutBraces(WorkerCommand(folder, options, "")) +
+                          "{}");
   for (const SweepRun& run : runs) child.input += run.name + "\n";
   child.stop = Watch(folder, runs, options);
   const ChildResult result = RunChild(child);

@@ -282,6 +282,26 @@ TEST_F(SweepBinaryTest, CtrlCLeavesATableOfWhatIsDone) {
   EXPECT_THAT(Read("out/sweep.csv"), HasSubstr("x=9,seed=1"));
 }
 
+// Its sweep.json runs a program that somebody else chose.
+TEST_F(SweepBinaryTest, ACopiedFolderIsNotTrusted) {
+  const std::string out = "--output_dir=" + folder_;
+  std::string output;
+  ASSERT_EQ(Run("--grid=x=1,2 " + out + "/out -- " + program_, &output), 0);
+  ASSERT_EQ(Notes().size(), 2u);
+  fs::create_directories(folder_ + "/copy");
+  fs::copy(folder_ + "/out/sweep.json", folder_ + "/copy/sweep.json");
+  for (const std::string flags : {"", "--run=x=1,seed=1"}) {
+    EXPECT_EQ(Run(flags + " " + out + "/copy </dev/null", &output), 2);
+    EXPECT_THAT(output, HasSubstr("not trusted"));
+    EXPECT_THAT(output, HasSubstr("program.sh"));
+  }
+  EXPECT_EQ(Notes().size(), 2u);
+  ASSERT_EQ(Run(out + "/copy --trust", &output), 0) << output;
+  EXPECT_EQ(Notes().size(), 4u);
+  // Its own from now on.
+  EXPECT_EQ(Run(out + "/copy", &output), 0) << output;
+}
+
 TEST_F(SweepBinaryTest, ASecondSweepWaitsForTheFirst) {
   const std::vector<std::string> flags = {
       "--grid=x=1:1:3", "--jobs=1",   "--output_dir=" + folder_ + "/out", "--",

@@ -123,6 +123,57 @@ TEST_F(GraphG2oTest, EdgesMayComeFirst) {
   EXPECT_TRUE(graph.GetFeature(1).fixed);
 }
 
+TEST_F(GraphG2oTest, EdgesAloneNameTheirVertices) {
+  const std::string text =
+      "\xEF\xBB\xBF"
+      "EDGE_SE2 12 7 1 0 0 1 0 0 1 0 1\n"
+      "FIX 7\n"
+      "EDGE_SE2_XY 12 3 1 2 1 0 1\n"
+      "EDGE2 7 9 1 0 0 1 0 1 1 0 0\n";
+  Graph graph;
+  const G2oFile file = Read(text, &graph);
+  ASSERT_EQ(graph.num_features(), 4u);
+  ASSERT_EQ(graph.num_constraints(), 3u);
+  EXPECT_EQ(file.file_ids, (std::vector<std::int64_t>{3, 7, 9, 12}));
+  EXPECT_EQ(file.named_by_edges, (std::vector<FeatureId>{0, 1, 2, 3}));
+  EXPECT_EQ(graph.GetFeature(0).type->name, "point");
+  for (const FeatureId pose : {1, 2, 3}) {
+    EXPECT_EQ(graph.GetFeature(pose).type->name, "pose");
+    EXPECT_EQ(graph.GetFeature(pose).fixed, pose == 1);
+  }
+  EXPECT_EQ(graph.GetConstraint(0).features, (std::vector<FeatureId>{3, 1}));
+  // Written back as it was, and with all vertices once one has moved.
+  EXPECT_EQ(Write(graph, &file), text.substr(3));
+  graph.MutableFeatures()[3]->parameters = {1.0, 2.0, 0.5};
+  EXPECT_EQ(Write(graph, &file),
+            "VERTEX_XY 3 0 0\nVERTEX_SE2 7 0 0 0\nVERTEX_SE2 9 0 0 0\n"
+            "VERTEX_SE2 12 1 2 0.5\n" +
+                text.substr(3));
+}
+
+TEST_F(GraphG2oTest, EdgesAloneThatDoNotTellTheTypes) {
+  const auto message = [&](const std::string& text) -> std::string {
+    Graph graph;
+    try {
+      Read(text, &graph);
+    } catch (const Error& error) {
+      EXPECT_EQ(graph.num_features(), 0u);
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(message("EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n"
+                    "EDGE_SE2_XY 1 2 1 2 1 0 1\n")
+                .find(":2: vertex 2 is a point here and a pose above"),
+            std::string::npos);
+  EXPECT_NE(message("EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nFIX 9\n").find(":2: "),
+            std::string::npos);
+  // One vertex, and the others are missed.
+  EXPECT_NE(message("VERTEX_SE2 1 0 0 0\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n")
+                .find(":2: no vertex 2"),
+            std::string::npos);
+}
+
 TEST_F(GraphG2oTest, EverythingComesBack) {
   Graph graph;
   Transaction transaction;

@@ -399,6 +399,23 @@ TEST(CarmenReaderTest, ManyUnknownNamesMakeFewReports) {
   EXPECT_EQ(Skipped(log, "not used"), 1000);
 }
 
+TEST(CarmenReaderTest, ScansThatAreTooDenseAreThinned) {
+  std::string dense = "FLASER 25000 ";
+  for (int i = 0; i < 25000; ++i) dense += std::to_string(1 + i % 3) + " ";
+  const Log log = Read(Flaser(10000, "2", "0 0 0 0 0 0", "1") + dense +
+                       "0 0 0 0 0 0 2 host 0.5\n");
+  ASSERT_EQ(log.scans.size(), 2u);
+  EXPECT_EQ(log.scans[0].ranges.size(), 10000u);
+  EXPECT_NEAR(log.scans[0].angle_step, kPi / 10000, kTight);
+  const Scan& scan = log.scans[1];
+  ASSERT_EQ(scan.ranges.size(), 8334u);
+  EXPECT_NEAR(scan.start_angle, -kPi / 2, kTight);
+  EXPECT_NEAR(scan.angle_step, 3 * kPi / 25000, kTight);
+  for (const float range : scan.ranges) ASSERT_EQ(range, 1.0f);
+  EXPECT_EQ(Skipped(log, "more than 10000"), 1);
+  EXPECT_THAT(log.skipped.back().first_lines, ElementsAre(2));
+}
+
 TEST(CarmenReaderTest, RecognizesFormats) {
   EXPECT_TRUE(LooksLikeCarmenLog("# CARMEN Logfile\nPARAM a b\n"));
   EXPECT_TRUE(LooksLikeCarmenLog("FLASER 180 1.0 2.0"));

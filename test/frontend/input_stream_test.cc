@@ -3,12 +3,16 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/input_stream.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace plumbline {
@@ -223,6 +227,67 @@ TEST(InputStreamTest, MissingFilesAndDirectoriesAreRefused) {
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("is a directory: expected a file"));
   }
+}
+
+TEST(InputStreamTest, AByteOrderMarkIsPassedOver) {
+  const std::string text =
+      "\xEF\xBB\xBF"
+      "a\n\xEF\xBB\xBF"
+      "b\n";
+  for (const std::string& stored : {text, Gzip(text), Bzip2(text)}) {
+    EXPECT_THAT(Lines(stored), ElementsAre("a",
+                                           "\xEF\xBB\xBF"
+                                           "b"));
+    InputStream input("test", stored);
+    EXPECT_EQ(input.Peek(2), "a\n");
+    EXPECT_EQ(input.ReadRest(), text.substr(3));
+  }
+  EXPECT_THAT(Lines("\xEF\xBB\xBF"), IsEmpty());
+  EXPECT_THAT(Lines("\xEF\xBB"), ElementsAre("\xEF\xBB"));
+}
+
+// What has no end, or is unpacked to far more than it was.
+TEST(InputStreamTest, LimitsOfWhatIsReadAtOnce) {
+  const auto message = [](InputStream* input, std::size_t limit) {
+    try {
+      input->ReadRest(limit);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  InputStream zeros("/dev/zero");
+  EXPECT_THAT(message(&zeros, std::size_t{1} << 30),
+              HasSubstr("/dev/zero: holds bytes that are zero"));
+  const std::string bomb = Gzip(std::string(10 << 20, 'x'));
+  ASSERT_LT(bomb.size(), 100000u);
+  InputStream packed("bomb", bomb);
+  EXPECT_EQ(message(&packed, 4 << 20),
+            "bomb: holds more than 4 MiB: expected less text");
+  InputStream enough("bomb", bomb);
+  EXPECT_EQ(message(&enough, 10 << 20), "");
+}
+
+// Opening one waits for its writer; reading before there is one finds an end.
+TEST(InputStreamTest, NamedPipes) {
+  const std::string path = ::testing::TempDir() + "input_stream_pipe";
+  std::remove(path.c_str());
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  int asked = 0;
+  InputStream stopped(path, [&] { return ++asked > 2; });
+  EXPECT_THAT(Lines(&stopped), IsEmpty());
+  for (const bool may_stop : {false, true}) {
+    std::thread writer([&] {
+      usleep(100000);
+      std::ofstream(path) << "a\nb\n";
+    });
+    std::function<bool()> stop;
+    if (may_stop) stop = [] { return false; };
+    InputStream input(path, stop);
+    EXPECT_THAT(Lines(&input), ElementsAre("a", "b"));
+    writer.join();
+  }
+  std::remove(path.c_str());
 }
 
 TEST(InputStreamTest, TellsHowFarItIs) {

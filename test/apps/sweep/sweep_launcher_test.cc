@@ -175,6 +175,22 @@ TEST_F(SweepLauncherTest, ParallelOnThisMachine) {
   CompareWithLocal("--launcher=parallel");
 }
 
+// GNU parallel puts names of runs in the place of braces.
+TEST_F(SweepLauncherTest, ParallelInAFolderOfBraces) {
+  if (Find("parallel").empty()) GTEST_SKIP() << "GNU parallel is not there";
+  std::string output;
+  const std::string out = "it's {} {#} {.}";
+  fs::create_directories(folder_ + "/" + out);
+  ASSERT_EQ(RunInShell("cd " + folder_ + " && " + binary_ +
+                           " --grid=x=1,2 --launcher=parallel --output_dir=\"" +
+                           out + "\" -- ./program.sh",
+                       &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("runs: 2; 2 done"));
+  EXPECT_TRUE(fs::exists(folder_ + "/" + out + "/runs/x=2,seed=1/run.json"));
+}
+
 TEST_F(SweepLauncherTest, ParallelOverSshToTwoHosts) {
   const std::string sshd = Find("sshd");
   for (const char* program : {"parallel", "sshd", "ssh", "ssh-keygen"}) {

@@ -8,9 +8,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -98,6 +100,63 @@ TEST_F(SweepTest, DefinitionsComeBackFromTheirFile) {
   EXPECT_THROW(ReadDefinition(folder_), Error);
   std::ofstream(folder_ + "/sweep.json") << "{}";
   EXPECT_THROW(ReadDefinition(folder_), Error);
+}
+
+// Edited by hand.
+TEST_F(SweepTest, DefinitionsThatMakeNoSense) {
+  definition_.axes = {{"x", {"1", "2"}}};
+  definition_.command = {"/bin/true"};
+  WriteDefinition(definition_, folder_);
+  const std::string path = folder_ + "/sweep.json";
+  std::ifstream file(path);
+  const auto good = nlohmann::json::parse(file);
+  const auto refusal = [&](const std::string& key, const std::string& value) {
+    nlohmann::json json = good;
+    json[key] = nlohmann::json::parse(value);
+    std::ofstream(path) << json;
+    try {
+      ReadDefinition(folder_);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal("trials", "1"), "");
+  for (const auto& [key, value] :
+       std::vector<std::pair<std::string, std::string>>{
+           {"axes", R"([{"flag": "x", "values": []}])"},
+           {"axes", R"([{"flag": "x", "values": ["1", "1"]}])"},
+           {"axes", R"([{"flag": "", "values": ["1"]}])"},
+           {"axes", R"([{"flag": "x", "values": [1]}])"},
+           {"trials", "2000000000"},
+           {"trials", "20000000000"},
+           {"trials", "0"},
+           {"trials", "-1"},
+           {"trials", "1.5"},
+           {"first_seed", "-0.5"},
+           {"time_limit", "-1"},
+           {"command", "[]"}}) {
+    EXPECT_THAT(refusal(key, value), HasSubstr("sweep.json: ")) << key << value;
+  }
+  std::string values;
+  for (int i = 0; i < 1001; ++i) {
+    values += (i > 0 ? ",\"" : "\"") + std::to_string(i) + "\"";
+  }
+  const std::string axes = R"([{"flag": "x", "values": [)" + values +
+                           R"(]}, {"flag": "y", "values": [)" + values + "]}]";
+  EXPECT_THAT(refusal("axes", axes), HasSubstr("a million at most"));
+}
+
+TEST_F(SweepTest, DefinitionsKnowTheirFolder) {
+  EXPECT_FALSE(WasDefinedHere(folder_));
+  WriteDefinition(definition_, folder_);
+  EXPECT_TRUE(WasDefinedHere(folder_));
+  const std::string copy = folder_ + "/copy";
+  fs::create_directories(copy);
+  fs::copy(folder_ + "/sweep.json", copy + "/sweep.json");
+  EXPECT_FALSE(WasDefinedHere(copy));
+  std::ofstream(folder_ + "/sweep.json") << "{}";
+  EXPECT_FALSE(WasDefinedHere(folder_));
 }
 
 TEST_F(SweepTest, OtherAxesKeepRunsAndOtherCommandsDoNot) {

@@ -1,0 +1,224 @@
+#include <gflags/gflags.h>
+#include <plumbline/apps/cli/command_line.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/text_file.h>
+#include <plumbline/core/utf8.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string_view>
+
+namespace plumbline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargestFlagFile = std::size_t{1} << 20;
+constexpr char kExpectedLine[] =
+    "--name=value, --name, --noname or a comment that begins with #";
+
+// A word of somebody's in a message.
+std::string Shown(const std::string& text) {
+  constexpr std::size_t kLongest = 60;
+  const std::string printable = PrintableUtf8(text.substr(0, kLongest));
+  return "'" + printable + (text.size() > kLongest ? "...'" : "'");
+}
+
+std::string Trimmed(const std::string& text) {
+  constexpr char kBlanks[] = " \t\r\v\f";
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  if (begin == std::string::npos) return "";
+  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+}
+
+// What an argument that begins with a dash says.
+struct FlagWords {
+  std::string name;
+  bool has_value = false;
+  std::string value;
+};
+
+FlagWords SplitFlag(const std::string& argument) {
+  FlagWords words;
+  const std::size_t begin = argument.compare(0, 2, "--") == 0 ? 2 : 1;
+  const std::size_t equals = argument.find('=', begin);
+  words.name = argument.substr(begin, equals - begin);
+  words.has_value = equals != std::string::npos;
+  if (words.has_value) words.value = argument.substr(equals + 1);
+  return words;
+}
+
+bool IsFlag(const std::string& argument) {
+  return argument.size() > 1 && argument[0] == '-' && argument != "--";
+}
+
+bool FindFlag(const std::string& name, gflags::CommandLineFlagInfo* info) {
+  return gflags::GetCommandLineFlagInfo(name.c_str(), info);
+}
+
+// Whether `name` is "no" and the name of a bool.
+bool IsNegation(const std::string& name) {
+  gflags::CommandLineFlagInfo info;
+  return name.compare(0, 2, "no") == 0 && !FindFlag(name, &info) &&
+         FindFlag(name.substr(2), &info) && info.type == "bool";
+}
+
+bool IsKnown(const std::string& name) {
+  gflags::CommandLineFlagInfo info;
+  return FindFlag(name, &info) || IsNegation(name);
+}
+
+// --flagfile takes files; gflags knows it as a flag like any other.
+bool NamesFlagFiles(const FlagWords& flag) { return flag.name == "flagfile"; }
+
+class CommandLineReader {
+ public:
+  CommandLine Read(const std::vector<std::string>& arguments) {
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+      const std::string& argument = arguments[i];
+      if (argument == "--") {
+        result_.arguments.insert(result_.arguments.end(), arguments.begin() + i,
+                                 arguments.end());
+        break;
+      }
+      if (!IsFlag(argument)) {
+        result_.arguments.push_back(argument);
+        continue;
+      }
+      FlagWords flag = SplitFlag(argument);
+      gflags::CommandLineFlagInfo info;
+      const bool takes_next = !flag.has_value && i + 1 < arguments.size() &&
+                              FindFlag(flag.name, &info) && info.type != "bool";
+      if (takes_next) {
+        // "--input --output_dir=out": gflags would take the second for the
+        // value of the first.
+        const std::string& next = arguments[i + 1];
+        if (IsFlag(next) && IsKnown(SplitFlag(next).name)) {
+          Problem("--" + flag.name + ": has no value: expected --" + flag.name +
+                  "=value before " + Shown(next));
+          continue;
+        }
+        flag.value = next;
+      }
+      CheckNegation("", flag);
+      if (NamesFlagFiles(flag) && (flag.has_value || takes_next)) {
+        ReadFiles("--flagfile", flag.value);
+      } else {
+        result_.arguments.push_back(argument);
+        if (takes_next) result_.arguments.push_back(arguments[i + 1]);
+      }
+      if (takes_next) ++i;
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void Problem(std::string text) {
+    result_.problems.push_back(std::move(text));
+  }
+
+  void CheckNegation(const std::string& place, const FlagWords& flag) {
+    if (!flag.has_value || !IsNegation(flag.name)) return;
+    Problem(place + "--" + flag.name + "=" + flag.value +
+            ": 'no' and a value: expected --" + flag.name + " or --" +
+            flag.name.substr(2) + "=true or =false");
+  }
+
+  // `place` is what named them.
+  void ReadFiles(const std::string& place, const std::string& list) {
+    std::size_t begin = 0;
+    while (begin <= list.size()) {
+      std::size_t end = list.find(',', begin);
+      if (end == std::string::npos) end = list.size();
+      const std::string name = list.substr(begin, end - begin);
+      begin = end + 1;
+      if (name.empty()) {
+        Problem(place + ": no name of a file: expected --flagfile=FILE");
+      } else {
+        ReadFile(place, name);
+      }
+    }
+  }
+
+  void ReadFile(const std::string& place, const std::string& name) {
+    std::error_code error;
+    const fs::path canonical = fs::weakly_canonical(name, error);
+    if (std::find(open_.begin(), open_.end(), canonical) != open_.end()) {
+      Problem(place + ": " + Shown(name) +
+              " names itself as a flag file: expected another one");
+      return;
+    }
+    std::string text;
+    try {
+      text = ReadTextFile(name, kLargestFlagFile);
+    } catch (const Error& error) {
+      Problem(error.what());
+      return;
+    }
+    open_.push_back(canonical);
+    std::size_t begin = 0;
+    for (int line = 1; begin < text.size(); ++line) {
+      std::size_t end = text.find('\n', begin);
+      if (end == std::string::npos) end = text.size();
+      const std::size_t problems = result_.problems.size();
+      ReadLine(name + ":" + std::to_string(line),
+               Trimmed(text.substr(begin, end - begin)));
+      begin = end + 1;
+      // The first that is wrong in a file is enough: it may be no such file.
+      if (result_.problems.size() > problems) break;
+    }
+    open_.pop_back();
+  }
+
+  void ReadLine(const std::string& place, const std::string& line) {
+    if (line.empty() || line[0] == '#') return;
+    if (!IsFlag(line)) {
+      Problem(place + ": " + Shown(line) + " is no flag: expected " +
+              kExpectedLine);
+      return;
+    }
+    const FlagWords flag = SplitFlag(line);
+    if (!IsKnown(flag.name)) {
+      Problem(place + ": there is no flag " + Shown("--" + flag.name) +
+              ": expected " + kExpectedLine);
+      return;
+    }
+    if (NamesFlagFiles(flag)) {
+      ReadFiles(place, flag.value);
+      return;
+    }
+    const std::size_t problems = result_.problems.size();
+    CheckNegation(place + ": ", flag);
+    if (result_.problems.size() > problems) return;
+    gflags::CommandLineFlagInfo info;
+    if (FindFlag(flag.name, &info)) {
+      if (!flag.has_value && info.type != "bool") {
+        Problem(place + ": --" + flag.name + " has no value: expected --" +
+                flag.name + "=value");
+        return;
+      }
+      // Set for a try, and set back.
+      const gflags::FlagSaver saver;
+      if (flag.has_value &&
+          gflags::SetCommandLineOption(flag.name.c_str(), flag.value.c_str())
+              .empty()) {
+        Problem(place + ": --" + flag.name + "=" + Shown(flag.value) +
+                ": expected a value of type " + info.type);
+        return;
+      }
+    }
+    result_.arguments.push_back(line);
+  }
+
+  CommandLine result_;
+  // Flag files that are being read, the outermost first.
+  std::vector<fs::path> open_;
+};
+
+}  // namespace
+
+CommandLine ReadCommandLine(const std::vector<std::string>& arguments) {
+  return CommandLineReader().Read(arguments);
+}
+
+}  // namespace plumbline

@@ -8,6 +8,7 @@
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/initial_guess.h>
 #include <plumbline/core/plugin.h>
+#include <plumbline/core/utf8.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/frontend/builtins.h>
@@ -15,17 +16,16 @@
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/log_reader.h>
 #include <plumbline/outputs/marginals_output.h>
+#include <plumbline/outputs/output_folder.h>
 #include <plumbline/outputs/solve_outputs.h>
 #include <plumbline/outputs/summary.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/without_structure.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <set>
@@ -61,44 +61,94 @@ void ListPlugins(const Registry& registry) {
   }
 }
 
-// Writes all files, the summary last: it knows what the others took.
-void WriteOutputs(SolveOutcome* outcome, double total_begin) {
-  const std::filesystem::path folder(FLAGS_output_dir);
+std::string Joined(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) {
+    list += (list.empty() ? "" : ", ") + name;
+  }
+  return list;
+}
+
+// What became of files that an earlier run or somebody else left in the folder.
+void TellChanges(const OutputFolder::Changes& changes, const Summary& summary) {
+  const char* folder = FLAGS_output_dir.c_str();
+  if (!changes.removed.empty()) {
+    Remark("%s: removed of an earlier run: %s", folder,
+           Joined(changes.removed).c_str());
+  }
+  if (!changes.kept.empty()) {
+    Remark("%s: kept of an earlier run: %s", folder,
+           Joined(changes.kept).c_str());
+  }
+  if (!changes.replaced_foreign.empty()) {
+    Remark("%s: replaced, though no run had written them: %s", folder,
+           Joined(changes.replaced_foreign).c_str());
+  }
+  if (!summary.partial) return;
+  const std::string scans =
+      summary.scans_in_log > 0
+          ? " (" + std::to_string(summary.scans) + " of " +
+                std::to_string(summary.scans_in_log) + " scans)"
+          : "";
+  Remark("%s: holds a part of the run%s%s", folder, scans.c_str(),
+         changes.replaced_whole_run ? " in place of a whole one" : "");
+}
+
+// Writes all files and puts them in place together, the summary last: it knows
+// what the others took.
+void WriteOutputs(SolveOutcome* outcome, double total_begin,
+                  OutputFolder* folder) {
   const double begin = Now();
+  outcome->summary.partial = InterruptRequested();
   CountGraph(*outcome->graph, &outcome->summary);
   // What the report says; the summary, written last, has the whole.
   outcome->summary.total_seconds = begin - total_begin;
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   outcome->flags = OwnFlags();
   outcome->delta_threshold = FLAGS_delta_threshold;
-  WrittenOutputs written;
-  {
-    std::unique_ptr<Progress> progress;
-    written = WriteSolveOutputs(
-        *outcome, SelectOutputs(FLAGS_outputs, *outcome->registry), folder,
-        NumThreadsFromFlags(), [&](int done, int total) {
-          if (progress == nullptr) {
-            progress = std::make_unique<Progress>("writing", "files", total);
-          }
-          progress->Update(done);
-        });
+  try {
+    WrittenOutputs written;
+    {
+      std::unique_ptr<Progress> progress;
+      written = WriteSolveOutputs(
+          *outcome, SelectOutputs(FLAGS_outputs, *outcome->registry),
+          folder->staging(), NumThreadsFromFlags(), [&](int done, int total) {
+            if (progress == nullptr) {
+              progress = std::make_unique<Progress>("writing", "files", total);
+            }
+            progress->Update(done);
+          });
+    }
+    for (const std::string& reason : written.reasons) {
+      Remark("%s", reason.c_str());
+    }
+    outcome->summary.files = std::move(written.files);
+    outcome->summary.digests = written.digests;
+    outcome->summary.write_seconds = Now() - begin;
+    outcome->summary.total_seconds = Now() - total_begin;
+    outcome->summary.peak_memory_bytes = PeakMemoryBytes();
+    WriteSummary(outcome->summary,
+                 (folder->staging() / OutputFolder::kSummary).string());
+    TellChanges(folder->Commit(written.digests), outcome->summary);
+  } catch (const Error& error) {
+    throw folder->InPlace(error);
   }
-  for (const std::string& reason : written.reasons) {
-    Remark("%s", reason.c_str());
-  }
-  // A map of an earlier run beside this one's figures would be taken for this
-  // run's.
-  for (const std::string& name :
-       RemoveOutputsOfEarlierRun(folder, written.files)) {
-    Detail("removed %s of an earlier run", name.c_str());
-  }
-  outcome->summary.files = std::move(written.files);
-  outcome->summary.write_seconds = Now() - begin;
-  Detail("written to %s in %.1f s", FLAGS_output_dir.c_str(),
-         outcome->summary.write_seconds);
-  outcome->summary.total_seconds = Now() - total_begin;
-  outcome->summary.peak_memory_bytes = PeakMemoryBytes();
-  WriteSummary(outcome->summary, folder / "summary.json");
+  Detail("written to %s in %.1f s", FLAGS_output_dir.c_str(), Now() - begin);
+}
+
+// All files that the run reads, as far as flags name them.
+std::vector<std::filesystem::path> InputFiles() {
+  std::vector<std::filesystem::path> files = {
+      FLAGS_input == "-" ? "/dev/stdin" : FLAGS_input, FLAGS_structure_prior};
+  std::istringstream plugins(FLAGS_plugins);
+  std::string plugin;
+  while (std::getline(plugins, plugin, ',')) files.push_back(plugin);
+  return files;
+}
+
+// Every name that a run may write.
+std::set<std::string> NamesOfAllOutputs(const Registry& registry) {
+  return FilesOfOutputs(SelectOutputs("all", registry), registry);
 }
 
 // Says which flags that were given do nothing for this kind of input.
@@ -173,8 +223,13 @@ class ReadingProgress {
   std::unique_ptr<Progress> progress_;
 };
 
+// A file's name, for people: a name may have any bytes.
+std::string TitleOf(const InputStream& input) {
+  return PrintableUtf8(std::filesystem::path(input.name()).filename().string());
+}
+
 int SolveLog(InputStream* input, const LogReaderType& reader,
-             const Registry& registry, double begin) {
+             const Registry& registry, double begin, OutputFolder* folder) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
   summary.input = FLAGS_input;
@@ -230,6 +285,7 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   }
   for (const EmPhase& phase : solver.trace()) TellPhase(phase);
   summary.scans = static_cast<std::int64_t>(result.trajectory.size());
+  summary.scans_in_log = static_cast<std::int64_t>(log.scans.size());
   summary.skipped = log.skipped;
   summary.frontend_seconds =
       result.frontend_seconds + result.relocalization_seconds;
@@ -255,14 +311,14 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   };
   outcome.trace = solver.trace();
   outcome.occupancy = OccupancyOptionsFromFlags();
-  outcome.title =
-      std::filesystem::path(input->name()).filename().string() +
-      (FLAGS_structure ? ", with structure" : ", without structure");
-  WriteOutputs(&outcome, begin);
+  outcome.title = TitleOf(*input) + (FLAGS_structure ? ", with structure"
+                                                     : ", without structure");
+  WriteOutputs(&outcome, begin, folder);
   return kExitSuccess;
 }
 
-int SolveGraph(InputStream* input, const Registry& registry, double begin) {
+int SolveGraph(InputStream* input, const Registry& registry, double begin,
+               OutputFolder* folder) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
   summary.input = FLAGS_input;
@@ -296,7 +352,18 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
     CheckGauge(graph, ParseMarginalsSelection(FLAGS_marginals, registry));
   }
   Summary::Solver figures;
-  const InitialGuessOptions start = InitialGuessOptionsFromFlags();
+  InitialGuessOptions start = InitialGuessOptionsFromFlags();
+  if (!g2o.named_by_edges.empty() &&
+      start.method == InitialGuessMethod::kFile) {
+    if (!gflags::GetCommandLineFlagInfoOrDie("initial_guess").is_default) {
+      throw Error("--initial_guess", 0,
+                  "'file', but " + input->name() + " lists edges only",
+                  "odometry, spanning_tree or chordal");
+    }
+    start.method = InitialGuessMethod::kChordal;
+    Remark("%s: lists edges only: poses start by --initial_guess=chordal",
+           input->name().c_str());
+  }
   if (start.method != InitialGuessMethod::kFile) {
     const double start_begin = Now();
     const InitialGuessReport made = MakeInitialGuess(start, &graph);
@@ -328,6 +395,11 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   options.session.fast_removal = options.structure;
   SolverSession session(&graph, registry, options.session);
   const CostReport initial_cost = session.Cost();
+  if (!std::isfinite(initial_cost.total())) {
+    throw Error(input->name(), 0,
+                "the sum of squared residuals at the start is no finite number",
+                "smaller values, or less information");
+  }
   EmOrchestrator em(&graph, &session, registry, std::move(hierarchy),
                     options.em);
   em.SetTrace([&](const EmPhase& phase) {
@@ -366,8 +438,8 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin) {
   outcome.without_structure = [&] {
     return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
   };
-  outcome.title = std::filesystem::path(input->name()).filename().string();
-  WriteOutputs(&outcome, begin);
+  outcome.title = TitleOf(*input);
+  WriteOutputs(&outcome, begin, folder);
   return kExitSuccess;
 }
 
@@ -408,23 +480,17 @@ int Run() {
   // What nobody recognizes is for the reader of the commonest format to refuse:
   // it says what it found.
   if (reader == nullptr) reader = &registry.Get<LogReaderType>("carmen");
-  std::error_code error;
-  std::filesystem::create_directories(FLAGS_output_dir, error);
-  if (error || !std::filesystem::is_directory(FLAGS_output_dir)) {
-    throw Error(FLAGS_output_dir, 0,
-                "cannot make the output folder" +
-                    (error ? " (" + error.message() + ")" : std::string()),
-                "a folder that can be written to");
+  // What is wrong with the folder is said before the work, not after it.
+  OutputFolder folder(FLAGS_output_dir, NamesOfAllOutputs(registry),
+                      InputFiles());
+  folder.CheckTargets(
+      FilesOfOutputs(SelectOutputs(FLAGS_outputs, registry), registry));
+  if (!folder.cleaned().empty()) {
+    Remark("%s: removed what a run that was killed had left: %s",
+           FLAGS_output_dir.c_str(), Joined(folder.cleaned()).c_str());
   }
-  // Said before the work, not after it.
-  if (access(FLAGS_output_dir.c_str(), W_OK | X_OK) != 0) {
-    throw Error(FLAGS_output_dir, 0,
-                std::string("cannot write to the output folder (") +
-                    std::strerror(errno) + ")",
-                "a folder that can be written to");
-  }
-  return is_graph ? SolveGraph(&input, registry, begin)
-                  : SolveLog(&input, *reader, registry, begin);
+  return is_graph ? SolveGraph(&input, registry, begin, &folder)
+                  : SolveLog(&input, *reader, registry, begin, &folder);
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
+#include <plumbline/core/parallel_for.h>
+#include <plumbline/core/sha256.h>
 #include <plumbline/frontend/tum.h>
 #include <plumbline/outputs/em_trace.h>
 #include <plumbline/outputs/floor_plan.h>
@@ -14,15 +16,10 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <exception>
-#include <fstream>
 #include <functional>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
-#include <system_error>
-#include <thread>
 #include <utility>
 
 namespace plumbline {
@@ -91,42 +88,35 @@ auto Always(Write write) {
   };
 }
 
-// Runs the tasks on so many threads; the first exception, in the order of
-// tasks, is thrown again when all have ended. `progress` is told how many are
-// done.
-void RunTasks(const std::vector<std::function<void()>>& tasks, int threads,
-              const std::function<void(int, int)>& progress) {
-  std::vector<std::exception_ptr> failures(tasks.size());
-  std::mutex mutex;
-  std::size_t next = 0;
-  int done = 0;
-  auto work = [&] {
-    for (;;) {
-      std::size_t index;
-      {
-        std::lock_guard<std::mutex> lock(mutex);
-        if (next == tasks.size()) return;
-        index = next++;
-      }
-      try {
-        tasks[index]();
-      } catch (...) {
-        failures[index] = std::current_exception();
-      }
-      std::lock_guard<std::mutex> lock(mutex);
-      ++done;
-      if (progress) progress(done, static_cast<int>(tasks.size()));
+// What a writer came to.
+struct WriteResult {
+  std::string reason;
+  // Why it failed; empty when it did not.
+  std::string failure;
+  std::map<std::string, std::string> digests;
+};
+
+WriteResult RunWriter(const OutputWriterType& writer,
+                      const SolveOutcome& outcome, const path& folder) {
+  WriteResult result;
+  try {
+    result.reason = writer.write(outcome, folder);
+  } catch (const Error& error) {
+    result.failure = error.what();
+    return result;
+  }
+  if (!result.reason.empty()) return result;
+  std::vector<std::string> names = writer.further_files;
+  names.push_back(writer.name);
+  for (const std::string& name : names) {
+    result.digests[name] = Sha256OfFile((folder / name).string());
+    if (result.digests[name].empty()) {
+      result.failure = Error((folder / name).string(), 0, "was not written",
+                             "a file that its writer wrote")
+                           .what();
     }
-  };
-  std::vector<std::thread> pool;
-  for (int i = 1; i < threads && i < static_cast<int>(tasks.size()); ++i) {
-    pool.emplace_back(work);
   }
-  work();
-  for (std::thread& thread : pool) thread.join();
-  for (const std::exception_ptr& failure : failures) {
-    if (failure) std::rethrow_exception(failure);
-  }
+  return result;
 }
 
 }  // namespace
@@ -237,6 +227,17 @@ std::set<std::string> SelectOutputs(const std::string& list,
   return selected;
 }
 
+std::set<std::string> FilesOfOutputs(const std::set<std::string>& names,
+                                     const Registry& registry) {
+  std::set<std::string> files;
+  for (const std::string& name : names) {
+    const auto& writer = registry.Get<OutputWriterType>(name);
+    files.insert(writer.name);
+    files.insert(writer.further_files.begin(), writer.further_files.end());
+  }
+  return files;
+}
+
 WrittenOutputs WriteSolveOutputs(
     const SolveOutcome& outcome, const std::set<std::string>& names,
     const path& folder, int threads,
@@ -248,55 +249,39 @@ WrittenOutputs WriteSolveOutputs(
     if (output->of_scans && outcome.trajectory.empty()) continue;
     selected.push_back(output);
   }
-  std::vector<std::string> reasons(selected.size());
-  std::vector<std::function<void()>> tasks;
-  for (std::size_t i = 0; i < selected.size(); ++i) {
-    tasks.push_back([&reasons, &selected, &outcome, &folder, i] {
-      reasons[i] = selected[i]->write(outcome, folder);
-    });
-  }
-  RunTasks(tasks, threads, progress);
+  std::vector<WriteResult> results(selected.size());
+  std::mutex mutex;
+  int done = 0;
+  ParallelFor(selected.size(), threads, [&](std::size_t i) {
+    results[i] = RunWriter(*selected[i], outcome, folder);
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++done;
+    if (progress) progress(done, static_cast<int>(selected.size()));
+  });
   WrittenOutputs written;
+  std::string failure, others;
   for (std::size_t i = 0; i < selected.size(); ++i) {
-    if (!reasons[i].empty()) {
+    if (!results[i].failure.empty()) {
+      if (failure.empty()) {
+        failure = results[i].failure;
+      } else {
+        others += (others.empty() ? "" : ", ") + selected[i]->name;
+      }
+    } else if (!results[i].reason.empty()) {
       written.reasons.push_back(selected[i]->name +
-                                " not written: " + reasons[i]);
-      continue;
+                                " not written: " + results[i].reason);
     }
-    written.files.push_back(selected[i]->name);
-    written.files.insert(written.files.end(),
-                         selected[i]->further_files.begin(),
-                         selected[i]->further_files.end());
+    for (const auto& [name, digest] : results[i].digests) {
+      written.files.push_back(name);
+      written.digests[name] = digest;
+    }
+  }
+  if (!failure.empty()) {
+    if (!others.empty()) failure += "; so with " + others;
+    throw Error("no file is replaced", 0, failure, "");
   }
   std::sort(written.files.begin(), written.files.end());
   return written;
-}
-
-std::vector<std::string> RemoveOutputsOfEarlierRun(
-    const path& folder, const std::vector<std::string>& written) {
-  std::vector<std::string> removed;
-  std::ifstream file(folder / "summary.json");
-  const auto json = nlohmann::json::parse(file, nullptr, false);
-  if (!json.is_object()) return removed;
-  const auto files = json.find("files");
-  if (files == json.end() || !files->is_array()) return removed;
-  for (const auto& entry : *files) {
-    if (!entry.is_string()) continue;
-    const std::string name = entry.get<std::string>();
-    // A name in this folder and nothing that leads out of it.
-    if (name.empty() || name == "." || name == ".." ||
-        name.find('/') != std::string::npos || name == "summary.json" ||
-        std::count(written.begin(), written.end(), name) > 0) {
-      continue;
-    }
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(
-            std::filesystem::symlink_status(folder / name, error))) {
-      continue;
-    }
-    if (std::filesystem::remove(folder / name, error)) removed.push_back(name);
-  }
-  return removed;
 }
 
 }  // namespace plumbline

@@ -10,6 +10,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -47,25 +48,23 @@ std::set<std::string> SelectOutputs(const std::string& list,
 struct WrittenOutputs {
   /// Names of the files, in order.
   std::vector<std::string> files;
+  /// SHA-256 of each by name, in hexadecimal digits.
+  std::map<std::string, std::string> digests;
   /// A line for each that made no sense, with why.
   std::vector<std::string> reasons;
 };
 
-/// Writes the files selected on so many threads; throws Error when a file
-/// cannot be written. `progress` (may be null) is told how many are done and
-/// how many there are, by one thread at a time.
+/// Names of all files that these writers write, further ones included.
+std::set<std::string> FilesOfOutputs(const std::set<std::string>& names,
+                                     const Registry& registry);
+
+/// Writes the files selected on so many threads; throws Error that names all
+/// files that cannot be written. `progress` (may be null) is told how many are
+/// done and how many there are, by one thread at a time.
 WrittenOutputs WriteSolveOutputs(
     const SolveOutcome& outcome, const std::set<std::string>& names,
     const std::filesystem::path& folder, int threads,
     const std::function<void(int, int)>& progress = nullptr);
-
-/// Removes from a folder what an earlier run wrote and this one did not: the
-/// regular files that the summary.json there names as its own ("files"), but
-/// for those in `written`. Returns their names. Without a summary.json of that
-/// kind nothing is removed, since nothing says whose the files are.
-std::vector<std::string> RemoveOutputsOfEarlierRun(
-    const std::filesystem::path& folder,
-    const std::vector<std::string>& written);
 
 }  // namespace plumbline
 

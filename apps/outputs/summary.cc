@@ -213,6 +213,11 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
                       {"broken", summary.closures.broken}};
   json["version"] = kVersion;
   json["files"] = summary.files;
+  json["sha256"] = summary.digests;
+  json["partial"] = summary.partial;
+  if (summary.partial && summary.scans_in_log > 0) {
+    json["scans_in_log"] = summary.scans_in_log;
+  }
   if (summary.solver) {
     const Summary::Solver& solver = *summary.solver;
     json["solver"] = {

@@ -53,10 +53,16 @@ struct Summary {
   std::uint64_t seed = 1;
   /// Those that differ from the defaults: ChangedFlags().
   std::vector<FlagValue> flags;
-  /// Names of the files that the run wrote beside this one.
+  /// Names of the files that the run wrote beside this one, and their SHA-256
+  /// digests by name.
   std::vector<std::string> files;
+  std::map<std::string, std::string> digests;
+  /// The run was interrupted: the files hold what was done until then.
+  bool partial = false;
 
   std::int64_t scans = 0;
+  /// Scans that were read; of a log only.
+  std::int64_t scans_in_log = 0;
   /// By type name and level.
   std::map<std::string, std::map<int, std::int64_t>> features;
   /// By relation name.
@@ -124,12 +130,14 @@ void CountGraph(const Graph& graph, Summary* summary);
 /// structure, broken}}}, cost {initial, measurement, structure, total}, em
 /// {iterations, converged}, time_s {total, parse, frontend, detect, solve,
 /// write}, peak_memory_bytes, orthogonality_deg (null when there is no wall),
-/// closures {proposed, live, broken}, version, files; for a graph also solver
-/// {objective (cost.total), iterations, solves, converged, evaluation_s,
-/// linear_solver_s, setup_s, start {poses, landmarks, kept, seconds}}; for a
-/// log also frontend {skipped [{reason, count, first_lines}],
-/// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
-/// (their quotient)}. Numbers that are not finite become null.
+/// closures {proposed, live, broken}, version, files, sha256 {file}, partial
+/// (the run was interrupted; for a log `scans` then says how many were solved,
+/// and `scans_in_log` how many there are); for a graph also solver {objective
+/// (cost.total), iterations, solves, converged, evaluation_s, linear_solver_s,
+/// setup_s, start {poses, landmarks, kept, seconds}}; for a log also frontend
+/// {skipped [{reason, count, first_lines}], scan_seconds_second_tenth,
+/// scan_seconds_last_tenth, scan_seconds_growth (their quotient)}. Numbers that
+/// are not finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// The same into a file, whole or not at all. Throws Error when it cannot be

@@ -4,6 +4,8 @@
 #include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/graph_json.h>
+#include <plumbline/core/sha256.h>
+#include <plumbline/core/utf8.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/tum.h>
@@ -113,6 +115,42 @@ bool IsWellFormed(const std::string& xml) {
   return open.empty() && roots == 1;
 }
 
+// The six fields of poses come after the beams.
+std::string Flaser(const std::vector<std::string>& ranges, double x,
+                   double stamp) {
+  std::ostringstream line;
+  line << "FLASER " << ranges.size();
+  for (const std::string& range : ranges) line << " " << range;
+  for (int i = 0; i < 2; ++i) line << " " << x << " 0 0";
+  line << " " << stamp << " host " << stamp;
+  return line.str();
+}
+
+// Ranges in a room of 8 m x 6 m from (x, 0) along +x.
+std::vector<std::string> RoomRanges(double x, int beams) {
+  std::vector<std::string> ranges;
+  for (int i = 0; i < beams; ++i) {
+    const double angle = DegToRad(-90.0 + i * (beams > 181 ? 0.5 : 1.0)) + 1e-6;
+    const double ahead =
+        std::cos(angle) > 1e-9 ? (4.0 - x) / std::cos(angle) : 1e9;
+    const double side = 3.0 / std::max(1e-9, std::abs(std::sin(angle)));
+    std::ostringstream range;
+    range.precision(3);
+    range << std::fixed << std::min(ahead, side);
+    ranges.push_back(range.str());
+  }
+  return ranges;
+}
+
+// Without what XML 1.0 cannot hold, line by line.
+std::string KeepPrintable(const std::string& text) {
+  std::string kept;
+  for (const std::string& line : Lines(text)) {
+    kept += PrintableUtf8(line) + "\n";
+  }
+  return kept;
+}
+
 // Runs the binary in a folder of its own.
 class SolveTest : public ::testing::Test {
  protected:
@@ -191,6 +229,8 @@ class SolveTest : public ::testing::Test {
         json.erase("time_s");
         json.erase("peak_memory_bytes");
         json.erase("flags");
+        // Some files have times in them.
+        json.erase("sha256");
         if (json.contains("solver")) {
           for (const char* key :
                {"evaluation_s", "linear_solver_s", "setup_s"}) {
@@ -544,8 +584,9 @@ TEST_F(SolveTest, FilesOfAnEarlierRun) {
   EXPECT_EQ(Files("out"), (Names{"elsewhere", "graph.g2o", "map.json",
                                  "map.svg", "notes.txt", "summary.json"}));
   EXPECT_EQ(Files("out/elsewhere"), Names{"map.png"});
-  EXPECT_THAT(output, HasSubstr("removed report.html of an earlier run\n"));
-  EXPECT_THAT(output, Not(HasSubstr("removed map.json")));
+  EXPECT_THAT(output, HasSubstr("map.svg (no regular file)\n"));
+  EXPECT_THAT(output, HasSubstr(", report.html, trajectory.tum\n"));
+  EXPECT_THAT(output, Not(HasSubstr("map.json")));
 
   // A graph has no path of scans.
   ASSERT_EQ(Solve(log, "both", "", &output), 0) << output;
@@ -559,31 +600,100 @@ TEST_F(SolveTest, FilesOfAnEarlierRun) {
   EXPECT_EQ(Files("both"), FilesOfAGraph());
 }
 
-// What no run wrote is not removed, whatever stands in the summary.
-TEST(RemoveOutputsTest, NamesThatLeadElsewhere) {
-  const fs::path folder = fs::path(::testing::TempDir()) / "remove_outputs";
-  fs::remove_all(folder);
-  fs::create_directories(folder / "in/map.json");
-  for (const char* name : {"kept", "in/a", "in/b"}) {
-    std::ofstream(folder / name) << name;
+// The thesis of somebody who runs the program in its folder.
+TEST_F(SolveTest, NothingOfOthersIsRemoved) {
+  const std::string log = Write("office.log", Join(OfficeLines(60)));
+  std::string output;
+  fs::create_directories(folder_ / "out");
+  Write("out/thesis.tex", "years of work");
+  Write("out/map.svg", "drawn by hand");
+  Write("out/summary.json", R"({"files": ["thesis.tex", "map.svg"]})");
+  ASSERT_EQ(Solve(log, "out", "--outputs=map.json", &output), 0) << output;
+  EXPECT_EQ(Out("out", "thesis.tex"), "years of work");
+  EXPECT_EQ(Out("out", "map.svg"), "drawn by hand");
+  EXPECT_THAT(output, HasSubstr("map.svg (written by a version"));
+
+  // A run's own file, edited afterwards.
+  ASSERT_EQ(Solve(log, "out", "--outputs=map.json,map.svg", &output), 0);
+  Write("out/map.svg", "edited");
+  ASSERT_EQ(Solve(log, "out", "--outputs=map.json", &output), 0) << output;
+  EXPECT_EQ(Out("out", "map.svg"), "edited");
+  EXPECT_THAT(output, HasSubstr("map.svg (changed since it was written)"));
+}
+
+TEST_F(SolveTest, TheInputIsNeitherRemovedNorReplaced) {
+  const std::string log = Write("office.log", Join(OfficeLines(60)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "out", "", &output), 0) << output;
+  const std::string graph = Out("out", "graph.g2o");
+  const std::string path = (folder_ / "out/graph.g2o").string();
+  ASSERT_EQ(Solve(path, "out", "--outputs=map.json", &output), 0) << output;
+  EXPECT_TRUE(Out("out", "graph.g2o") == graph);
+  EXPECT_THAT(output, HasSubstr("graph.g2o (read by this run)"));
+  EXPECT_THAT(output, HasSubstr("removed of an earlier run: em_trace.csv"));
+  for (const std::string& input : {"'" + path + "'", "- <'" + path + "'"}) {
+    EXPECT_EQ(Run("--output_dir='" + (folder_ / "out").string() +
+                      "' --input=" + input,
+                  &output),
+              2);
+    EXPECT_THAT(output, HasSubstr("graph.g2o: is read by this run"));
+    EXPECT_TRUE(Out("out", "graph.g2o") == graph);
   }
-  for (const std::string text :
-       {"", "{", "[]", "{\"files\": 3}", "{\"files\": {\"a\": \"a\"}}",
-        "{\"files\": [1, null, \"\", \".\", \"..\", \"../kept\", "
-        "\"map.json\", \"b\", \"gone\", \"summary.json\"]}"}) {
-    std::ofstream(folder / "in/summary.json") << text;
-    EXPECT_TRUE(RemoveOutputsOfEarlierRun(folder / "in", {"b"}).empty())
-        << text;
+}
+
+// A summary's digests are those of the files beside it.
+void ExpectWhole(const fs::path& folder) {
+  const auto summary = nlohmann::json::parse(ReadFile(folder / "summary.json"));
+  EXPECT_EQ(summary["partial"], false);
+  EXPECT_EQ(summary["sha256"].size(), summary["files"].size());
+  for (const auto& [name, digest] : summary["sha256"].items()) {
+    EXPECT_EQ(digest, Sha256OfFile((folder / name).string())) << name;
   }
-  std::ofstream(folder / "in/summary.json") << "{\"files\": [\"b\", \"a\"]}";
-  EXPECT_EQ(RemoveOutputsOfEarlierRun(folder / "in", {"b"}),
-            std::vector<std::string>{"a"});
-  for (const char* name : {"kept", "in/b", "in/map.json", "in/summary.json"}) {
-    EXPECT_TRUE(fs::exists(folder / name)) << name;
+}
+
+// Files of limited size stand for a disk that is full.
+TEST_F(SolveTest, AFullDiskLeavesTheEarlierRunWhole) {
+  const std::string log = Write("office.log", Join(OfficeLines(60)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "out", "", &output), 0) << output;
+  ExpectWhole(folder_ / "out");
+  const auto before = Comparable("out");
+  const std::string command =
+      "trap '' XFSZ; ulimit -f 40; '" + binary_ + "' --input='" + log +
+      "' --output_dir='" + (folder_ / "out").string() + "' --delta_threshold=1";
+  EXPECT_EQ(RunInShell(command, &output), 2);
+  EXPECT_THAT(output, HasSubstr("File too large"));
+  EXPECT_THAT(output, HasSubstr("; so with "));
+  EXPECT_THAT(output, HasSubstr("no file is replaced"));
+  EXPECT_THAT(output, Not(HasSubstr(".plumbline_files")));
+  ExpectWhole(folder_ / "out");
+  EXPECT_TRUE(before == Comparable("out"));
+  EXPECT_EQ(Files("out"), FilesOfALog());
+}
+
+TEST_F(SolveTest, KilledRunsLeaveWholeFolders) {
+  const std::string log = Write("office.log", Join(OfficeLines(60)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "out", "", &output), 0) << output;
+  const std::string out = "--output_dir=" + (folder_ / "out").string();
+  const std::string input = "--input=" + log;
+  for (int i = 0; i < 10; ++i) {
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      execl(binary_.c_str(), binary_.c_str(), input.c_str(), out.c_str(),
+            "--quiet", static_cast<char*>(nullptr));
+      _exit(99);
+    }
+    usleep(30000 * i);
+    kill(child, SIGKILL);
+    ASSERT_EQ(waitpid(child, nullptr, 0), child);
+    if (SummaryOf("out").contains("mixed")) continue;
+    ExpectWhole(folder_ / "out");
   }
-  EXPECT_FALSE(fs::exists(folder / "in/a"));
-  EXPECT_TRUE(RemoveOutputsOfEarlierRun(folder / "nowhere", {}).empty());
-  fs::remove_all(folder);
+  ASSERT_EQ(Solve(log, "out", "", &output), 0) << output;
+  ExpectWhole(folder_ / "out");
+  EXPECT_EQ(Files("out"), FilesOfALog());
 }
 
 // Said, since a reader of the command would think otherwise.
@@ -718,7 +828,9 @@ TEST_F(SolveTest, InterruptedRunsWriteWhatTheyHave) {
   for (const std::string& name : FilesOfAGraph()) {
     EXPECT_EQ(files.count(name), 1u) << name;
   }
-  EXPECT_EQ(SummaryOf("out")["counts"]["scans"], 0);
+  const auto summary = SummaryOf("out");
+  EXPECT_EQ(summary["counts"]["scans"], 0);
+  EXPECT_EQ(summary["partial"], true);
 }
 
 // Nothing more comes, and the pipe stays open.
@@ -872,6 +984,142 @@ TEST_F(SolveTest, StartsOfAGraph) {
       << output;
   EXPECT_FALSE(SummaryOf("short")["solver"]["converged"]);
   EXPECT_THAT(output, HasSubstr("--max_solver_iterations"));
+}
+
+// TORO's tags, and files in circulation that list relative poses only.
+TEST_F(SolveTest, GraphsWithoutVertices) {
+  const std::string edges =
+      "EDGE_SE2 0 1 1 0 1.5707963267948966 100 0 0 100 0 1000\n"
+      "EDGE_SE2 1 2 1 0 1.5707963267948966 100 0 0 100 0 1000\n"
+      "EDGE_SE2 0 2 1 1 3.141592653589793 100 0 0 100 0 1000\n";
+  const std::string toro =
+      "VERTEX2 0 0 0 0\nVERTEX2 1 1 0 1.57\nVERTEX2 2 1 1 3.14\n"
+      "EDGE2 0 1 1 0 1.5707963267948966 100 0 100 1000 0 0\n"
+      "EDGE2 1 2 1 0 1.5707963267948966 100 0 100 1000 0 0\n";
+  std::string output;
+  for (const auto& [name, text] : std::map<std::string, std::string>{
+           {"edges.g2o", edges},
+           {"toro.graph", toro},
+           {"bom.g2o", "\xEF\xBB\xBF" + edges}}) {
+    ASSERT_EQ(Solve(Write(name, text), "out", "--structure=false", &output), 0)
+        << name << output;
+    EXPECT_EQ(output.find("lists edges only") != std::string::npos,
+              name != "toro.graph");
+    CheckFiles("out", FilesOfAGraph());
+    Graph graph;
+    std::istringstream solved(Out("out", "graph.g2o"));
+    ReadG2o(solved, "graph.g2o", registry_, &graph);
+    ASSERT_EQ(graph.num_features(), 3u) << name;
+    EXPECT_NEAR(graph.GetFeature(2).parameters[0], 1.0, 1e-6);
+    EXPECT_NEAR(graph.GetFeature(2).parameters[1], 1.0, 1e-6);
+  }
+  const std::string path = (folder_ / "edges.g2o").string();
+  EXPECT_EQ(Solve(path, "out", "--initial_guess=file", &output), 2);
+  EXPECT_THAT(output, HasSubstr("lists edges only"));
+  EXPECT_EQ(Solve(path, "out", "--initial_guess=spanning_tree", &output), 0);
+  EXPECT_THAT(output, Not(HasSubstr("lists edges only")));
+}
+
+// Names and sources are bytes, whatever they are.
+TEST_F(SolveTest, NamesThatAreNoText) {
+  std::string text = Join(OfficeLines(60));
+  std::string output;
+  for (const std::string name : {"B\xFCro.log", "a\x01\x1b[2J\n<&\".log"}) {
+    const std::string log = Write(name, text);
+    ASSERT_EQ(Solve(log, "out", "--outputs=all", &output), 0) << output;
+    for (const char* picture : {"floorplan.svg", "map.svg"}) {
+      const std::string svg = Out("out", picture);
+      EXPECT_TRUE(IsWellFormed(svg)) << picture;
+      EXPECT_EQ(svg, KeepPrintable(svg)) << picture;
+    }
+    EXPECT_FALSE(
+        nlohmann::json::parse(Out("out", "floorplan.geojson"), nullptr, false)
+            .is_discarded());
+  }
+}
+
+TEST_F(SolveTest, AByteOrderMarkIsNoPartOfALog) {
+  const std::string text = Join(OfficeLines(20));
+  const std::size_t first = text.find("\nFLASER") + 1;
+  std::string output;
+  ASSERT_EQ(Solve(Write("bom.log", "\xEF\xBB\xBF" + text.substr(first)), "out",
+                  "", &output),
+            0)
+      << output;
+  EXPECT_EQ(SummaryOf("out")["counts"]["scans"], 20);
+  EXPECT_TRUE(SummaryOf("out")["frontend"]["skipped"].empty());
+}
+
+// What is written can be read.
+TEST_F(SolveTest, TimeStampsOfAllSpellings) {
+  std::string text;
+  for (const char* stamp : {"1e-400", "+0.5", "1.5", "25e-1"}) {
+    std::string line = Flaser(RoomRanges(0.0, 181), 0.0, 7.0);
+    line.replace(line.find(" 7 host 7"), 9,
+                 std::string(" ") + stamp + " host 7");
+    text += line + "\n";
+  }
+  std::string output;
+  ASSERT_EQ(Solve(Write("stamps.log", text), "out", "", &output), 0) << output;
+  const std::vector<TimedPose> trajectory =
+      ReadTum((folder_ / "out/trajectory.tum").string());
+  ASSERT_EQ(trajectory.size(), 4u);
+  EXPECT_EQ(trajectory[0].timestamp, 0.0);
+  EXPECT_EQ(trajectory[1].timestamp, 0.5);
+  EXPECT_EQ(trajectory[3].timestamp, 2.5);
+}
+
+// Nobody writes to it.
+TEST_F(SolveTest, APipeAsInputAnswersTheFirstInterrupt) {
+  const std::string pipe_name = (folder_ / "pipe").string();
+  ASSERT_EQ(mkfifo(pipe_name.c_str(), 0600), 0);
+  std::string output;
+  EXPECT_EQ(RunInShell("timeout --signal=INT --kill-after=20 1 '" + binary_ +
+                           "' --input='" + pipe_name + "' --output_dir='" +
+                           (folder_ / "out").string() + "'; exit $?",
+                       &output),
+            124);
+  EXPECT_THAT(output, HasSubstr("interrupted"));
+  // And with a writer it is read.
+  const std::string log = Write("office.log", Join(OfficeLines(20)));
+  EXPECT_EQ(
+      RunInShell("(sleep 0.3; cat '" + log + "' >'" + pipe_name + "') & '" +
+                     binary_ + "' --input='" + pipe_name + "' --output_dir='" +
+                     (folder_ / "out").string() + "'",
+                 &output),
+      0)
+      << output;
+  EXPECT_EQ(SummaryOf("out")["counts"]["scans"], 20);
+  // One in the place of an output is refused before the work.
+  fs::create_directories(folder_ / "pipes");
+  ASSERT_EQ(mkfifo((folder_ / "pipes/map.svg").c_str(), 0600), 0);
+  EXPECT_EQ(Solve(log, "pipes", "", &output), 2);
+  EXPECT_THAT(output, HasSubstr("map.svg: is a pipe"));
+}
+
+TEST_F(SolveTest, FlagsThatAreNotUnderstood) {
+  const std::string log = Write("office.log", Join(OfficeLines(20)));
+  std::string output;
+  for (const char* text : {"--sede=3\n", "seed=3\n", "--seed = 3\n", "--seed\n",
+                           "--nostructure=false\n", "\x01\xff\n"}) {
+    const std::string flags = Write("my.flags", text);
+    EXPECT_EQ(Solve(log, "out", "--flagfile='" + flags + "'", &output), 1)
+        << text;
+    EXPECT_THAT(output, HasSubstr("my.flags:1: "));
+    EXPECT_THAT(output, HasSubstr("expected"));
+  }
+  EXPECT_EQ(Solve(log, "out", "--nostructure=false", &output), 1);
+  EXPECT_TRUE(Files("out").empty());
+  ASSERT_EQ(
+      Solve(log, "out",
+            "--flagfile='" + Write("my.flags", "\xEF\xBB\xBF--seed=3\n") + "'",
+            &output),
+      0)
+      << output;
+  EXPECT_EQ(SummaryOf("out")["seed"], 3);
+  // Devices and packed nothing have no end.
+  EXPECT_EQ(Solve(log, "out", "--structure_prior=/dev/zero", &output), 2);
+  EXPECT_THAT(output, HasSubstr("/dev/zero: "));
 }
 
 TEST_F(SolveTest, FrameOfTheInformation) {
@@ -1200,6 +1448,20 @@ TEST_F(SolveTest, BadGraphsOfPoints) {
 }
 
 // Nothing at all is no graph.
+// Numbers that are finite and have squares that are not.
+TEST_F(SolveTest, ObjectivesThatOverflow) {
+  std::string output;
+  for (const char* text : {"VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1e200 0 0\n"
+                           "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n",
+                           "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n"
+                           "EDGE_SE2 0 1 1e200 0 0 1 0 0 1 0 1\n"}) {
+    EXPECT_EQ(Solve(Write("large.g2o", text), "out", "", &output), 2) << text;
+    EXPECT_THAT(output, HasSubstr("large.g2o: the sum of squared residuals"));
+    EXPECT_THAT(output, HasSubstr("expected"));
+  }
+  EXPECT_TRUE(Files("out").empty());
+}
+
 TEST_F(SolveTest, NoGraph) {
   std::string output;
   for (const char* const text : {"", "\n\n", "# nothing\n"}) {
@@ -1426,33 +1688,6 @@ TEST_F(SolveTest, GarbledGraphs) {
     EXPECT_THAT(output, HasSubstr("expected"));
   }
   EXPECT_TRUE(Files("out").empty());
-}
-
-// The six fields of poses come after the beams.
-std::string Flaser(const std::vector<std::string>& ranges, double x,
-                   double stamp) {
-  std::ostringstream line;
-  line << "FLASER " << ranges.size();
-  for (const std::string& range : ranges) line << " " << range;
-  for (int i = 0; i < 2; ++i) line << " " << x << " 0 0";
-  line << " " << stamp << " host " << stamp;
-  return line.str();
-}
-
-// Ranges in a room of 8 m x 6 m from (x, 0) along +x.
-std::vector<std::string> RoomRanges(double x, int beams) {
-  std::vector<std::string> ranges;
-  for (int i = 0; i < beams; ++i) {
-    const double angle = DegToRad(-90.0 + i * (beams > 181 ? 0.5 : 1.0)) + 1e-6;
-    const double ahead =
-        std::cos(angle) > 1e-9 ? (4.0 - x) / std::cos(angle) : 1e9;
-    const double side = 3.0 / std::max(1e-9, std::abs(std::sin(angle)));
-    std::ostringstream range;
-    range.precision(3);
-    range << std::fixed << std::min(ahead, side);
-    ranges.push_back(range.str());
-  }
-  return ranges;
 }
 
 TEST_F(SolveTest, NoOdometryAtAll) {

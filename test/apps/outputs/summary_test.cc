@@ -183,10 +183,11 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
 
   std::vector<std::string> keys;
   for (const auto& entry : json.items()) keys.push_back(entry.key());
-  EXPECT_EQ(keys, (std::vector<std::string>{
-                      "input", "seed", "flags", "counts", "cost", "em",
-                      "time_s", "peak_memory_bytes", "orthogonality_deg",
-                      "closures", "version", "files", "frontend"}));
+  EXPECT_EQ(keys,
+            (std::vector<std::string>{
+                "input", "seed", "flags", "counts", "cost", "em", "time_s",
+                "peak_memory_bytes", "orthogonality_deg", "closures", "version",
+                "files", "sha256", "partial", "frontend"}));
   EXPECT_EQ(json["input"], "a\xEF\xBF\xBD.clf");
   EXPECT_EQ(json["seed"], 18446744073709551615u);
   EXPECT_EQ(json["flags"].dump(),
@@ -210,6 +211,25 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
             R"({"skipped":[{"reason":"too short","count":2,)"
             R"("first_lines":[7,9]}],"scan_seconds_second_tenth":2.5,)"
             R"("scan_seconds_last_tenth":18.5,"scan_seconds_growth":7.4})");
+}
+
+TEST(SummaryTest, APartOfARunSaysSo) {
+  Summary summary;
+  summary.scans = 389;
+  summary.scans_in_log = 1408;
+  summary.files = {"map.json"};
+  summary.digests = {{"map.json", "0123"}};
+  const auto write = [&] {
+    std::ostringstream output;
+    WriteSummary(summary, output);
+    return nlohmann::json::parse(output.str());
+  };
+  EXPECT_EQ(write()["partial"], false);
+  EXPECT_FALSE(write().contains("scans_in_log"));
+  EXPECT_EQ(write()["sha256"].dump(), R"({"map.json":"0123"})");
+  summary.partial = true;
+  EXPECT_EQ(write()["partial"], true);
+  EXPECT_EQ(write()["scans_in_log"], 1408);
 }
 
 TEST(SummaryTest, AGraphHasNoFrontend) {

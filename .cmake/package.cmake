@@ -60,4 +60,24 @@ foreach(component runtime development)
     DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/${package} COMPONENT ${component})
 endforeach()
 
+# Pages, under each other as in the source so that their links hold, and
+# examples: projects that build against the installed package.
+set(documents ${CMAKE_INSTALL_DATAROOTDIR}/doc/libplumbline-dev)
+foreach(page README.md core/graph_files.md core/method.md core/plugins.md factors/relations.md
+        datasets/README.md datasets/RESULTS.md datasets/sweeps/README.md)
+  get_filename_component(folder ${page} DIRECTORY)
+  install(FILES ${PROJECT_SOURCE_DIR}/${page}
+    DESTINATION ${documents}/${folder} COMPONENT development)
+endforeach()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/datasets/pictures
+  DESTINATION ${documents}/datasets COMPONENT development)
+install(FILES ${PROJECT_SOURCE_DIR}/datasets/office.clf.gz
+  DESTINATION ${documents}/datasets COMPONENT development)
+foreach(example bare_problem log_to_floor_plan orchestrator plugin scan_by_scan)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/test/consumer/${example}
+    DESTINATION ${documents}/examples/consumer COMPONENT development)
+endforeach()
+install(FILES ${PROJECT_SOURCE_DIR}/test/consumer/CMakeLists.txt
+  DESTINATION ${documents}/examples/consumer COMPONENT development)
+
 include(CPack)

@@ -12,7 +12,7 @@ namespace plumbline {
 struct RelationPrior {
   /// False: proposals of it are left out.
   bool is_expected = true;
-  /// Standard deviations that take the place of the detector's, one a row, in
+  /// Standard deviations that take the place of the detector's, one per row, in
   /// the units of the rows; empty: as the detector has it.
   std::vector<double> sigmas;
 };

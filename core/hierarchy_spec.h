@@ -12,6 +12,7 @@ struct HierarchySpec {
   /// levels[0] reads level 0.
   std::vector<std::vector<std::string>> levels;
 
+  /// True when no level is there: nothing is detected.
   bool empty() const { return levels.empty(); }
   /// Whether any level has this detector.
   bool Contains(const std::string& detector) const;

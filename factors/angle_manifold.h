@@ -20,9 +20,11 @@ class WrappedAngleManifold : public ceres::Manifold {
  public:
   static_assert(0 <= kAngle && kAngle < kSize, "no such parameter");
 
+  /// Number of parameters, as they are and as steps.
   int AmbientSize() const override { return kSize; }
   int TangentSize() const override { return kSize; }
 
+  /// x with delta added, the angle in (-pi, pi].
   bool Plus(const double* x, const double* delta,
             double* x_plus_delta) const override {
     for (int i = 0; i < kSize; ++i) x_plus_delta[i] = x[i] + delta[i];
@@ -30,11 +32,13 @@ class WrappedAngleManifold : public ceres::Manifold {
     return true;
   }
 
+  /// The identity.
   bool PlusJacobian(const double* /*x*/, double* jacobian) const override {
     SetIdentity(jacobian);
     return true;
   }
 
+  /// Copies the matrix.
   bool RightMultiplyByPlusJacobian(const double* /*x*/, const int num_rows,
                                    const double* ambient_matrix,
                                    double* tangent_matrix) const override {
@@ -43,6 +47,7 @@ class WrappedAngleManifold : public ceres::Manifold {
     return true;
   }
 
+  /// y - x, the difference of angles in (-pi, pi].
   bool Minus(const double* y, const double* x,
              double* y_minus_x) const override {
     for (int i = 0; i < kSize; ++i) y_minus_x[i] = y[i] - x[i];
@@ -50,6 +55,7 @@ class WrappedAngleManifold : public ceres::Manifold {
     return true;
   }
 
+  /// The identity.
   bool MinusJacobian(const double* /*x*/, double* jacobian) const override {
     SetIdentity(jacobian);
     return true;

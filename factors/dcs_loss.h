@@ -34,6 +34,7 @@ class DcsLoss final : public ceres::LossFunction {
     }
   }
 
+  /// As ceres::LossFunction says.
   void Evaluate(double s, double rho[3]) const override {
     if (s <= phi_) {
       rho[0] = s;

@@ -31,6 +31,7 @@ class FrozenDeltaLoss final : public ceres::LossFunction {
     }
   }
 
+  /// As ceres::LossFunction says.
   void Evaluate(double s, double rho[3]) const override {
     rho[0] = *delta_ * s;
     rho[1] = *delta_;
@@ -65,6 +66,7 @@ class ContinuousDeltaLoss final : public ceres::LossFunction {
     internal::CheckDegreesOfFreedom(degrees_of_freedom);
   }
 
+  /// As ceres::LossFunction says.
   void Evaluate(double s, double rho[3]) const override {
     const int k = degrees_of_freedom_;
     const double p_value = ChiSquarePValue(s, k);

@@ -30,6 +30,7 @@ class GemanMcClureLoss final : public ceres::LossFunction {
     }
   }
 
+  /// As ceres::LossFunction says.
   void Evaluate(double s, double rho[3]) const override {
     const double b = squared_scale_;
     const double w = b / (b + s);

@@ -12,7 +12,7 @@ namespace plumbline {
 
 /// Reads a CARMEN log (plain, gzip, bzip2, "-" for standard input) into scans.
 ///
-/// Messages, one a line, `NAME fields... ipc_timestamp ipc_host
+/// Messages, one per line, `NAME fields... ipc_timestamp ipc_host
 /// logger_timestamp` (the ipc_timestamp is the scan's time):
 ///
 ///   FLASER n r1..rn x y theta odom_x odom_y odom_theta

@@ -137,6 +137,8 @@ class GraphBuilder {
     robot_.Correct(localized.pose, localized.observation_information, seen);
   }
 
+  /// The state of the builder, for the kinds of features to work on: the graph,
+  /// the robot in it, and what the functions above return.
   Graph* graph_;
   const Registry& registry_;
   RobotLinks robot_;

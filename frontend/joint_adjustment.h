@@ -52,10 +52,10 @@ struct JointAdjustmentOptions {
 /// or broken, and can go on being found and broken on the graph.
 class JointAdjustment {
  public:
-  /// Puts places into the graph, where `key_poses` say (map frame, one a
+  /// Puts places into the graph, where `key_poses` say (map frame, one per
   /// record). `robot`: the pose that the front-end keeps in the graph, which
-  /// leaves it (kNoId: none). `refined` has one entry a scan. Pointers are not
-  /// owned and must outlive this.
+  /// leaves it (kNoId: none). `refined` has one entry per scan. Pointers are
+  /// not owned and must outlive this.
   JointAdjustment(Graph* graph, SolverSession* session,
                   const Registry& registry, const std::vector<Scan>& scans,
                   const std::vector<RefinedScan>& refined,
@@ -69,8 +69,8 @@ class JointAdjustment {
   /// Throws Error when a solve fails.
   void Adjust(const std::function<bool()>& stop = nullptr);
 
-  /// The key poses as they stand, one a record: those between places by refined
-  /// odometry, what is missing at the next place spread over the way.
+  /// The key poses as they stand, one per record: those between places by
+  /// refined odometry, what is missing at the next place spread over the way.
   std::vector<Pose2> KeyPoses() const;
 
   /// Matches of scans and votes for walls that are live.

@@ -14,7 +14,7 @@ struct MapWithoutStructure {
   /// Where the features of the map with structure lie, by their ids; those that
   /// no counterpart was found for are not there.
   std::map<FeatureId, Feature> features;
-  /// One pose a scan (map frame).
+  /// One pose per scan (map frame).
   std::vector<Pose2> path;
 };
 

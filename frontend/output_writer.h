@@ -23,9 +23,9 @@ struct SolvedRun {
   /// Never null while files are written.
   const Graph* graph = nullptr;
   const Registry* registry = nullptr;
-  /// One pose a scan that was solved (map frame); empty for a graph.
+  /// One pose per scan that was solved (map frame); empty for a graph.
   std::vector<TimedPose> trajectory;
-  /// The log's scans, at least one a pose; null for a graph.
+  /// The log's scans, at least one per pose; null for a graph.
   const std::vector<Scan>* scans = nullptr;
   std::vector<EmPhase> trace;
   /// Comments and unknown tags of a graph's file; null for a log.

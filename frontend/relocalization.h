@@ -34,7 +34,7 @@ std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
 
 /// Poses of all scans: key scans as given, the scans between them by refined
 /// odometry, with what is missing at the next key spread over the way.
-/// `refined` has one entry a scan of the log.
+/// `refined` has one entry per scan of the log.
 std::vector<Pose2> InterpolateScans(const std::vector<RefinedScan>& refined,
                                     const std::vector<KeyScanRecord>& records,
                                     const std::vector<Pose2>& key_poses);

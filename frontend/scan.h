@@ -28,8 +28,8 @@ struct Scan {
   /// Range of the laser, m: readings at or above it (within the reader's
   /// margin) are "no return".
   double maximum_range = 0.0;
-  /// m, one a beam. A reading that is not a return (NaN, negative, zero, at or
-  /// above maximum_range) is stored as 0.
+  /// m, one per beam. A reading that is not a return (NaN, negative, zero, at
+  /// or above maximum_range) is stored as 0.
   std::vector<float> ranges;
   /// Line of the log that it stood on, from 1.
   int line = 0;

@@ -73,7 +73,7 @@ class ScanMatchFinder {
   ScanMatchFinder(const std::vector<Place>& places,
                   const ScanRelationOptions& options);
 
-  /// All relations at these poses: one a place, in one frame, good to within
+  /// All relations at these poses: one per place, in one frame, good to within
   /// the matcher's initial radius where scans overlap. They come in the order
   /// of submaps, then of places. Cost: linear in the places.
   std::vector<ScanRelation> Find(const std::vector<Pose2>& poses);

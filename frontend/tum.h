@@ -11,9 +11,9 @@
 namespace plumbline {
 
 /// Writes a trajectory in the format of the TUM benchmark,
-/// `timestamp x y z qx qy qz qw`: a line a pose, single blanks, no comments, in
-/// the order given. The time stamp is written as the input wrote it, else with
-/// six decimals. Throws Error for a pose that is not finite.
+/// `timestamp x y z qx qy qz qw`: one line per pose, single blanks, no
+/// comments, in the order given. The time stamp is written as the input wrote
+/// it, else with six decimals. Throws Error for a pose that is not finite.
 void WriteTum(const std::vector<TimedPose>& trajectory, std::ostream& output);
 
 /// Reads a trajectory in the TUM format (plain, gzip, bzip2, "-"); comments

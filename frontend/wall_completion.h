@@ -51,8 +51,8 @@ struct WallCompletionOptions {
 /// few beams at a time. Gathers the returns of all scans, at their final
 /// poses, that no wall of the map explains, and grows straight pieces in them.
 /// Returns the transaction that adds them as segments of level 0, bound to
-/// their neighbours by measurements; the graph is not changed. One pose a scan
-/// (map frame). Cost: linear in the returns.
+/// their neighbours by measurements; the graph is not changed. One pose per
+/// scan (map frame). Cost: linear in the returns.
 Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
                               const std::vector<Scan>& scans,
                               const std::vector<Pose2>& poses,

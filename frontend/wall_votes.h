@@ -27,7 +27,7 @@ struct WallVoteOptions {
   /// returns and visits, they share the wall's own errors (panels, frames,
   /// bends) and those of its poses.
   double independence = 0.05;
-  /// Fewer returns of one place on a wall are no vote.
+  /// Fewer returns of one place on a wall do not count as a vote.
   int min_points = 3;
   /// The result does not depend on it.
   int num_threads = 1;
@@ -42,9 +42,9 @@ struct WallVote {
 };
 
 /// Lets every return vote for the wall (segment of level 0) that it hit, its
-/// weight robust; all scans of a place count as one. `poses`: one a place, map
-/// frame. Returns the votes of each place by ascending id of the wall. Cost:
-/// linear in the returns.
+/// weight robust; all scans of a place count as one. `poses`: one per place,
+/// map frame. Returns the votes of each place by ascending id of the wall.
+/// Cost: linear in the returns.
 std::vector<std::vector<WallVote>> CollectWallVotes(
     const Graph& graph, const std::vector<Place>& places,
     const std::vector<Pose2>& poses, const WallVoteOptions& options);

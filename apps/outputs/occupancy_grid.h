@@ -61,6 +61,7 @@ class OccupancyGrid {
   /// bottom (y).
   std::uint8_t Pixel(int column, int row) const;
 
+  /// Columns, rows, and the side of a cell, m.
   int width() const { return width_; }
   int height() const { return height_; }
   double resolution() const { return options_.resolution; }

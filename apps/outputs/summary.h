@@ -42,6 +42,7 @@ std::optional<double> MeanOfTenth(const std::vector<double>& values, int tenth);
 
 /// What a run did, written as summary.json.
 struct Summary {
+  /// Constraints of one relation.
   struct ConstraintCounts {
     /// Live ones by class, and broken ones of either.
     std::int64_t measurement = 0;
@@ -49,6 +50,7 @@ struct Summary {
     std::int64_t broken = 0;
   };
 
+  /// The file that was read, and the seed of all that is drawn at random.
   std::string input;
   std::uint64_t seed = 1;
   /// Those that differ from the defaults: ChangedFlags().
@@ -60,6 +62,7 @@ struct Summary {
   /// The run was interrupted: the files hold what was done until then.
   bool partial = false;
 
+  /// 0 for a graph.
   std::int64_t scans = 0;
   /// Scans that were read; of a log only.
   std::int64_t scans_in_log = 0;
@@ -83,6 +86,7 @@ struct Summary {
   double measurement_cost = 0.0;
   double structure_cost = 0.0;
 
+  /// Iterations of EM on the whole graph, and whether they converged.
   int em_iterations = 0;
   bool em_converged = false;
 
@@ -94,7 +98,9 @@ struct Summary {
   double solve_seconds = 0.0;
   double write_seconds = 0.0;
 
+  /// PeakMemoryBytes().
   std::int64_t peak_memory_bytes = 0;
+  /// How far the directions of walls are from right angles (OrthogonalityDeg).
   std::optional<double> orthogonality_deg;
 
   /// Of a graph only: what the start placed (InitialGuessReport) and all solves

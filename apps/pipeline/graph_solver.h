@@ -62,6 +62,7 @@ class GraphSolver {
       const std::function<bool()>& stop = nullptr,
       const std::function<void(const EmPhase&)>& phase = nullptr);
 
+  /// The session of all solves.
   const SolverSession& session() const { return session_; }
 
  private:

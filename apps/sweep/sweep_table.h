@@ -36,11 +36,11 @@ bool IsMeasuredResource(const std::string& figure);
 /// the shortest way that reads back as the same.
 std::string TableNumber(double value);
 
-/// Writes a row a run that has a record, with a header: run, the axes' flags,
-/// seed, status, reason, and the figures by their names. Left out are figures
-/// that these columns hold already (seed and flags.*) and, without `resources`,
-/// measured time and memory; a figure with the name of an axis becomes
-/// summary.<name>.
+/// Writes a row for each run that has a record, with a header: run, the axes'
+/// flags, seed, status, reason, and the figures by their names. Left out are
+/// figures that these columns hold already (seed and flags.*) and, without
+/// `resources`, measured time and memory; a figure with the name of an axis
+/// becomes summary.<name>.
 void WriteSweepTable(const SweepResult& result, bool resources,
                      std::ostream& output);
 

@@ -42,7 +42,11 @@ expect("${control}" "control of libplumbline-dev" "Package: libplumbline-dev\n"
   "Section: libdevel\n" "Depends: libceres-dev \\(>= 2\\.1\\), libeigen3-dev")
 expect("${contents}" "libplumbline-dev" "/usr/include/plumbline/factors/line_orientation\\.h\n"
   "/libplumbline_core\\.a\n" "/cmake/plumbline/plumblineConfig\\.cmake\n"
-  "/pkgconfig/plumbline-factors\\.pc\n" "/usr/share/doc/libplumbline-dev/copyright\n")
+  "/pkgconfig/plumbline-factors\\.pc\n" "/usr/share/doc/libplumbline-dev/copyright\n"
+  "/usr/share/doc/libplumbline-dev/core/method\\.md\n"
+  "/usr/share/doc/libplumbline-dev/README\\.md\n"
+  "/usr/share/doc/libplumbline-dev/examples/consumer/bare_problem/bare_problem\\.cc\n"
+  "/usr/share/doc/libplumbline-dev/examples/consumer/plugin/CMakeLists\\.txt\n")
 if(contents MATCHES "/bin/")
   message(FATAL_ERROR "libplumbline-dev: ${contents}: expected no binaries")
 endif()

@@ -148,13 +148,16 @@ Json ToleranceOf(const Constraint& constraint) {
   return array;
 }
 
-Json FeaturesToJson(const Report& report, Names* types, Names* sources) {
+// `clusters`: of each wall, the index into MapDrawing::cluster_features.
+Json FeaturesToJson(const Report& report,
+                    const std::map<FeatureId, int>& clusters, Names* types,
+                    Names* sources) {
   const Graph& graph = *report.graph;
   Json id = Json::array(), type = Json::array(), level = Json::array();
   Json is_virtual = Json::array(), source = Json::array();
   Json scans = Json::array(), measured = Json::array();
   Json parameters = Json::array(), after = Json::array();
-  Json before = Json::array();
+  Json before = Json::array(), cluster = Json::array();
   for (const Feature* feature : graph.Features()) {
     // A path is shown as such; thousands of poses would hide the rest.
     if (feature->type->name == "pose") continue;
@@ -172,6 +175,8 @@ Json FeaturesToJson(const Report& report, Names* types, Names* sources) {
     }
     measured.push_back(measurements);
     after.push_back(Geometry(*feature));
+    const auto of_wall = clusters.find(feature->id);
+    cluster.push_back(of_wall == clusters.end() ? -1 : of_wall->second);
     // Walls say all by their ends.
     Json values = nullptr;
     if (after.back().is_null()) {
@@ -196,6 +201,7 @@ Json FeaturesToJson(const Report& report, Names* types, Names* sources) {
   json["measured"] = std::move(measured);
   json["parameters"] = std::move(parameters);
   json["after"] = std::move(after);
+  json["cluster"] = std::move(cluster);
   json["before"] =
       report.before.features.empty() ? Json(nullptr) : std::move(before);
   return json;
@@ -313,7 +319,14 @@ Json DataToJson(const Report& report) {
   for (const SkipReport& skip : summary.skipped) {
     json["skipped"].push_back({{"reason", skip.reason}, {"count", skip.count}});
   }
-  json["features"] = FeaturesToJson(report, &types, &sources);
+  // Colours are those of the map.
+  const MapDrawing drawing = DrawingFromGraph(*report.graph, report.path);
+  std::map<FeatureId, int> clusters;
+  for (const DrawnWall& wall : drawing.walls) {
+    for (const FeatureId member : wall.members) clusters[member] = wall.cluster;
+  }
+  json["clusters"] = drawing.cluster_features;
+  json["features"] = FeaturesToJson(report, clusters, &types, &sources);
   json["structure"] = StructureToJson(*report.graph, &relations, &sources);
   json["types"] = types.ToJson();
   json["sources"] = sources.ToJson();

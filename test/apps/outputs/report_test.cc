@@ -238,6 +238,37 @@ TEST_F(ReportTest, DataOfTheMap) {
   EXPECT_EQ(run["phase_seconds"].size(), 3u);
 }
 
+// A wall that only a rectangle holds has the colour of the rectangle's side, as
+// on the map.
+TEST_F(ReportTest, ColoursAreThoseOfTheMap) {
+  const FeatureId tied = Add("segment", {0, 0, 0}, 0, 9.0);
+  const FeatureId side = Add("segment", {5, 5, 0}, 0, 4.0);
+  const FeatureId across = Add("segment", {5, 5, 0.5 * kPi}, 0, 2.0);
+  const FeatureId free = Add("segment", {5, 9, 1}, 0, 2.0);
+  const FeatureId rectangle = Add("rectangle", {5, 6, 0, 3, 1}, 1);
+  const FeatureId level = Add("orientation", {0.0}, 2);
+  const FeatureId upright = Add("orientation", {0.5 * kPi}, 2);
+  const auto tie = [&](const std::string& relation, FeatureId a, FeatureId b,
+                       std::vector<double> expected) {
+    Tie(relation, {a, b}, std::move(expected), 0.01,
+        ConstraintClass::kStructure);
+  };
+  tie("segment_orientation", tied, level, {0.0});
+  tie("segment_rectangle", side, rectangle, {0.0, 0.0});
+  tie("segment_rectangle", across, rectangle, {0.0, 0.5 * kPi});
+  tie("rectangle_orientation", rectangle, level, {0.0});
+  tie("rectangle_orientation", rectangle, upright, {0.5 * kPi});
+  Report report = MakeReport();
+  const auto data = Script(Text(report), "data");
+  EXPECT_EQ(data["clusters"], nlohmann::json({level, upright}));
+  const auto& cluster = data["features"]["cluster"];
+  EXPECT_EQ(cluster[tied], 0);
+  EXPECT_EQ(cluster[side], 0);
+  EXPECT_EQ(cluster[across], 1);
+  EXPECT_EQ(cluster[free], -1);
+  EXPECT_EQ(cluster[rectangle], -1);
+}
+
 TEST_F(ReportTest, TextInTheDataEndsNothing) {
   MakeCorridor(2);
   Report report = MakeReport();

@@ -1,6 +1,7 @@
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/detectors/merged_walls.h>
 #include <plumbline/detectors/same_wall.h>
 
@@ -17,10 +18,6 @@ using Eigen::Vector2d;
 
 // Lengths below count as this, m.
 constexpr double kLeastLength = 1e-3;
-
-Vector2d Along(const WallPiece& piece) {
-  return {std::cos(piece.pose[2]), std::sin(piece.pose[2])};
-}
 
 double LengthOf(const WallPiece& piece) {
   return std::max(piece.end - piece.begin, kLeastLength);
@@ -47,24 +44,24 @@ WallPiece UnitePieces(const std::vector<WallPiece>& pieces) {
   }
   WallPiece united = longest;
   united.pose[2] = NormalizeAngle(longest.pose[2] + turn / turn_weight);
-  const Vector2d along = Along(united);
-  const Vector2d across(-along.y(), along.x());
-  const Vector2d origin = longest.pose.head<2>();
+  const Wall line = MakeWall(united.pose, 0.0, 0.0);
+  const Vector2d across = line.normal();
   double offset = 0.0;
   double offset_weight = 0.0;
   bool is_first = true;
   for (const WallPiece& piece : pieces) {
-    const Vector2d relative = piece.pose.head<2>() - origin;
-    const Vector2d own = Along(piece);
-    const Vector2d middle = relative + 0.5 * (piece.begin + piece.end) * own;
+    const Wall wall = MakeWall(piece.pose, piece.begin, piece.end);
+    const Vector2d relative = wall.position - line.position;
+    const Vector2d middle =
+        relative + 0.5 * (wall.begin + wall.end) * wall.direction;
     offset += LengthOf(piece) * across.dot(middle);
     offset_weight += LengthOf(piece);
-    for (const double end : {piece.begin, piece.end}) {
-      const double at = along.dot(relative + end * own);
-      united.begin = is_first ? at : std::min(united.begin, at);
-      united.end = is_first ? at : std::max(united.end, at);
-      is_first = false;
-    }
+    const Interval interval = line.IntervalOf(wall);
+    united.begin =
+        is_first ? interval.first : std::min(united.begin, interval.first);
+    united.end =
+        is_first ? interval.second : std::max(united.end, interval.second);
+    is_first = false;
   }
   united.pose.head<2>() += offset / offset_weight * across;
   return united;

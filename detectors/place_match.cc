@@ -1,4 +1,5 @@
 #include <plumbline/core/error.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/detectors/place_match.h>
 
 #include <Eigen/Cholesky>
@@ -36,43 +37,33 @@ constexpr int kSolverRounds = 2;
 // Displacements this close are one, m.
 constexpr double kCell = 0.03;
 
-struct Wall {
-  Vector2d position;
-  Vector2d along;
-  Vector2d normal;
-  double direction;
-  double begin;
-  double end;
-  double noise;
-  int group;
+// A wall of one of the two places, with what its comparison needs.
+struct ComparedWall : Wall {
+  double noise = 0.0;
+  int group = -1;
 };
 
-Wall Prepare(const PlaceWall& wall, const PlaceMatchOptions& options) {
-  Wall prepared;
-  prepared.position = wall.position;
-  prepared.direction = wall.direction;
-  prepared.along = {std::cos(wall.direction), std::sin(wall.direction)};
-  prepared.normal = {-prepared.along.y(), prepared.along.x()};
-  prepared.begin = wall.begin;
-  prepared.end = wall.end;
+ComparedWall Prepare(const PlaceWall& wall, const PlaceMatchOptions& options) {
+  ComparedWall prepared;
+  static_cast<Wall&>(prepared) =
+      MakeWall(wall.position, wall.direction, wall.begin, wall.end);
   prepared.group = wall.group;
   const double length = std::max(wall.end - wall.begin, 0.1);
   prepared.noise = options.direction_noise / (length * std::sqrt(length));
   return prepared;
 }
 
-Wall Move(const Wall& wall, const Vector2d& pivot,
-          const Vector3d& displacement) {
-  Wall moved = wall;
+ComparedWall Move(const ComparedWall& wall, const Vector2d& pivot,
+                  const Vector3d& displacement) {
+  ComparedWall moved = wall;
   const double c = std::cos(displacement[2]);
   const double s = std::sin(displacement[2]);
   Eigen::Matrix2d rotation;
   rotation << c, -s, s, c;
   moved.position =
       pivot + rotation * (wall.position - pivot) + displacement.head<2>();
-  moved.along = rotation * wall.along;
-  moved.normal = rotation * wall.normal;
-  moved.direction = wall.direction + displacement[2];
+  moved.direction = rotation * wall.direction;
+  moved.angle = wall.angle + displacement[2];
   return moved;
 }
 
@@ -86,24 +77,20 @@ struct Comparison {
   double second_middle;
 };
 
-Comparison Compare(const Wall& first, const Wall& second) {
+Comparison Compare(const ComparedWall& first, const ComparedWall& second) {
   Comparison c;
-  c.angle = NormalizeAngle(second.direction - first.direction);
-  const Vector2d begin = second.position + second.begin * second.along;
-  const Vector2d end = second.position + second.end * second.along;
-  const double from = first.along.dot(begin - first.position);
-  const double to = first.along.dot(end - first.position);
+  c.angle = NormalizeAngle(second.angle - first.angle);
+  const double from = first.Along(second.At(second.begin));
+  const double to = first.Along(second.At(second.end));
   const double low = std::max(first.begin, std::min(from, to));
   const double high = std::min(first.end, std::max(from, to));
   c.overlap = high - low;
   c.middle = 0.5 * (low + high);
-  const double cosine = first.along.dot(second.along);
-  const double reference = first.along.dot(second.position - first.position);
+  const double cosine = first.direction.dot(second.direction);
+  const double reference = first.Along(second.position);
   c.second_middle =
       std::abs(cosine) > 0.1 ? (c.middle - reference) / cosine : 0.0;
-  const Vector2d point =
-      second.position + c.second_middle * second.along - first.position;
-  c.offset = first.normal.dot(point);
+  c.offset = first.Across(second.At(c.second_middle));
   return c;
 }
 
@@ -132,8 +119,8 @@ class Matcher {
       Try(Solve({candidates_[i]}));
       for (std::size_t j = 0; j < i; ++j) {
         const double cross =
-            std::abs(std::sin(first_[candidates_[i].first].direction -
-                              first_[candidates_[j].first].direction));
+            std::abs(std::sin(first_[candidates_[i].first].angle -
+                              first_[candidates_[j].first].angle));
         if (cross < std::sin(kParallel)) continue;
         if (candidates_[i].second == candidates_[j].second) continue;
         Try(Solve({candidates_[i], candidates_[j]}));
@@ -171,7 +158,8 @@ class Matcher {
     double worth = 0.0;
   };
 
-  double AngleGate(const Wall& a, const Wall& b, double variance) const {
+  double AngleGate(const ComparedWall& a, const ComparedWall& b,
+                   double variance) const {
     return options_.gate *
            std::sqrt(variance +
                      options_.angle_tolerance * options_.angle_tolerance +
@@ -192,11 +180,10 @@ class Matcher {
     rivals_.resize(second_.size());
     by_second_.resize(second_.size());
     for (std::size_t j = 0; j < second_.size(); ++j) {
-      const Wall& wall = second_[j];
-      const Vector2d middle =
-          wall.position + 0.5 * (wall.begin + wall.end) * wall.along;
-      const double across = Range(wall.normal, middle) + options_.tolerance;
-      const double along = Range(wall.along, middle);
+      const ComparedWall& wall = second_[j];
+      const Vector2d middle = wall.Middle();
+      const double across = Range(wall.normal(), middle) + options_.tolerance;
+      const double along = Range(wall.direction, middle);
       ranges_[j] = across;
       std::vector<double> offsets;
       for (std::size_t i = 0; i < first_.size(); ++i) {
@@ -206,7 +193,7 @@ class Matcher {
         }
         if (c.overlap + along < options_.min_overlap) continue;
         const Vector2d to_first = first_[i].position - middle;
-        const double offset = -first_[i].normal.dot(to_first);
+        const double offset = -first_[i].normal().dot(to_first);
         if (std::abs(offset) > across) continue;
         by_second_[j].push_back(static_cast<int>(i));
         candidates_.push_back({static_cast<int>(i), static_cast<int>(j)});
@@ -236,20 +223,21 @@ class Matcher {
       Matrix3d normal = prior_;
       Vector3d right = -prior_ * displacement;
       for (const Candidate& pair : pairs) {
-        const Wall& first = first_[pair.first];
-        const Wall moved = Move(second_[pair.second], pivot_, displacement);
+        const ComparedWall& first = first_[pair.first];
+        const ComparedWall moved =
+            Move(second_[pair.second], pivot_, displacement);
         Comparison c = Compare(first, moved);
         if (c.overlap <= 0.0) {
           // Not side by side yet: the second's own middle.
           c.second_middle = 0.5 * (moved.begin + moved.end);
-          c.offset = first.normal.dot(
-              moved.position + c.second_middle * moved.along - first.position);
+          c.offset = first.Across(moved.At(c.second_middle));
         }
-        const Vector2d lever = moved.position + c.second_middle * moved.along -
-                               pivot_ - displacement.head<2>();
+        const Vector2d lever =
+            moved.At(c.second_middle) - pivot_ - displacement.head<2>();
+        const Vector2d normal_of_first = first.normal();
         const Vector3d across(
-            first.normal.x(), first.normal.y(),
-            first.normal.dot(Vector2d(-lever.y(), lever.x())));
+            normal_of_first.x(), normal_of_first.y(),
+            normal_of_first.dot(Vector2d(-lever.y(), lever.x())));
         const double weight = 1.0 / (sigma_offset * sigma_offset);
         normal += weight * across * across.transpose();
         right -= weight * c.offset * across;
@@ -270,7 +258,7 @@ class Matcher {
     double conflicts = 0.0;
     for (std::size_t j = 0; j < second_.size(); ++j) {
       if (by_second_[j].empty()) continue;
-      const Wall moved = Move(second_[j], pivot_, displacement);
+      const ComparedWall moved = Move(second_[j], pivot_, displacement);
       double least = options_.tolerance;
       double in_conflict = 0.0;
       std::vector<WallMatch> found;
@@ -316,15 +304,12 @@ class Matcher {
 
   // Takes a matched wall of the second place into the line that it is part of.
   void AddToLines(int wall, double overlap, std::vector<Line>* lines) const {
-    const Wall& own = second_[wall];
-    const Vector2d middle =
-        own.position + 0.5 * (own.begin + own.end) * own.along;
+    const ComparedWall& own = second_[wall];
+    const Vector2d middle = own.Middle();
     for (Line& line : *lines) {
-      const Wall& other = second_[line.wall];
-      if (std::abs(NormalizeAngle(own.direction - other.direction)) <=
-              kSameLineAngle &&
-          std::abs(other.normal.dot(middle - other.position)) <=
-              kSameLineOffset) {
+      const ComparedWall& other = second_[line.wall];
+      if (std::abs(NormalizeAngle(own.angle - other.angle)) <= kSameLineAngle &&
+          std::abs(other.Across(middle)) <= kSameLineOffset) {
         line.overlap += overlap;
         return;
       }
@@ -377,14 +362,14 @@ class Matcher {
     std::vector<Direction> directions;
     bool is_wide = false;
     for (const Line& line : lines) {
-      const Wall& wall = second_[line.wall];
+      const ComparedWall& wall = second_[line.wall];
       const double weight = std::min(1.0, line.overlap / kFullLength);
       result.search = std::max(result.search, line.range);
       is_wide = is_wide || line.range > options_.narrow + options_.tolerance;
       Direction* same = nullptr;
       for (Direction& direction : directions) {
-        const double cross = direction.along.x() * wall.along.y() -
-                             direction.along.y() * wall.along.x();
+        const double cross = direction.along.x() * wall.direction.y() -
+                             direction.along.y() * wall.direction.x();
         if (std::abs(cross) <= std::sin(kParallel)) {
           same = &direction;
           break;
@@ -396,8 +381,8 @@ class Matcher {
         if (directions.size() < 2) {
           gain -= std::log(std::max(1.0, line.range / options_.tolerance));
         }
-        directions.push_back({wall.along, line.range, false});
-      } else if (!same->has_opposite && same->along.dot(wall.along) < 0.0) {
+        directions.push_back({wall.direction, line.range, false});
+      } else if (!same->has_opposite && same->along.dot(wall.direction) < 0.0) {
         same->has_opposite = true;
         gain *= 0.5;
       }
@@ -416,14 +401,15 @@ class Matcher {
 
   bool IsAmbiguous(const WallMatch& match, std::size_t best) const {
     const Hypothesis& own = hypotheses_[best];
-    const Wall moved = Move(second_[match.second], pivot_, own.displacement);
-    const Vector2d point = moved.position + match.along * moved.along;
+    const ComparedWall moved =
+        Move(second_[match.second], pivot_, own.displacement);
+    const Vector2d point = moved.At(match.along);
     for (const Hypothesis& rival : hypotheses_) {
       if (rival.worth < own.worth - options_.rival_margin) continue;
-      const Wall elsewhere =
+      const ComparedWall elsewhere =
           Move(second_[match.second], pivot_, rival.displacement);
-      const Vector2d other = elsewhere.position + match.along * elsewhere.along;
-      if (std::abs(moved.normal.dot(other - point)) > options_.rival_offset) {
+      const Vector2d other = elsewhere.At(match.along);
+      if (std::abs(moved.normal().dot(other - point)) > options_.rival_offset) {
         return true;
       }
     }
@@ -434,8 +420,8 @@ class Matcher {
   Vector2d pivot_;
   Matrix3d covariance_;
   Matrix3d prior_;
-  std::vector<Wall> first_;
-  std::vector<Wall> second_;
+  std::vector<ComparedWall> first_;
+  std::vector<ComparedWall> second_;
   std::vector<Candidate> candidates_;
   // Some candidates are not known to be one wall.
   bool has_news_ = false;

@@ -1,3 +1,4 @@
+#include <plumbline/core/wall.h>
 #include <plumbline/detectors/parameters.h>
 #include <plumbline/detectors/rectangle.h>
 
@@ -10,6 +11,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -32,8 +34,8 @@ double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-// The visible part of a segment or line.
-struct Wall {
+// A side of a room, or a part of one: the visible part of a segment or line.
+struct Face {
   const Feature* feature = nullptr;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   // rad, and as a unit vector.
@@ -43,45 +45,29 @@ struct Wall {
 };
 
 // False when it is no wall, or none with a finite visible part.
-bool MakeWall(const Feature& feature, Wall* wall) {
-  Eigen::Vector2d position(feature.parameters[0], feature.parameters[1]);
-  if (feature.type->name == "segment") {
-    wall->angle = feature.parameters[2];
-  } else if (feature.type->name == "line") {
-    wall->angle = feature.parameters[1];
-    position = Eigen::Vector2d(feature.anchor[0], feature.anchor[1]) +
-               feature.parameters[0] * Eigen::Vector2d(-std::sin(wall->angle),
-                                                       std::cos(wall->angle));
-  } else {
-    return false;
-  }
-  wall->feature = &feature;
-  wall->direction = {std::cos(wall->angle), std::sin(wall->angle)};
-  wall->half_length = 0.5 * (feature.extent_end - feature.extent_begin);
-  wall->middle = position + 0.5 * (feature.extent_begin + feature.extent_end) *
-                                wall->direction;
-  return wall->half_length > 0.0 && std::isfinite(wall->half_length) &&
-         std::isfinite(wall->angle) && wall->middle.allFinite();
+bool MakeFace(const Feature& feature, Face* face) {
+  const std::optional<Wall> wall = WallOf(feature);
+  if (!wall) return false;
+  face->feature = &feature;
+  face->middle = wall->Middle();
+  face->angle = wall->angle;
+  face->direction = wall->direction;
+  face->half_length = 0.5 * wall->length();
+  return face->half_length > 0.0 && std::isfinite(face->half_length) &&
+         std::isfinite(face->angle) && face->middle.allFinite();
 }
 
 // Where a wall lies along a line through `origin` in the direction `along`.
-std::pair<double, double> Interval(const Wall& wall,
-                                   const Eigen::Vector2d& origin,
-                                   const Eigen::Vector2d& along) {
+Interval IntervalAlong(const Face& wall, const Eigen::Vector2d& origin,
+                       const Eigen::Vector2d& along) {
   const double middle = along.dot(wall.middle - origin);
   const double reach = wall.half_length * std::abs(along.dot(wall.direction));
   return {middle - reach, middle + reach};
 }
 
-double Overlap(const std::pair<double, double>& a,
-               const std::pair<double, double>& b) {
-  return std::min(a.second, b.second) - std::max(a.first, b.first);
-}
-
 // Whether two walls on one line are two faces of a wall rather than two parts
 // of it: half of the shorter one lies beside the other.
-bool RunsBeside(const std::pair<double, double>& a,
-                const std::pair<double, double>& b) {
+bool RunsBeside(const Interval& a, const Interval& b) {
   return Overlap(a, b) > 0.5 * std::min(a.second - a.first, b.second - b.first);
 }
 
@@ -91,7 +77,7 @@ class WallGrid {
   explicit WallGrid(double cell) : cell_(cell) {}
 
   // `reach`: how far the wall counts past its ends.
-  void Add(int index, const Wall& wall, double reach) {
+  void Add(int index, const Face& wall, double reach) {
     Visit(wall, reach, [&](const Cell& cell) {
       std::vector<int>& walls = cells_[cell];
       if (walls.empty() || walls.back() != index) walls.push_back(index);
@@ -99,7 +85,7 @@ class WallGrid {
   }
 
   // Indices of the walls that pass within a cell of the wall, ascending.
-  std::vector<int> Near(const Wall& wall, double reach) const {
+  std::vector<int> Near(const Face& wall, double reach) const {
     std::set<int> found;
     std::set<Cell> seen;
     Visit(wall, reach, [&](const Cell& center) {
@@ -119,7 +105,7 @@ class WallGrid {
   using Cell = std::pair<std::int64_t, std::int64_t>;
 
   template <typename Visitor>
-  void Visit(const Wall& wall, double reach, const Visitor& visit) const {
+  void Visit(const Face& wall, double reach, const Visitor& visit) const {
     const double end = wall.half_length + reach;
     const int steps = 1 + static_cast<int>(std::ceil(2.0 * end / cell_));
     for (int i = 0; i <= steps; ++i) {
@@ -155,7 +141,7 @@ struct Rectangle {
   // Walls on each side: features, where they lie along it from its middle.
   struct Member {
     const Feature* feature = nullptr;
-    std::pair<double, double> interval;
+    Interval interval;
     bool is_new = false;
   };
   std::array<std::vector<Member>, kNumSides> sides;
@@ -195,7 +181,7 @@ double CommonArea(const Rectangle& first, const Rectangle& second) {
 // One call of Detect.
 class RectangleSearch {
  public:
-  RectangleSearch(const RectangleOptions& options, std::vector<Wall> walls)
+  RectangleSearch(const RectangleOptions& options, std::vector<Face> walls)
       : options_(options),
         walls_(std::move(walls)),
         grid_(std::max(options.corner_gap, options.max_opening)) {
@@ -225,7 +211,7 @@ class RectangleSearch {
 
  private:
   int size() const { return static_cast<int>(walls_.size()); }
-  const Wall& wall(int i) const { return walls_[static_cast<std::size_t>(i)]; }
+  const Face& wall(int i) const { return walls_[static_cast<std::size_t>(i)]; }
   // Past its ends a wall may meet another or go on as another.
   double Reach() const {
     return std::max(options_.corner_gap, 0.5 * options_.max_opening);
@@ -242,18 +228,18 @@ class RectangleSearch {
     }
   }
 
-  bool AreCollinear(const Wall& first, const Wall& second) const {
+  bool AreCollinear(const Face& first, const Face& second) const {
     if (std::abs(NormalizeAxial(first.angle - second.angle)) >
         options_.gate_angle) {
       return false;
     }
     const auto own = std::pair(-first.half_length, first.half_length);
-    const auto other = Interval(second, first.middle, first.direction);
+    const auto other = IntervalAlong(second, first.middle, first.direction);
     if (-Overlap(own, other) > options_.max_opening || RunsBeside(own, other)) {
       return false;
     }
     // Across, seen from the nearer end of each.
-    const auto is_near = [&](const Wall& from, const Wall& to) {
+    const auto is_near = [&](const Face& from, const Face& to) {
       const double along = from.direction.dot(to.middle - from.middle);
       const double sign =
           (from.direction.dot(to.direction) > 0.0) == (along > 0.0) ? -1.0
@@ -378,7 +364,7 @@ class RectangleSearch {
   std::size_t FirstSide(
       double theta,
       const std::array<std::vector<int>, kNumSides>& sides) const {
-    const Wall& first = wall(sides[0][0]);
+    const Face& first = wall(sides[0][0]);
     const Eigen::Vector2d outward = first.middle - wall(sides[2][0]).middle;
     Eigen::Vector2d normal(first.direction.y(), -first.direction.x());
     if (normal.dot(outward) < 0.0) normal = -normal;
@@ -397,8 +383,8 @@ class RectangleSearch {
   }
 
   // Where a wall lies along a side; false when it is not on it.
-  bool IsOnSide(const Wall& wall, const Rectangle& rectangle, int side,
-                std::pair<double, double>* interval) const {
+  bool IsOnSide(const Face& wall, const Rectangle& rectangle, int side,
+                Interval* interval) const {
     const double angle =
         rectangle.theta + kSides[static_cast<std::size_t>(side)];
     const Eigen::Vector2d middle = rectangle.Middle(side);
@@ -414,7 +400,7 @@ class RectangleSearch {
         options_.gate) {
       return false;
     }
-    *interval = Interval(wall, middle, rectangle.Direction(side));
+    *interval = IntervalAlong(wall, middle, rectangle.Direction(side));
     const double half = rectangle.HalfLength(side);
     return Overlap(*interval, {-half, half}) >=
            std::min(wall.half_length, half);
@@ -426,7 +412,7 @@ class RectangleSearch {
     for (int side = 0; side < kNumSides; ++side) {
       std::vector<Rectangle::Member>& members =
           rectangle->sides[static_cast<std::size_t>(side)];
-      Wall line;
+      Face line;
       line.middle = rectangle->Middle(side);
       line.direction = rectangle->Direction(side);
       line.half_length = rectangle->HalfLength(side);
@@ -436,8 +422,8 @@ class RectangleSearch {
       }
       std::sort(by_length.begin(), by_length.end());
       for (const auto& entry : by_length) {
-        const Wall& candidate = wall(entry.second);
-        std::pair<double, double> interval;
+        const Face& candidate = wall(entry.second);
+        Interval interval;
         if (!IsOnSide(candidate, *rectangle, side, &interval)) continue;
         if (std::any_of(members.begin(), members.end(),
                         [&](const Rectangle::Member& member) {
@@ -454,7 +440,7 @@ class RectangleSearch {
   // Whether walls cover enough of the side and meet the next ones.
   bool IsCovered(const Rectangle& rectangle, int side) const {
     const double half = rectangle.HalfLength(side);
-    std::vector<std::pair<double, double>> intervals;
+    std::vector<Interval> intervals;
     for (const Rectangle::Member& member :
          rectangle.sides[static_cast<std::size_t>(side)]) {
       intervals.push_back(member.interval);
@@ -538,8 +524,8 @@ class RectangleSearch {
     for (int side = 0; side < kNumSides; ++side) {
       for (Rectangle::Member& member :
            rectangle->sides[static_cast<std::size_t>(side)]) {
-        Wall wall;
-        MakeWall(*member.feature, &wall);
+        Face wall;
+        MakeFace(*member.feature, &wall);
         if (!IsOnSide(wall, *rectangle, side, &member.interval)) return false;
       }
     }
@@ -579,7 +565,7 @@ class RectangleSearch {
   }
 
   const RectangleOptions& options_;
-  std::vector<Wall> walls_;
+  std::vector<Face> walls_;
   WallGrid grid_;
   std::vector<Corner> corners_;
   // Corners of each wall; walls in line with each, itself first.
@@ -619,11 +605,11 @@ Rectangle ReadRectangle(const Graph& graph, const Feature& feature) {
     const int side = SideOf(constraint);
     if (side < 0) continue;
     const Feature& support = graph.GetFeature(constraint.features[0]);
-    Wall wall;
-    if (!MakeWall(support, &wall)) continue;
+    Face wall;
+    if (!MakeFace(support, &wall)) continue;
     rectangle.sides[static_cast<std::size_t>(side)].push_back(
         {&support,
-         Interval(wall, rectangle.Middle(side), rectangle.Direction(side)),
+         IntervalAlong(wall, rectangle.Middle(side), rectangle.Direction(side)),
          false});
   }
   return rectangle;
@@ -652,10 +638,10 @@ bool RectangleDetector::IsSupported(
 Transaction RectangleDetector::Detect(const Graph& graph,
                                       const Registry& registry,
                                       const DetectionScope& scope) const {
-  std::vector<Wall> walls;
+  std::vector<Face> walls;
   const auto consider = [&](const Feature& feature) {
-    Wall wall;
-    if (feature.level == scope.level && MakeWall(feature, &wall) &&
+    Face wall;
+    if (feature.level == scope.level && MakeFace(feature, &wall) &&
         2.0 * wall.half_length >= options_.min_length) {
       walls.push_back(wall);
     }

@@ -1,5 +1,6 @@
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/marginals.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/detectors/parameters.h>
 #include <plumbline/detectors/same_wall.h>
 #include <plumbline/factors/pose2.h>
@@ -39,6 +40,10 @@ constexpr double kStepsOfLongest = 16.0;
 using Pair = std::pair<int, int>;
 
 Pair Ordered(int i, int j) { return {std::min(i, j), std::max(i, j)}; }
+
+Wall Geometry(const PlaceWall& wall) {
+  return MakeWall(wall.position, wall.direction, wall.begin, wall.end);
+}
 
 // A wall pair to be proposed.
 struct Proposal {
@@ -140,19 +145,13 @@ class Search {
 
   double Length(int i) const { return walls_[i].end - walls_[i].begin; }
 
-  Vector2d Middle(int i) const {
-    const PlaceWall& wall = walls_[i];
-    const double middle = 0.5 * (wall.begin + wall.end);
-    return wall.position + middle * Vector2d(std::cos(wall.direction),
-                                             std::sin(wall.direction));
-  }
+  Vector2d Middle(int i) const { return Geometry(walls_[i]).Middle(); }
 
   double DistanceTo(int i, const Vector2d& point) const {
-    const PlaceWall& wall = walls_[i];
-    const Vector2d along(std::cos(wall.direction), std::sin(wall.direction));
+    const Wall wall = Geometry(walls_[i]);
     const Vector2d relative = point - wall.position;
-    const double t = std::clamp(along.dot(relative), wall.begin, wall.end);
-    return (relative - t * along).norm();
+    const double t = std::clamp(wall.Along(point), wall.begin, wall.end);
+    return (relative - t * wall.direction).norm();
   }
 
   // Walls up to `depth` measurement links away with the number of links,
@@ -422,12 +421,8 @@ class Search {
     proposal.along = match.along;
     if (proposal.pair.second != j) {
       // The point given along the second wall, found on the other.
-      const Vector2d along(std::cos(walls_[j].direction),
-                           std::sin(walls_[j].direction));
-      const Vector2d own(std::cos(walls_[i].direction),
-                         std::sin(walls_[i].direction));
-      proposal.along = own.dot(walls_[j].position + match.along * along -
-                               walls_[i].position);
+      proposal.along =
+          Geometry(walls_[i]).Along(Geometry(walls_[j]).At(match.along));
     }
     proposal.search = search;
     proposal.evidence = evidence;
@@ -451,11 +446,9 @@ class Search {
     std::vector<std::set<std::pair<long, long>>> cells(walls_.size());
     for (int i = 0; i < static_cast<int>(walls_.size()); ++i) {
       if (Length(i) < options_.min_length) continue;
-      const PlaceWall& wall = walls_[i];
-      const Vector2d along(std::cos(wall.direction), std::sin(wall.direction));
+      const Wall wall = Geometry(walls_[i]);
       for (double t = wall.begin;; t += 0.5 * kCell) {
-        const double at = std::min(t, wall.end);
-        cells[i].insert(cell(wall.position + at * along));
+        cells[i].insert(cell(wall.At(std::min(t, wall.end))));
         if (t >= wall.end) break;
       }
       for (const auto& key : cells[i]) grid[key].push_back(i);
@@ -512,18 +505,17 @@ class Search {
             std::sqrt(tolerance * tolerance + noise(first) + noise(second))) {
       return false;
     }
-    const Vector2d along(std::cos(first.direction), std::sin(first.direction));
-    const Vector2d normal(-along.y(), along.x());
-    const Vector2d own(std::cos(second.direction), std::sin(second.direction));
-    const Vector2d relative = second.position - first.position;
-    const double from = along.dot(relative + second.begin * own);
-    const double to = along.dot(relative + second.end * own);
-    const double low = std::max(first.begin, std::min(from, to));
-    const double high = std::min(first.end, std::max(from, to));
+    const Wall one = Geometry(first);
+    const Wall other = Geometry(second);
+    const Interval interval = one.IntervalOf(other);
+    const double low = std::max(one.begin, interval.first);
+    const double high = std::min(one.end, interval.second);
     if (high - low < options_.match.min_overlap) return false;
     match->overlap = high - low;
-    match->along = (0.5 * (low + high) - along.dot(relative)) / along.dot(own);
-    match->offset = normal.dot(relative + match->along * own);
+    match->along = (0.5 * (low + high) - one.Along(other.position)) /
+                   one.direction.dot(other.direction);
+    match->offset = one.normal().dot(other.position - one.position +
+                                     match->along * other.direction);
     return std::abs(match->offset) <= options_.known_offset;
   }
 

@@ -1,3 +1,4 @@
+#include <plumbline/core/wall.h>
 #include <plumbline/frontend/wall_completion.h>
 
 #include <Eigen/LU>
@@ -21,16 +22,11 @@ std::int64_t CellKey(std::int64_t column, std::int64_t row) {
       (static_cast<std::uint64_t>(row) & 0xffffffffu));
 }
 
-struct Wall {
-  FeatureId id;
-  Pose2 pose;
-  Eigen::Vector2d direction;
-  double begin, end;
-};
+struct IndexedWall : Wall {
+  FeatureId id = kNoId;
 
-Wall MakeWall(FeatureId id, const Pose2& pose, double begin, double end) {
-  return {id, pose, {std::cos(pose[2]), std::sin(pose[2])}, begin, end};
-}
+  IndexedWall(FeatureId id, const Wall& wall) : Wall(wall), id(id) {}
+};
 
 // Walls by the index cells that they pass through.
 class WallIndex {
@@ -38,15 +34,12 @@ class WallIndex {
   WallIndex(const Graph& graph, double reach) : reach_(reach) {
     for (const Feature* feature : graph.Features()) {
       if (feature->type->name != "segment" || feature->is_virtual) continue;
-      Insert(MakeWall(feature->id,
-                      Pose2(feature->parameters[0], feature->parameters[1],
-                            feature->parameters[2]),
-                      feature->extent_begin, feature->extent_end));
+      Insert({feature->id, *WallOf(*feature)});
     }
     num_known_ = walls_.size();
   }
 
-  void Insert(const Wall& wall) {
+  void Insert(const IndexedWall& wall) {
     has_last_ = false;
     walls_.push_back(wall);
     const int i = static_cast<int>(walls_.size()) - 1;
@@ -56,10 +49,10 @@ class WallIndex {
         static_cast<int>(std::ceil((end - begin) / (0.5 * kIndexCell)));
     for (int k = 0; k <= steps; ++k) {
       const double t = begin + (end - begin) * k / std::max(1, steps);
-      const auto column = static_cast<std::int64_t>(
-          std::floor((wall.pose[0] + t * wall.direction.x()) / kIndexCell));
-      const auto row = static_cast<std::int64_t>(
-          std::floor((wall.pose[1] + t * wall.direction.y()) / kIndexCell));
+      const auto column =
+          static_cast<std::int64_t>(std::floor(wall.At(t).x() / kIndexCell));
+      const auto row =
+          static_cast<std::int64_t>(std::floor(wall.At(t).y() / kIndexCell));
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
           std::vector<int>& cell = cells_[CellKey(column + dx, row + dy)];
@@ -83,25 +76,21 @@ class WallIndex {
     if (last_ == nullptr) return false;
     for (int index : *last_) {
       const Wall& wall = walls_[index];
-      const double c = wall.direction.x();
-      const double s = wall.direction.y();
-      const double dx = point.x() - wall.pose[0];
-      const double dy = point.y() - wall.pose[1];
-      if (std::abs(-s * dx + c * dy) > offset) continue;
-      const double along = c * dx + s * dy;
+      if (std::abs(wall.Across(point)) > offset) continue;
+      const double along = wall.Along(point);
       if (along >= wall.begin - gap && along <= wall.end + gap) return true;
     }
     return false;
   }
 
-  const std::vector<Wall>& walls() const { return walls_; }
+  const std::vector<IndexedWall>& walls() const { return walls_; }
   // The first so many are features of the graph, the others are new.
   std::size_t num_known() const { return num_known_; }
 
  private:
   const double reach_;
   std::size_t num_known_ = 0;
-  std::vector<Wall> walls_;
+  std::vector<IndexedWall> walls_;
   std::unordered_map<std::int64_t, std::vector<int>> cells_;
   // The cell asked for last.
   bool has_last_ = false;
@@ -115,6 +104,8 @@ struct Cell {
   // Towards the lasers that saw it.
   Eigen::Vector2d view = Eigen::Vector2d::Zero();
   int returns = 0;
+  // Scans that saw it, ascending.
+  std::vector<std::size_t> scans;
   // Direction of the surface; only where it is straight.
   Eigen::Vector2d direction = Eigen::Vector2d::Zero();
   double straightness = 0.0;
@@ -241,6 +232,9 @@ class Completion {
         cell.sum += point;
         cell.view -= ray;
         ++cell.returns;
+        if (cell.scans.empty() || cell.scans.back() != i) {
+          cell.scans.push_back(i);
+        }
       }
     }
   }
@@ -387,9 +381,17 @@ class Completion {
     }
     const double middle = 0.5 * (places.front() + places.back());
     const Eigen::Vector2d position = origin + mean + middle * direction;
+    std::vector<std::size_t> scans;
+    for (const int index : on) {
+      scans.insert(scans.end(), cells_[index].scans.begin(),
+                   cells_[index].scans.end());
+    }
+    std::sort(scans.begin(), scans.end());
+    const auto num_scans =
+        std::unique(scans.begin(), scans.end()) - scans.begin();
     Add(Pose2(position.x(), position.y(),
               std::atan2(direction.y(), direction.x())),
-        length, returns);
+        length, static_cast<int>(num_scans));
   }
 
   // What the new wall explains is no other wall.
@@ -413,13 +415,11 @@ class Completion {
     }
   }
 
-  void Add(const Pose2& pose, double length, int returns) {
-    std::vector<std::pair<double, const Wall*>> nearest;
+  void Add(const Pose2& pose, double length, int num_scans) {
+    std::vector<std::pair<double, const IndexedWall*>> nearest;
     for (std::size_t k = 0; k < index_.num_known(); ++k) {
-      const Wall& wall = index_.walls()[k];
-      const Eigen::Vector2d middle = TransformPoint(
-          wall.pose, Eigen::Vector2d(0.5 * (wall.begin + wall.end), 0.0));
-      nearest.emplace_back((middle - pose.head<2>()).norm(), &wall);
+      const IndexedWall& wall = index_.walls()[k];
+      nearest.emplace_back((wall.Middle() - pose.head<2>()).norm(), &wall);
     }
     if (nearest.empty()) return;
     const std::size_t links =
@@ -434,15 +434,15 @@ class Completion {
     feature.parameters = {pose[0], pose[1], pose[2]};
     feature.extent_begin = -0.5 * length;
     feature.extent_end = 0.5 * length;
-    feature.observations = returns;
+    feature.observations = num_scans;
     feature.source = "wall_completion";
     const FeatureId id = transaction_.AddFeature(feature);
     for (std::size_t k = 0; k < links; ++k) {
-      const Wall& wall = *nearest[k].second;
+      const IndexedWall& wall = *nearest[k].second;
       Constraint constraint;
       constraint.type = &registry_.GetRelation("pose_pose");
       constraint.features = std::vector<FeatureId>{wall.id, id};
-      constraint.expected = Between(wall.pose, pose);
+      constraint.expected = Between(wall.pose(), pose);
       const double offset =
           options_.link_offset_sigma * options_.link_offset_sigma;
       const double angle =
@@ -453,7 +453,7 @@ class Completion {
       constraint.source = "wall_completion";
       transaction_.AddConstraint(std::move(constraint));
     }
-    index_.Insert(MakeWall(id, pose, -0.5 * length, 0.5 * length));
+    index_.Insert({id, MakeWall(pose, -0.5 * length, 0.5 * length)});
   }
 
   const Registry& registry_;

@@ -1,6 +1,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/frontend/wall_votes.h>
 
 #include <algorithm>
@@ -14,14 +15,9 @@ namespace {
 
 constexpr double kCell = 0.5;
 
-struct Wall {
+// Its ends are where returns may still be on it.
+struct GridWall : Wall {
   FeatureId id = kNoId;
-  Eigen::Vector2d position;
-  Eigen::Vector2d direction;
-  // Towards the side that it was seen from.
-  Eigen::Vector2d normal;
-  double begin = 0.0;
-  double end = 0.0;
 };
 
 // Walls by the cells that a return on them may fall into.
@@ -30,14 +26,11 @@ class WallGrid {
   WallGrid(const Graph& graph, const WallVoteOptions& options) {
     for (const Feature* feature : graph.Features()) {
       if (feature->type->name != "segment" || feature->level != 0) continue;
-      Wall wall;
+      GridWall wall;
+      static_cast<Wall&>(wall) = *WallOf(*feature);
       wall.id = feature->id;
-      wall.position = {feature->parameters[0], feature->parameters[1]};
-      wall.direction = {std::cos(feature->parameters[2]),
-                        std::sin(feature->parameters[2])};
-      wall.normal = {-wall.direction.y(), wall.direction.x()};
-      wall.begin = feature->extent_begin - options.max_gap;
-      wall.end = feature->extent_end + options.max_gap;
+      wall.begin -= options.max_gap;
+      wall.end += options.max_gap;
       const int index = static_cast<int>(walls_.size());
       walls_.push_back(wall);
       // Steps of half a cell along and across reach every cell of the strip.
@@ -52,7 +45,7 @@ class WallGrid {
               wall.position +
               (wall.begin + (wall.end - wall.begin) * i / std::max(1, along)) *
                   wall.direction +
-              (2.0 * j / across - 1.0) * options.max_offset * wall.normal;
+              (2.0 * j / across - 1.0) * options.max_offset * wall.normal();
           std::vector<int>& cell = cells_[Key(point)];
           if (cell.empty() || cell.back() != index) cell.push_back(index);
         }
@@ -71,10 +64,10 @@ class WallGrid {
     const auto found = cells_.find(cell);
     return found == cells_.end() ? nullptr : &found->second;
   }
-  const Wall& wall(int index) const { return walls_[index]; }
+  const GridWall& wall(int index) const { return walls_[index]; }
 
  private:
-  std::vector<Wall> walls_;
+  std::vector<GridWall> walls_;
   std::map<Cell, std::vector<int>> cells_;
 };
 
@@ -86,7 +79,7 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
   if (places.size() != poses.size()) {
     throw PLUMBLINE_ERROR(std::to_string(places.size()) + " places and " +
                               std::to_string(poses.size()) + " poses",
-                          "one pose a place");
+                          "one pose for each place");
   }
   const WallGrid grid(graph, options);
   const double min_cosine = std::cos(options.max_turn);
@@ -115,12 +108,12 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
       double best = options.max_offset;
       FeatureId hit = kNoId;
       for (const int index : *near) {
-        const Wall& wall = grid.wall(index);
+        const GridWall& wall = grid.wall(index);
         const Eigen::Vector2d difference = position - wall.position;
-        const double offset = std::abs(difference.dot(wall.normal));
+        const double offset = std::abs(difference.dot(wall.normal()));
         const double along = difference.dot(wall.direction);
         if (offset < best && along >= wall.begin && along <= wall.end &&
-            normal.dot(wall.normal) >= min_cosine) {
+            normal.dot(wall.normal()) >= min_cosine) {
           best = offset;
           hit = wall.id;
         }

@@ -3,6 +3,7 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/core/xml_text.h>
 #include <plumbline/detectors/merged_walls.h>
 #include <plumbline/detectors/same_wall.h>
@@ -17,6 +18,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 namespace plumbline {
@@ -765,27 +767,14 @@ double ScaleBarLength(double longest) {
 }
 
 bool WallEnds(const Feature& feature, DrawnWall* wall) {
-  double x, y, direction;
-  if (feature.type->name == "segment") {
-    x = feature.parameters[0];
-    y = feature.parameters[1];
-    direction = feature.parameters[2];
-  } else if (feature.type->name == "line") {
-    // d = y cos(alpha) - x sin(alpha) relative to the anchor (Eq. 12): the foot
-    // point is d along the normal (-sin(alpha), cos(alpha)).
-    direction = feature.parameters[1];
-    x = feature.anchor[0] - feature.parameters[0] * std::sin(direction);
-    y = feature.anchor[1] + feature.parameters[0] * std::cos(direction);
-  } else {
-    return false;
-  }
-  if (!(feature.extent_end > feature.extent_begin)) return false;
-  const double c = std::cos(direction);
-  const double s = std::sin(direction);
-  wall->x1 = x + feature.extent_begin * c;
-  wall->y1 = y + feature.extent_begin * s;
-  wall->x2 = x + feature.extent_end * c;
-  wall->y2 = y + feature.extent_end * s;
+  const std::optional<Wall> seen = WallOf(feature);
+  if (!seen || !(seen->end > seen->begin)) return false;
+  const Eigen::Vector2d begin = seen->At(seen->begin);
+  const Eigen::Vector2d end = seen->At(seen->end);
+  wall->x1 = begin.x();
+  wall->y1 = begin.y();
+  wall->x2 = end.x();
+  wall->y2 = end.y();
   wall->id = feature.id;
   return true;
 }
@@ -832,19 +821,12 @@ FeatureId OrientationOf(const Graph& graph, FeatureId wall) {
 // On the first segment, with its direction: the middle of the part where the
 // second lies beside it, or of the gap between them.
 Pose2 MiddleOfCommonPart(const Feature& first, const Feature& second) {
-  const Eigen::Vector2d along(std::cos(first.parameters[2]),
-                              std::sin(first.parameters[2]));
-  const Eigen::Vector2d own(std::cos(second.parameters[2]),
-                            std::sin(second.parameters[2]));
-  const Eigen::Vector2d position(first.parameters[0], first.parameters[1]);
-  const Eigen::Vector2d relative =
-      Eigen::Vector2d(second.parameters[0], second.parameters[1]) - position;
-  const double a = along.dot(relative + second.extent_begin * own);
-  const double b = along.dot(relative + second.extent_end * own);
-  const double middle = 0.5 * (std::max(first.extent_begin, std::min(a, b)) +
-                               std::min(first.extent_end, std::max(a, b)));
-  const Eigen::Vector2d point = position + middle * along;
-  return Pose2(point.x(), point.y(), first.parameters[2]);
+  const Wall wall = *WallOf(first);
+  const Interval other = wall.IntervalOf(*WallOf(second));
+  const Eigen::Vector2d point =
+      wall.At(0.5 * (std::max(wall.begin, other.first) +
+                     std::min(wall.end, other.second)));
+  return Pose2(point.x(), point.y(), wall.angle);
 }
 
 }  // namespace

@@ -84,6 +84,24 @@ TEST_F(WallCompletionTest, FindsTheWallSeenThroughTheDoor) {
   }
 }
 
+TEST_F(WallCompletionTest, ObservationsAreScansAndNotReturns) {
+  const Transaction walls =
+      FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_);
+  ASSERT_EQ(walls.added_features().size(), 1u);
+  int scans = 0;
+  int returns = 0;
+  for (const Scan& scan : scans_) {
+    int hits = 0;
+    for (const float range : scan.ranges) hits += range > 3.5f ? 1 : 0;
+    scans += hits > 0 ? 1 : 0;
+    returns += hits;
+  }
+  ASSERT_GT(returns, 2 * scans);
+  const int observations = walls.added_features().front().observations;
+  EXPECT_LE(observations, scans);
+  EXPECT_GE(observations, 0.8 * scans);
+}
+
 TEST_F(WallCompletionTest, FindsNothingTwice) {
   graph_.Apply(FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_));
   EXPECT_TRUE(

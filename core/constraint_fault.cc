@@ -1,6 +1,6 @@
 #include <plumbline/core/constraint_fault.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/registry.h>
-#include <plumbline/factors/information.h>
 
 #include <algorithm>
 #include <vector>

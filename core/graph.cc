@@ -1,7 +1,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/registry.h>
-#include <plumbline/factors/information.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include <plumbline/core/hypothesis_memory.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/registry.h>
-#include <plumbline/factors/information.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/marginals.h>
-#include <plumbline/factors/information.h>
 #include <plumbline/factors/pose2.h>
 
 #include <Eigen/SparseCholesky>

@@ -2,10 +2,10 @@
 #include <dlfcn.h>
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/session.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/factors/chi_square.h>
-#include <plumbline/factors/information.h>
 
 #include <algorithm>
 #include <chrono>

@@ -4,7 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
+#include <Eigen/Householder>
 #include <cmath>
 #include <stdexcept>
 
@@ -76,6 +76,28 @@ Eigen::SelfAdjointEigenSolver<SquareMatrix<Derived>> ScaledEigenSolver(
   return Eigen::SelfAdjointEigenSolver<SquareMatrix<Derived>>(scaled);
 }
 
+// Turns a square matrix into the upper triangular one with the same square, by
+// Householder reflections; what is below the diagonal is left over. As
+// Eigen::HouseholderQR for sizes below its block size of 48, without the code
+// for larger ones, which takes seconds to compile.
+template <typename Matrix>
+void MakeTriangular(Matrix* matrix) {
+  const Eigen::Index size = matrix->rows();
+  auto block = matrix->block(0, 0, size, size);
+  Eigen::Matrix<double, 1, Matrix::ColsAtCompileTime, Eigen::RowMajor, 1,
+                Matrix::MaxColsAtCompileTime>
+      workspace(size);
+  for (Eigen::Index k = 0; k < size; ++k) {
+    double tau;
+    double beta;
+    block.col(k).tail(size - k).makeHouseholderInPlace(tau, beta);
+    block(k, k) = beta;
+    block.bottomRightCorner(size - k, size - k - 1)
+        .applyHouseholderOnTheLeft(block.col(k).tail(size - k - 1), tau,
+                                   workspace.data() + k + 1);
+  }
+}
+
 [[noreturn]] inline void ThrowInvalidInformation() {
   throw std::invalid_argument(
       "information matrix: expected a finite, symmetric, positive "
@@ -84,11 +106,12 @@ Eigen::SelfAdjointEigenSolver<SquareMatrix<Derived>> ScaledEigenSolver(
 
 }  // namespace internal
 
-/// True when `matrix` can be an information matrix (or a covariance): square,
+/// True when the matrix can be an information matrix (or a covariance): square,
 /// not empty, finite, symmetric and positive semidefinite, up to
 /// kInformationTolerance. Zero is an information matrix.
 template <typename Derived>
-bool IsValidInformation(const Eigen::MatrixBase<Derived>& matrix) {
+bool IsValidInformation(const Eigen::MatrixBase<Derived>& expression) {
+  const auto& matrix = expression.eval();
   if (!internal::IsSymmetricInformation(matrix)) return false;
   const auto solver =
       internal::ScaledEigenSolver(matrix, internal::InformationScale(matrix));
@@ -101,7 +124,8 @@ bool IsValidInformation(const Eigen::MatrixBase<Derived>& matrix) {
 /// units of the rows. Throws std::invalid_argument when the matrix is not a
 /// valid information matrix.
 template <typename Derived>
-int InformationRank(const Eigen::MatrixBase<Derived>& information) {
+int InformationRank(const Eigen::MatrixBase<Derived>& expression) {
+  const auto& information = expression.eval();
   if (!internal::IsSymmetricInformation(information)) {
     internal::ThrowInvalidInformation();
   }
@@ -123,8 +147,9 @@ int InformationRank(const Eigen::MatrixBase<Derived>& information) {
 /// std::invalid_argument when the matrix is not a valid information matrix.
 template <typename Derived>
 internal::SquareMatrix<Derived> SqrtInformation(
-    const Eigen::MatrixBase<Derived>& information) {
+    const Eigen::MatrixBase<Derived>& expression) {
   using Matrix = internal::SquareMatrix<Derived>;
+  const auto& information = expression.eval();
   if (!internal::IsSymmetricInformation(information)) {
     internal::ThrowInvalidInformation();
   }
@@ -144,8 +169,8 @@ internal::SquareMatrix<Derived> SqrtInformation(
     const double value = solver.eigenvalues()[i];
     root.row(i) *= value > kInformationRankTolerance ? std::sqrt(value) : 0.0;
   }
-  const Eigen::HouseholderQR<Matrix> qr(root);
-  Matrix factor = qr.matrixQR().template triangularView<Eigen::Upper>();
+  internal::MakeTriangular(&root);
+  Matrix factor = root.template triangularView<Eigen::Upper>();
   factor *= scale.asDiagonal();
   for (Eigen::Index i = 0; i < factor.rows(); ++i) {
     if (factor(i, i) < 0.0) factor.row(i) = -factor.row(i);
@@ -159,8 +184,9 @@ internal::SquareMatrix<Derived> SqrtInformation(
 /// positive definite.
 template <typename Derived>
 internal::SquareMatrix<Derived> SqrtInformationFromCovariance(
-    const Eigen::MatrixBase<Derived>& covariance) {
+    const Eigen::MatrixBase<Derived>& expression) {
   using Matrix = internal::SquareMatrix<Derived>;
+  const auto& covariance = expression.eval();
   if (internal::IsSymmetricInformation(covariance)) {
     // With rows and columns in reverse order, the lower factor of the reversed
     // matrix is an upper U with U U' = covariance; L is its inverse.

@@ -201,6 +201,14 @@ void TellPhase(const EmPhase& phase) {
          phase.iteration, phase.phase.c_str(), phase.cost.measurement,
          phase.cost.structure, phase.structure_constraints,
          phase.broken_constraints);
+  for (const auto& [detector, counts] : phase.detections) {
+    std::string list;
+    for (const auto& [name, number] : counts) {
+      if (number == 0) continue;
+      list += (list.empty() ? "" : ", ") + name + " " + std::to_string(number);
+    }
+    if (!list.empty()) Detail("  %s: %s", detector.c_str(), list.c_str());
+  }
 }
 
 // A bar while an input is read.

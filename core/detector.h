@@ -42,7 +42,7 @@ struct DetectionScope {
   /// True when Detect shall return at once.
   bool ShouldStop() const { return stop && stop(); }
   /// Adds to a count, which is there from then on even when `number` is 0.
-  void Count(const std::string& name, std::int64_t number) const {
+  void Count(const char* name, std::int64_t number) const {
     if (counts != nullptr) (*counts)[name] += number;
   }
 };

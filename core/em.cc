@@ -3,18 +3,16 @@
 #include <plumbline/core/hypothesis_memory.h>
 #include <plumbline/core/proposal_filter.h>
 #include <plumbline/core/solve_schedule.h>
+#include <plumbline/core/stopwatch.h>
 #include <plumbline/core/structure_census.h>
 #include <plumbline/core/support_policy.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 namespace plumbline {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // Weights that moved less are not worth a solve.
 constexpr double kDeltaChange = 1e-6;
@@ -22,10 +20,6 @@ constexpr double kDeltaChange = 1e-6;
 // larger a graph, the surer one place in it is still undecided, and a round for
 // its sake costs as much as any.
 constexpr double kNegligible = 1e-4;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // What a detector of a level may look at in a scope: features of the level, and
 // those of lower ones.
@@ -130,24 +124,24 @@ struct EmOrchestrator::Impl final : public GraphListener {
 
   // x <- optimize(graph), as a phase of its own.
   void OptimizeWhole(const std::string& phase) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     const EmScope whole;
     schedule.Optimize(whole);
-    EndPhase(phase, whole, start);
+    EndPhase(phase, whole, watch);
   }
 
   // x <- optimize(graph), the solve that structure is judged by.
   void OptimizeForJudgement(const EmScope& scope) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     NoteChange(judge->Prepare(scope));
     schedule.Optimize(scope);
-    EndPhase("optimize", scope, start);
+    EndPhase("optimize", scope, watch);
   }
 
   // graph <- break what is refuted, drop what has lost its support;
   // x <- optimize(graph).
   bool BreakAndDrop(EmScope* scope) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     bool has_changed = WeighAndBreak(*scope);
     if (scope->is_whole()) support.RecheckAll();
     if (support.DropUnsupported()) has_changed = true;
@@ -155,7 +149,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
     schedule.Optimize(*scope);
     schedule.NoteCost();
     memory.MeasureRelaxedErrors();
-    EndPhase("break", *scope, start);
+    EndPhase("break", *scope, watch);
     return has_changed;
   }
 
@@ -174,7 +168,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
       }
       graph->Apply(std::move(transaction));
       has_broken = true;
-      if (verdict.is_final) break;
+      if (verdict.is_final || is_stopped) break;
       schedule.Optimize(scope);
     }
     return has_broken;
@@ -182,7 +176,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
 
   // graph <- add(find_structure(graph, level)); x <- optimize(graph).
   bool FindStructure(int level, EmScope* scope) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     const int changes_before = census.num_changes();
     const bool has_found = Detect(level, *scope);
     if (has_found) {
@@ -190,14 +184,14 @@ struct EmOrchestrator::Impl final : public GraphListener {
       schedule.OptimizeAfterFinds(*scope, census.num_changes() - changes_before,
                                   census.num_structure());
     }
-    EndPhase("detect_" + std::to_string(level), *scope, start);
+    EndPhase("detect_" + std::to_string(level), *scope, watch);
     return has_found;
   }
 
   // Has the detectors of a level look, and adds what the filter lets in; true
   // when there was something.
   bool Detect(int level, const EmScope& scope) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     DetectionScope detection;
     detection.level = level;
     detection.stop = [this] { return AskStop(); };
@@ -207,22 +201,26 @@ struct EmOrchestrator::Impl final : public GraphListener {
       detection.lower_features = &ids.lower;
     }
     bool has_found = false;
+    detections.clear();
     const auto& detectors = hierarchy[static_cast<std::size_t>(level)];
     for (std::size_t i = 0; i < detectors.size(); ++i) {
       // Different for every detector, the same in every iteration, so that what
       // is found at a fixed point is the same too.
       detection.seed =
           options.seed + 1000003u * static_cast<std::uint64_t>(level) + i;
+      // Nobody asks for counts without a trace.
+      detection.counts = trace ? &detections[detectors[i]->name()] : nullptr;
       Transaction proposal = detectors[i]->Detect(*graph, registry, detection);
       if (is_stopped) break;
       if (proposal.empty()) continue;
-      Transaction accepted = filter.Filter(std::move(proposal), *detectors[i]);
+      Transaction accepted =
+          filter.Filter(std::move(proposal), *detectors[i], detection);
       if (accepted.empty()) continue;
       RememberTakenBack(accepted);
       graph->Apply(std::move(accepted));
       has_found = true;
     }
-    totals.detect_seconds += SecondsSince(start);
+    totals.detect_seconds += watch.Seconds();
     return has_found;
   }
 
@@ -262,21 +260,22 @@ struct EmOrchestrator::Impl final : public GraphListener {
     if (change > kDeltaChange) schedule.MarkDirty();
   }
 
-  // Reports a phase that began at `start` and asks whether to go on.
+  // Reports a phase that began with `watch` and asks whether to go on.
   void EndPhase(const std::string& name, const EmScope& scope,
-                Clock::time_point start) {
+                const Stopwatch& watch) {
     totals.solve_seconds = schedule.seconds();
     if (trace) {
       EmPhase phase;
       phase.iteration = totals.iterations;
       phase.phase = name;
-      phase.seconds = SecondsSince(start);
+      phase.seconds = watch.Seconds();
       phase.cost = session->Cost(scope.session_scope());
       phase.features = census.features();
       phase.structure_constraints = census.num_structure();
       phase.broken_constraints = census.num_broken();
       phase.structure_by_relation = census.structure_by_relation();
       phase.broken_by_relation = census.broken_by_relation();
+      phase.detections = std::exchange(detections, {});
       trace(phase);
     }
     AskStop();
@@ -297,6 +296,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
   void OnConstraintAdded(const Constraint& constraint) override {
     census.OnConstraintAdded(constraint);
     schedule.OnConstraintChanged(constraint);
+    memory.OnConstraintAdded(constraint);
     if (constraint.state == ConstraintState::kBroken &&
         constraint.kind == ConstraintClass::kStructure) {
       memory.Remember(constraint);
@@ -328,10 +328,29 @@ struct EmOrchestrator::Impl final : public GraphListener {
   ProposalFilter filter;
   StructureCensus census;
 
+  // By detector, since the last phase.
+  std::map<std::string, DetectionCounts> detections;
   bool is_stopped = false;
   std::function<bool()> stop;
   std::function<void(const EmPhase&)> trace;
   EmReport totals;
+};
+
+// Has phases, detectors and solves ask whether to stop while it lives.
+class EmOrchestrator::StopScope {
+ public:
+  StopScope(Impl* em, const std::function<bool()>& stop)
+      : em_(em), solve_stop_(em->session, [em] { return em->AskStop(); }) {
+    em_->is_stopped = false;
+    em_->stop = stop;
+  }
+  StopScope(const StopScope&) = delete;
+  StopScope& operator=(const StopScope&) = delete;
+  ~StopScope() { em_->stop = nullptr; }
+
+ private:
+  Impl* em_;
+  SolveStop solve_stop_;
 };
 
 EmOrchestrator::EmOrchestrator(Graph* graph, SolverSession* session,
@@ -345,7 +364,6 @@ EmOrchestrator::EmOrchestrator(Graph* graph, SolverSession* session,
 EmOrchestrator::~EmOrchestrator() = default;
 
 bool EmOrchestrator::Iterate(const std::vector<FeatureId>* scope) {
-  impl_->stop = nullptr;
   impl_->is_stopped = false;
   // Parameters may have been changed without the graph's knowledge.
   impl_->schedule.MarkDirty();
@@ -353,11 +371,8 @@ bool EmOrchestrator::Iterate(const std::vector<FeatureId>* scope) {
 }
 
 EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {
-  impl_->stop = stop;
-  impl_->is_stopped = false;
-  const EmReport report = impl_->Run();
-  impl_->stop = nullptr;
-  return report;
+  const StopScope stop_scope(impl_.get(), stop);
+  return impl_->Run();
 }
 
 void EmOrchestrator::SetTrace(std::function<void(const EmPhase&)> trace) {

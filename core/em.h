@@ -35,6 +35,9 @@ struct EmPhase {
   /// The same by relation name; of structure only.
   std::map<std::string, int> structure_by_relation;
   std::map<std::string, int> broken_by_relation;
+  /// By the name of the detector, in a phase that detects: what it searched and
+  /// refused, and what of its proposal was let in (ProposalFilter).
+  std::map<std::string, DetectionCounts> detections;
   /// Time of this phase.
   double seconds = 0.0;
 };
@@ -61,9 +64,11 @@ struct EmReport {
 /// solve that follows; every E-step after a solve weighs it anew. Virtual
 /// features that have lost their support go with their constraints.
 ///
-/// The loop ends, since a hypothesis is let in again only as HypothesisMemory
-/// says: it is added at most max_breaks times, and a raw feature has at most
-/// max_breaks_per_feature of them broken per relation.
+/// The loop ends, whatever detectors propose that is not there already: every
+/// hypothesis that comes either stays or is broken, and what is broken is let
+/// in again only as HypothesisMemory says, which bounds how often a relation
+/// may be broken on the raw features that a hypothesis is about, directly or
+/// by way of virtual ones.
 class EmOrchestrator {
  public:
   /// Pointers are not owned and must outlive the orchestrator. Without a judge
@@ -82,8 +87,10 @@ class EmOrchestrator {
 
   /// Iterates on the whole graph until it has converged (or max_iterations).
   /// The first solve has the measurements only, unless structure is live
-  /// already. `stop` is asked between phases and ends the loop when it returns
-  /// true. Returns the sums of this run.
+  /// already. `stop` is asked after every phase, every step of a solve, and by
+  /// detectors that take long; once it has returned true the loop ends within
+  /// that step, and what a detector was about to propose is not added. Returns
+  /// the sums of this run.
   EmReport Run(const std::function<bool()>& stop = nullptr);
 
   /// Called after every phase.
@@ -94,6 +101,7 @@ class EmOrchestrator {
 
  private:
   struct Impl;
+  class StopScope;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -65,7 +65,8 @@ struct EmOptions {
   int max_breaks = 3;
   /// Nor when a raw feature has had so many hypotheses of one relation broken,
   /// whatever their values: a virtual feature that comes back a little to the
-  /// side each time would otherwise never be the same hypothesis.
+  /// side each time would otherwise never be the same hypothesis. The same for
+  /// hypotheses between virtual features that stand on the same raw ones.
   int max_breaks_per_feature = 10;
   std::uint64_t seed = 1;
   /// By relation; what is missing is as the detectors propose it. As many

@@ -17,6 +17,10 @@ constexpr std::int64_t kNoId = -1;
 /// Most parameters that a feature type may have.
 constexpr int kMaxFeatureSize = 6;
 
+/// Highest level of a feature: far more than any hierarchy has, so that a
+/// number which is none is refused.
+constexpr int kMaxLevel = 1000;
+
 struct FeatureType;  // core/registry.h
 
 /// A node of the graph: something with parameters to be estimated (method.md,

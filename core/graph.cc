@@ -61,10 +61,10 @@ void CheckFeature(const Feature& feature) {
         feature.type->name + " has a number that is not finite",
         "finite numbers");
   }
-  if (feature.level < 0) {
+  if (feature.level < 0 || feature.level > kMaxLevel) {
     throw PLUMBLINE_ERROR(
         feature.type->name + " of level " + std::to_string(feature.level),
-        "a level of at least 0");
+        "a level from 0 to " + std::to_string(kMaxLevel));
   }
 }
 
@@ -92,27 +92,72 @@ Error UnknownId(const std::string& what, Id id) {
                          "the id of a " + what + " in the graph");
 }
 
+// Does nothing for a type of feature that fits the i-th place of a relation.
+void CheckFits(const RelationType& relation, std::size_t i,
+               const FeatureType& type) {
+  const std::vector<std::string>& fitting = relation.feature_types[i];
+  if (std::find(fitting.begin(), fitting.end(), type.name) != fitting.end()) {
+    return;
+  }
+  std::string names;
+  for (const std::string& name : fitting) {
+    names += (names.empty() ? "" : " or ") + name;
+  }
+  throw PLUMBLINE_ERROR("feature " + std::to_string(i + 1) + " of " +
+                            relation.name + " is a " + type.name,
+                        names);
+}
+
 }  // namespace
+
+// What is left to do of a transaction that was checked. Ids ascending.
+struct Graph::Removals {
+  std::vector<FeatureId> features;
+  // Broken ones that go with their features included.
+  std::vector<ConstraintId> constraints;
+  std::vector<ConstraintId> broken;
+};
+
+// What is no longer live or there, for the listeners.
+struct Graph::Retired {
+  // In the order of ids; removed ones are among `dead_constraints`.
+  std::vector<const Constraint*> constraints;
+  std::vector<std::unique_ptr<Constraint>> dead_constraints;
+  std::vector<std::unique_ptr<Node>> dead_features;
+};
 
 TransactionResult Graph::Apply(Transaction transaction) {
   // First everything is checked, then everything is changed: nothing below the
   // checks throws (out of memory apart).
-  const std::vector<FeatureId> removed_features =
-      SortedUnique(transaction.removed_features(), "feature");
-  std::vector<ConstraintId> removed =
-      SortedUnique(transaction.removed_constraints(), "constraint");
-  const std::vector<ConstraintId> broken =
-      SortedUnique(transaction.broken_constraints(), "constraint");
+  const Removals removals = CheckRemovals(transaction);
+  for (const Feature& feature : transaction.added_features()) {
+    CheckFeature(feature);
+  }
+  for (const Constraint& constraint : transaction.added_constraints()) {
+    CheckAddition(constraint, transaction.added_features(), removals);
+  }
+  const Retired retired = Retire(removals);
+  const TransactionResult added = Add(&transaction);
+  Tell(retired, added);
+  return added;
+}
 
-  for (const ConstraintId id : removed) {
+Graph::Removals Graph::CheckRemovals(const Transaction& transaction) const {
+  Removals removals;
+  removals.features = SortedUnique(transaction.removed_features(), "feature");
+  removals.constraints =
+      SortedUnique(transaction.removed_constraints(), "constraint");
+  removals.broken =
+      SortedUnique(transaction.broken_constraints(), "constraint");
+  for (const ConstraintId id : removals.constraints) {
     if (FindConstraint(id) == nullptr) throw UnknownId("constraint", id);
-    if (Contains(broken, id)) {
+    if (Contains(removals.broken, id)) {
       throw PLUMBLINE_ERROR(
           "constraint " + std::to_string(id) + " is both broken and removed",
           "one of the two");
     }
   }
-  for (const ConstraintId id : broken) {
+  for (const ConstraintId id : removals.broken) {
     const Constraint* constraint = FindConstraint(id);
     if (constraint == nullptr) throw UnknownId("constraint", id);
     if (constraint->state != ConstraintState::kLive) {
@@ -122,14 +167,14 @@ TransactionResult Graph::Apply(Transaction transaction) {
     }
   }
   std::vector<ConstraintId> gone_with_features;
-  for (const FeatureId id : removed_features) {
+  for (const FeatureId id : removals.features) {
     const Feature* feature = FindFeature(id);
     if (feature == nullptr) throw UnknownId("feature", id);
     for (const ConstraintId constraint_id : ConstraintsOf(id)) {
-      if (Contains(removed, constraint_id)) continue;
+      if (Contains(removals.constraints, constraint_id)) continue;
       const Constraint& constraint = GetConstraint(constraint_id);
       if (constraint.state == ConstraintState::kLive &&
-          !Contains(broken, constraint_id)) {
+          !Contains(removals.broken, constraint_id)) {
         throw PLUMBLINE_ERROR(
             "feature " + Describe(*feature) +
                 " cannot be removed: live constraint " + Describe(constraint) +
@@ -139,100 +184,94 @@ TransactionResult Graph::Apply(Transaction transaction) {
       gone_with_features.push_back(constraint_id);
     }
   }
-  const std::vector<Feature>& added = transaction.added_features();
-  for (const Feature& feature : added) CheckFeature(feature);
-  for (const Constraint& constraint : transaction.added_constraints()) {
-    if (constraint.type == nullptr) {
-      throw PLUMBLINE_ERROR("constraint without a type", "a registered type");
-    }
-    const RelationType& type = *constraint.type;
-    if (constraint.features.size() != type.feature_types.size()) {
-      throw PLUMBLINE_ERROR(type.name + " between " +
-                                std::to_string(constraint.features.size()) +
-                                " features",
-                            std::to_string(type.feature_types.size()));
-    }
-    for (std::size_t i = 0; i < constraint.features.size(); ++i) {
-      const FeatureId id = constraint.features[i];
-      const FeatureType* feature_type = nullptr;
-      if (Transaction::IsProvisional(id)) {
-        const std::size_t index = Transaction::ProvisionalIndex(id);
-        if (index >= added.size()) throw UnknownId("added feature", id);
-        feature_type = added[index].type;
-      } else {
-        const Feature* feature = FindFeature(id);
-        if (feature == nullptr || Contains(removed_features, id)) {
-          throw UnknownId("feature", id);
-        }
-        feature_type = feature->type;
-      }
-      const std::vector<std::string>& fitting = type.feature_types[i];
-      if (std::find(fitting.begin(), fitting.end(), feature_type->name) ==
-          fitting.end()) {
-        std::string names;
-        for (const std::string& name : fitting) {
-          names += (names.empty() ? "" : " or ") + name;
-        }
-        throw PLUMBLINE_ERROR("feature " + std::to_string(i + 1) + " of " +
-                                  type.name + " is a " + feature_type->name,
-                              names);
-      }
-      // A solver takes each block once in a residual.
-      if (std::count(constraint.features.begin(), constraint.features.end(),
-                     id) > 1) {
-        throw PLUMBLINE_ERROR(
-            type.name + " from feature " + std::to_string(id) + " to itself",
-            "different features");
-      }
-    }
-    CheckNumbers(type, constraint.expected, constraint.information);
-    if (!(constraint.delta >= 0.0 && constraint.delta <= 1.0)) {
-      throw PLUMBLINE_ERROR(
-          "delta of " + type.name + " is " + std::to_string(constraint.delta),
-          "a number in [0, 1]");
-    }
-  }
-
-  // Retired constraints and removed features are kept until the listeners have
-  // been told.
-  std::vector<std::unique_ptr<Constraint>> dead_constraints;
-  std::vector<const Constraint*> retired;
+  std::vector<ConstraintId>& removed = removals.constraints;
   removed.insert(removed.end(), gone_with_features.begin(),
                  gone_with_features.end());
   std::sort(removed.begin(), removed.end());
   // Between two removed features, a broken constraint is met twice.
   removed.erase(std::unique(removed.begin(), removed.end()), removed.end());
-  for (const ConstraintId id : broken) {
+  return removals;
+}
+
+void Graph::CheckAddition(const Constraint& constraint,
+                          const std::vector<Feature>& added,
+                          const Removals& removals) const {
+  if (constraint.type == nullptr) {
+    throw PLUMBLINE_ERROR("constraint without a type", "a registered type");
+  }
+  const RelationType& type = *constraint.type;
+  if (constraint.features.size() != type.feature_types.size()) {
+    throw PLUMBLINE_ERROR(type.name + " between " +
+                              std::to_string(constraint.features.size()) +
+                              " features",
+                          std::to_string(type.feature_types.size()));
+  }
+  for (std::size_t i = 0; i < constraint.features.size(); ++i) {
+    const FeatureId id = constraint.features[i];
+    if (Transaction::IsProvisional(id)) {
+      const std::size_t index = Transaction::ProvisionalIndex(id);
+      if (index >= added.size()) throw UnknownId("added feature", id);
+      CheckFits(type, i, *added[index].type);
+    } else {
+      const Feature* feature = FindFeature(id);
+      if (feature == nullptr || Contains(removals.features, id)) {
+        throw UnknownId("feature", id);
+      }
+      CheckFits(type, i, *feature->type);
+    }
+    // A solver takes each block once in a residual.
+    if (std::count(constraint.features.begin(), constraint.features.end(), id) >
+        1) {
+      throw PLUMBLINE_ERROR(
+          type.name + " from feature " + std::to_string(id) + " to itself",
+          "different features");
+    }
+  }
+  CheckNumbers(type, constraint.expected, constraint.information);
+  if (!(constraint.delta >= 0.0 && constraint.delta <= 1.0)) {
+    throw PLUMBLINE_ERROR(
+        "delta of " + type.name + " is " + std::to_string(constraint.delta),
+        "a number in [0, 1]");
+  }
+}
+
+Graph::Retired Graph::Retire(const Removals& removals) {
+  Retired retired;
+  for (const ConstraintId id : removals.broken) {
     Constraint& constraint = *constraints_[id];
     constraint.state = ConstraintState::kBroken;
-    retired.push_back(&constraint);
+    retired.constraints.push_back(&constraint);
   }
-  for (const ConstraintId id : removed) {
+  for (const ConstraintId id : removals.constraints) {
     std::unique_ptr<Constraint>& slot = constraints_[id];
     for (const FeatureId feature_id : slot->features) {
       std::vector<ConstraintId>& adjacent = features_[feature_id]->constraints;
       adjacent.erase(std::lower_bound(adjacent.begin(), adjacent.end(), id));
     }
-    if (!Contains(broken, id)) retired.push_back(slot.get());
-    dead_constraints.push_back(std::move(slot));
+    if (!Contains(removals.broken, id)) {
+      retired.constraints.push_back(slot.get());
+    }
+    retired.dead_constraints.push_back(std::move(slot));
     --num_constraints_;
   }
   std::sort(
-      retired.begin(), retired.end(),
+      retired.constraints.begin(), retired.constraints.end(),
       [](const Constraint* a, const Constraint* b) { return a->id < b->id; });
-  std::vector<std::unique_ptr<Node>> dead_features;
-  for (const FeatureId id : removed_features) {
+  for (const FeatureId id : removals.features) {
     const Feature& feature = features_[id]->feature;
     if (feature.is_virtual) {
       std::vector<FeatureId>& ids = virtual_features_[feature.level];
       ids.erase(std::lower_bound(ids.begin(), ids.end(), id));
     }
-    dead_features.push_back(std::move(features_[id]));
+    retired.dead_features.push_back(std::move(features_[id]));
     --num_features_;
   }
+  return retired;
+}
 
+TransactionResult Graph::Add(Transaction* transaction) {
   TransactionResult result;
-  for (Feature& feature : transaction.added_features()) {
+  for (Feature& feature : transaction->added_features()) {
     auto node = std::make_unique<Node>();
     node->feature = std::move(feature);
     node->feature.id = feature_id_end();
@@ -245,8 +284,8 @@ TransactionResult Graph::Apply(Transaction transaction) {
     features_.push_back(std::move(node));
     ++num_features_;
   }
-  for (Constraint& added_constraint : transaction.added_constraints()) {
-    auto constraint = std::make_unique<Constraint>(std::move(added_constraint));
+  for (Constraint& added : transaction->added_constraints()) {
+    auto constraint = std::make_unique<Constraint>(std::move(added));
     constraint->id = constraint_id_end();
     for (FeatureId& id : constraint->features) {
       if (Transaction::IsProvisional(id)) {
@@ -258,22 +297,24 @@ TransactionResult Graph::Apply(Transaction transaction) {
     constraints_.push_back(std::move(constraint));
     ++num_constraints_;
   }
+  return result;
+}
 
+void Graph::Tell(const Retired& retired, const TransactionResult& added) const {
   for (GraphListener* listener : listeners_) {
-    for (const Constraint* constraint : retired) {
+    for (const Constraint* constraint : retired.constraints) {
       listener->OnConstraintRetired(*constraint);
     }
-    for (const auto& node : dead_features) {
+    for (const auto& node : retired.dead_features) {
       listener->OnFeatureRemoved(node->feature);
     }
-    for (const FeatureId id : result.features) {
+    for (const FeatureId id : added.features) {
       listener->OnFeatureAdded(features_[id]->feature);
     }
-    for (const ConstraintId id : result.constraints) {
+    for (const ConstraintId id : added.constraints) {
       listener->OnConstraintAdded(*constraints_[id]);
     }
   }
-  return result;
 }
 
 void Graph::UpdateConstraint(ConstraintId id, const Eigen::VectorXd& expected,

@@ -38,8 +38,9 @@ class Graph {
   /// Applies a transaction whole or not at all. Throws Error and leaves the
   /// graph as it was when an id is unknown, a constraint's features do not fit
   /// its relation, sizes disagree, a number is not finite, the information is
-  /// not symmetric positive semidefinite, or a feature to be removed is used
-  /// by a live constraint that stays (the message names both).
+  /// not symmetric positive semidefinite, a level is not in [0, kMaxLevel], or
+  /// a feature to be removed is used by a live constraint that stays (the
+  /// message names both).
   TransactionResult Apply(Transaction transaction);
 
   /// Gives a live measurement a new expected value and information (the robot's
@@ -96,6 +97,17 @@ class Graph {
     Feature feature;
     std::vector<ConstraintId> constraints;
   };
+  struct Removals;
+  struct Retired;
+
+  // The steps of Apply: these two throw, the others must not.
+  Removals CheckRemovals(const Transaction& transaction) const;
+  void CheckAddition(const Constraint& constraint,
+                     const std::vector<Feature>& added,
+                     const Removals& removals) const;
+  Retired Retire(const Removals& removals);
+  TransactionResult Add(Transaction* transaction);
+  void Tell(const Retired& retired, const TransactionResult& added) const;
 
   std::vector<std::unique_ptr<Node>> features_;
   std::vector<std::unique_ptr<Constraint>> constraints_;

@@ -511,8 +511,8 @@ class Reader {
     own.line = line_;
     own.file_id = Id(fields_[1]);
     Feature& feature = own.attributes;
-    feature.level = static_cast<int>(
-        Integer(fields_[2], "level", 0, std::numeric_limits<int>::max()));
+    feature.level =
+        static_cast<int>(Integer(fields_[2], "level", 0, kMaxLevel));
     feature.is_virtual = Integer(fields_[3], "virtual", 0, 1) == 1;
     feature.anchor = {Number(fields_[4]), Number(fields_[5])};
     feature.extent_begin = Number(fields_[6]);

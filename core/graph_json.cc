@@ -250,7 +250,7 @@ Feature ReadFeature(const Node& node, const Registry& registry) {
     }
     type.Fail("is \"" + type.String() + "\"", "one of " + known);
   }
-  feature.level = static_cast<int>(node.Get("level").Integer(kLargestInt));
+  feature.level = static_cast<int>(node.Get("level").Integer(kMaxLevel));
   feature.is_virtual = node.Get("virtual").Boolean();
   feature.fixed = node.Get("fixed").Boolean();
   const Node parameters = node.Get("parameters");

@@ -1,41 +1,11 @@
+#include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/hypothesis_memory.h>
-#include <plumbline/core/information.h>
-#include <plumbline/core/registry.h>
 
 #include <algorithm>
 #include <cmath>
 
 namespace plumbline {
 namespace {
-
-// Infinite where the relation cannot be evaluated.
-Eigen::VectorXd WhitenedError(const RelationType& relation,
-                              const Eigen::VectorXd& expected,
-                              const Eigen::MatrixXd& information,
-                              const std::vector<const Feature*>& features) {
-  RelationArguments arguments;
-  arguments.expected = expected;
-  arguments.sqrt_information = SqrtInformation(information);
-  arguments.features = features;
-  std::vector<const double*> parameters;
-  parameters.reserve(features.size());
-  for (const Feature* feature : features) {
-    parameters.push_back(feature->data());
-  }
-  const auto cost = relation.make_cost(arguments);
-  Eigen::VectorXd error(relation.residual_size);
-  if (!cost->Evaluate(parameters.data(), error.data(), nullptr) ||
-      !error.allFinite()) {
-    error.setConstant(std::numeric_limits<double>::infinity());
-  }
-  return error;
-}
-
-Eigen::VectorXd WhitenedError(const Constraint& constraint,
-                              const std::vector<const Feature*>& features) {
-  return WhitenedError(*constraint.type, constraint.expected,
-                       constraint.information, features);
-}
 
 // The first raw feature; kNoId when all are virtual.
 FeatureId KeyOf(const std::vector<const Feature*>& features) {
@@ -53,6 +23,28 @@ HypothesisMemory::HypothesisMemory(const Graph* graph, const EmOptions& options)
       max_breaks_(options.max_breaks),
       max_breaks_per_feature_(options.max_breaks_per_feature) {}
 
+void HypothesisMemory::OnConstraintAdded(const Constraint& constraint) {
+  if (constraint.kind != ConstraintClass::kStructure) return;
+  for (const FeatureId id : constraint.features) {
+    const Feature& feature = graph_->GetFeature(id);
+    if (!feature.is_virtual) continue;
+    for (const FeatureId other : constraint.features) {
+      if (graph_->GetFeature(other).level >= feature.level) continue;
+      const FeatureId root = RootOf(other);
+      if (root == kNoId) continue;
+      const auto [found, is_new] = roots_.emplace(id, root);
+      if (!is_new) found->second = std::min(found->second, root);
+    }
+  }
+}
+
+FeatureId HypothesisMemory::RootOf(FeatureId id) const {
+  const auto found = roots_.find(id);
+  if (found != roots_.end()) return found->second;
+  const Feature* feature = graph_->FindFeature(id);
+  return feature != nullptr && !feature->is_virtual ? id : kNoId;
+}
+
 void HypothesisMemory::Remember(const Constraint& constraint) {
   const std::vector<const Feature*> features = RecallAll(constraint.features);
   const FeatureId key = KeyOf(features);
@@ -62,20 +54,21 @@ void HypothesisMemory::Remember(const Constraint& constraint) {
       [&](const auto& one) { return SaysTheSame(one, constraint, features); });
   if (hypothesis == hypotheses.end()) {
     hypothesis = hypotheses.emplace(hypotheses.end());
-    hypothesis->relation = constraint.type;
-    hypothesis->expected = constraint.expected;
   }
   // The latest values are those to compare with.
-  hypothesis->features = constraint.features;
-  hypothesis->information = constraint.information;
+  hypothesis->said = constraint;
   hypothesis->error = std::numeric_limits<double>::infinity();
   ++hypothesis->breaks;
   unmeasured_.insert(key);
+  if (key == kNoId) {
+    ++breaks_by_roots_[{constraint.type, RootsOf(constraint.features)}];
+  }
 }
 
 void HypothesisMemory::OnFeatureRemoved(const Feature& feature) {
   if (feature.is_virtual) {
     dropped_.emplace(feature.id, feature);
+    roots_.erase(feature.id);
   } else {
     hypotheses_.erase(feature.id);
   }
@@ -88,30 +81,32 @@ void HypothesisMemory::MeasureRelaxedErrors() {
     for (Hypothesis& hypothesis : found->second) {
       if (!std::isinf(hypothesis.error)) continue;
       const std::vector<const Feature*> features =
-          RecallAll(hypothesis.features);
-      if (features.size() != hypothesis.features.size()) continue;
-      hypothesis.error =
-          WhitenedError(*hypothesis.relation, hypothesis.expected,
-                        hypothesis.information, features)
-              .norm();
+          RecallAll(hypothesis.said.features);
+      if (features.size() != hypothesis.said.features.size()) continue;
+      hypothesis.error = WhitenedError(hypothesis.said, features).norm();
     }
   }
   unmeasured_.clear();
 }
 
 bool HypothesisMemory::MayBeProposed(
-    const Constraint& constraint,
-    const std::vector<const Feature*>& features) const {
+    const Constraint& constraint, const std::vector<const Feature*>& features,
+    std::vector<FeatureId> roots) const {
   const FeatureId key = KeyOf(features);
   const auto found = hypotheses_.find(key);
   if (found == hypotheses_.end()) return true;
-  if (key != kNoId) {
-    int breaks = 0;
+  int breaks = 0;
+  if (key == kNoId) {
+    if (roots.empty()) roots = RootsOf(constraint.features);
+    const auto rooted =
+        breaks_by_roots_.find({constraint.type, std::move(roots)});
+    if (rooted != breaks_by_roots_.end()) breaks = rooted->second;
+  } else {
     for (const Hypothesis& hypothesis : found->second) {
-      if (hypothesis.relation == constraint.type) breaks += hypothesis.breaks;
+      if (hypothesis.said.type == constraint.type) breaks += hypothesis.breaks;
     }
-    if (breaks >= max_breaks_per_feature_) return false;
   }
+  if (breaks >= max_breaks_per_feature_) return false;
   for (const Hypothesis& hypothesis : found->second) {
     if (!SaysTheSame(hypothesis, constraint, features)) continue;
     return hypothesis.breaks < max_breaks_ &&
@@ -129,6 +124,13 @@ const Feature* HypothesisMemory::Recall(FeatureId id) const {
   return found == dropped_.end() ? nullptr : &found->second;
 }
 
+std::vector<FeatureId> HypothesisMemory::RootsOf(
+    const std::vector<FeatureId>& ids) const {
+  std::vector<FeatureId> roots;
+  for (const FeatureId id : ids) roots.push_back(RootOf(id));
+  return roots;
+}
+
 // Forgotten ones are left out.
 std::vector<const Feature*> HypothesisMemory::RecallAll(
     const std::vector<FeatureId>& ids) const {
@@ -144,17 +146,17 @@ std::vector<const Feature*> HypothesisMemory::RecallAll(
 bool HypothesisMemory::SaysTheSame(
     const Hypothesis& hypothesis, const Constraint& constraint,
     const std::vector<const Feature*>& features) const {
-  if (hypothesis.relation != constraint.type ||
-      hypothesis.expected != constraint.expected) {
+  const Constraint& said = hypothesis.said;
+  if (said.type != constraint.type || said.expected != constraint.expected) {
     return false;
   }
   std::vector<const Feature*> replaced = features;
   bool is_same = true;
   for (std::size_t i = 0; i < features.size(); ++i) {
     // A new feature has no id and equals none.
-    if (features[i]->id == hypothesis.features[i]) continue;
+    if (features[i]->id == said.features[i]) continue;
     is_same = false;
-    const Feature* own = Recall(hypothesis.features[i]);
+    const Feature* own = Recall(said.features[i]);
     if (own == nullptr || !own->is_virtual || !features[i]->is_virtual ||
         own->type != features[i]->type) {
       return false;

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -24,12 +25,19 @@ namespace plumbline {
 /// It is let in again only when its error has fallen by more than
 /// reproposal_sigmas since, and only max_breaks times. A raw feature may have
 /// max_breaks_per_feature hypotheses of one relation broken, whatever their
-/// values. So what can be added is bounded, and the loop of EM ends.
+/// values. Hypotheses between virtual features alone count for the roots of
+/// these: the raw feature with the smallest id that each has stood on, through
+/// structure constraints down the levels. There are only so many raw features,
+/// so what can be added is bounded, and the loop of EM ends.
 class HypothesisMemory {
  public:
   /// The graph is not owned and must outlive the memory. Of the options, those
   /// on proposing again are read.
   HypothesisMemory(const Graph* graph, const EmOptions& options);
+
+  /// To be called for every constraint that comes into the graph, in the order
+  /// of ids: it tells what virtual features stand on.
+  void OnConstraintAdded(const Constraint& constraint);
 
   /// Enters a structure constraint of the graph that was broken, or one that a
   /// detector is about to take back.
@@ -45,17 +53,20 @@ class HypothesisMemory {
 
   /// False when this was broken before and nothing speaks for trying it again.
   /// `features` are the constraint's, in its order; those of a proposal have no
-  /// id yet. Sizes must fit the relation.
+  /// id yet. Sizes must fit the relation. `roots` are those of the features;
+  /// empty: as the graph has them. Only those between virtual features count.
   bool MayBeProposed(const Constraint& constraint,
-                     const std::vector<const Feature*>& features) const;
+                     const std::vector<const Feature*>& features,
+                     std::vector<FeatureId> roots = {}) const;
+
+  /// The root of a feature of the graph: itself when it is raw; kNoId when it
+  /// stands on nothing.
+  FeatureId RootOf(FeatureId id) const;
 
  private:
-  // A broken hypothesis, by what it said.
+  // A broken hypothesis, by what it said last.
   struct Hypothesis {
-    const RelationType* relation = nullptr;
-    std::vector<FeatureId> features;
-    Eigen::VectorXd expected;
-    Eigen::MatrixXd information;
+    Constraint said;
     // Norm of the whitened error, that is in standard deviations, once the map
     // had been solved without it.
     double error = std::numeric_limits<double>::infinity();
@@ -64,7 +75,10 @@ class HypothesisMemory {
   // By the first raw feature; what is between virtual ones alone is under
   // kNoId.
   using HypothesesByFeature = std::map<FeatureId, std::vector<Hypothesis>>;
+  // A relation and the roots of the features that it is between.
+  using RootedRelation = std::pair<const RelationType*, std::vector<FeatureId>>;
 
+  std::vector<FeatureId> RootsOf(const std::vector<FeatureId>& ids) const;
   const Feature* Recall(FeatureId id) const;
   std::vector<const Feature*> RecallAll(
       const std::vector<FeatureId>& ids) const;
@@ -78,6 +92,10 @@ class HypothesisMemory {
   HypothesesByFeature hypotheses_;
   // Keys of hypotheses that were broken and not measured since.
   std::set<FeatureId> unmeasured_;
+  // Of virtual features.
+  std::map<FeatureId, FeatureId> roots_;
+  // How often hypotheses between virtual features alone were broken.
+  std::map<RootedRelation, int> breaks_by_roots_;
   // Virtual features that are gone, as they were last.
   std::map<FeatureId, Feature> dropped_;
 };

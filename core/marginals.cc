@@ -1,3 +1,4 @@
+#include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/information.h>
@@ -34,44 +35,13 @@ std::string Describe(const Feature& feature) {
 // As SolverSession::Linearize, with the weight of the last E-step.
 LinearizedConstraint LinearizeByDelta(const Graph& graph,
                                       const Constraint& constraint) {
-  using RowMajor =
-      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  RelationArguments arguments;
-  arguments.expected = constraint.expected;
-  arguments.sqrt_information = SqrtInformation(constraint.information);
-  std::vector<const double*> parameters;
-  std::vector<RowMajor> rows;
-  std::vector<double*> jacobians;
-  for (const FeatureId id : constraint.features) {
-    const Feature& feature = graph.GetFeature(id);
-    arguments.features.push_back(&feature);
-    parameters.push_back(feature.data());
-    rows.emplace_back(constraint.type->residual_size, feature.type->size);
-  }
-  for (RowMajor& matrix : rows) jacobians.push_back(matrix.data());
-  const auto cost = constraint.type->make_cost(arguments);
-  LinearizedConstraint linearized;
-  linearized.residual.resize(constraint.type->residual_size);
-  bool is_finite = cost->Evaluate(parameters.data(), linearized.residual.data(),
-                                  jacobians.data()) &&
-                   linearized.residual.allFinite();
-  for (const RowMajor& matrix : rows) {
-    is_finite = is_finite && matrix.allFinite();
-  }
-  if (!is_finite) {
-    throw PLUMBLINE_ERROR(
-        constraint.type->name + " " + std::to_string(constraint.id) +
-            " cannot be linearized",
-        "a state at which the residual and its derivatives are finite");
-  }
-  const double weight = constraint.kind == ConstraintClass::kStructure
-                            ? std::sqrt(std::max(constraint.delta, kDeltaFloor))
-                            : 1.0;
-  linearized.residual *= weight;
-  for (const RowMajor& matrix : rows) {
-    linearized.jacobians.push_back(weight * matrix);
-  }
-  return linearized;
+  const auto cost =
+      MakeCost(constraint, SqrtInformation(constraint.information),
+               FeaturesOf(graph, constraint));
+  LinearizedConstraint linearized = Linearize(graph, constraint, *cost);
+  if (constraint.kind != ConstraintClass::kStructure) return linearized;
+  return Weighted(std::move(linearized),
+                  std::sqrt(std::max(constraint.delta, kDeltaFloor)));
 }
 
 bool IsPose(const FeatureType& type) {

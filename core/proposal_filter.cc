@@ -24,6 +24,33 @@ class ProposedFeatures {
     return index < added_->size() ? &(*added_)[index] : nullptr;
   }
 
+  // Finds out what the new features stand on, when these constraints are in the
+  // graph.
+  void FindRoots(const std::vector<Constraint>& constraints,
+                 const HypothesisMemory& memory) {
+    for (const Constraint& constraint : constraints) {
+      for (const FeatureId id : constraint.features) {
+        const Feature* feature = Find(id);
+        if (feature == nullptr || !Transaction::IsProvisional(id)) continue;
+        for (const FeatureId other_id : constraint.features) {
+          const Feature* other = Find(other_id);
+          if (other == nullptr || other->level >= feature->level) continue;
+          const FeatureId root = RootOf(other_id, memory);
+          if (root == kNoId) continue;
+          const auto [found, is_new] = roots_.emplace(id, root);
+          if (!is_new) found->second = std::min(found->second, root);
+        }
+      }
+    }
+  }
+
+  // As in HypothesisMemory, new features included.
+  FeatureId RootOf(FeatureId id, const HypothesisMemory& memory) const {
+    if (!Transaction::IsProvisional(id)) return memory.RootOf(id);
+    const auto found = roots_.find(id);
+    return found == roots_.end() ? kNoId : found->second;
+  }
+
   // Those of a constraint that are there and have a type.
   std::vector<const Feature*> Of(const Constraint& constraint) const {
     std::vector<const Feature*> features;
@@ -39,6 +66,8 @@ class ProposedFeatures {
  private:
   const Graph* graph_;
   const std::vector<Feature>* added_;
+  // Of new features.
+  std::map<FeatureId, FeatureId> roots_;
 };
 
 // True when the numbers fit the relation and each other, so that the error can
@@ -169,20 +198,38 @@ ProposalFilter::ProposalFilter(
       support_(support) {}
 
 Transaction ProposalFilter::Filter(Transaction proposal,
-                                   const StructureDetector& detector) const {
+                                   const StructureDetector& detector,
+                                   const DetectionScope& scope) const {
   std::vector<Feature>& features = proposal.added_features();
   for (Feature& feature : features) {
     feature.is_virtual = true;
     if (feature.source.empty()) feature.source = detector.name();
   }
-  const ProposedFeatures proposed(graph_, &features);
+  ProposedFeatures proposed(graph_, &features);
+  proposed.FindRoots(proposal.added_constraints(), *memory_);
   std::vector<Constraint> constraints;
+  std::int64_t unexpected = 0;
+  std::int64_t there = 0;
+  std::int64_t broken = 0;
   for (Constraint& constraint : proposal.added_constraints()) {
-    if (!ApplyPrior(&constraint)) continue;
-    const std::vector<const Feature*> between = proposed.Of(constraint);
-    if (IsWellFormed(constraint, between) &&
-        (IsThere(constraint) || !memory_->MayBeProposed(constraint, between))) {
+    if (!ApplyPrior(&constraint)) {
+      ++unexpected;
       continue;
+    }
+    const std::vector<const Feature*> between = proposed.Of(constraint);
+    if (IsWellFormed(constraint, between)) {
+      if (IsThere(constraint)) {
+        ++there;
+        continue;
+      }
+      std::vector<FeatureId> roots;
+      for (const FeatureId id : constraint.features) {
+        roots.push_back(proposed.RootOf(id, *memory_));
+      }
+      if (!memory_->MayBeProposed(constraint, between, std::move(roots))) {
+        ++broken;
+        continue;
+      }
     }
     if (constraint.source.empty()) constraint.source = detector.name();
     constraints.push_back(std::move(constraint));
@@ -190,7 +237,22 @@ Transaction ProposalFilter::Filter(Transaction proposal,
   SupportedPart part(features, constraints);
   part.Reduce(features, proposed, detector, *support_);
 
+  const auto proposed_features = static_cast<std::int64_t>(features.size());
+  const auto possible = static_cast<std::int64_t>(constraints.size());
   Transaction accepted = MakeTransaction(part, &features, &constraints);
+  const auto let_in =
+      static_cast<std::int64_t>(accepted.added_constraints().size());
+  scope.Count("features proposed", proposed_features);
+  scope.Count("features refused: too little support",
+              proposed_features -
+                  static_cast<std::int64_t>(accepted.added_features().size()));
+  scope.Count("constraints proposed",
+              static_cast<std::int64_t>(proposal.added_constraints().size()));
+  scope.Count("constraints refused: not expected", unexpected);
+  scope.Count("constraints refused: there already", there);
+  scope.Count("constraints refused: broken before", broken);
+  scope.Count("constraints refused: feature with too little support",
+              possible - let_in);
   for (const FeatureId id : proposal.removed_features()) {
     accepted.RemoveFeature(id);
   }

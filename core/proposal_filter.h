@@ -29,9 +29,10 @@ class ProposalFilter {
   /// The part of the proposal that is let in, under other provisional ids, with
   /// the tolerances of the priors; new features are marked as virtual, and the
   /// detector's name is filled in where no source is given. Throws Error when a
-  /// prior does not fit its relation.
-  Transaction Filter(Transaction proposal,
-                     const StructureDetector& detector) const;
+  /// prior does not fit its relation. Counts what is let in and what is not
+  /// into `scope`.
+  Transaction Filter(Transaction proposal, const StructureDetector& detector,
+                     const DetectionScope& scope = DetectionScope()) const;
 
  private:
   bool ApplyPrior(Constraint* constraint) const;

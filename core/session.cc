@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <utility>
@@ -135,6 +136,25 @@ class CoarseEnd final : public ceres::IterationCallback {
   double function_tolerance_;
 };
 
+// Ends a solve with what it has when it is told to.
+class StopWhenAsked final : public ceres::IterationCallback {
+ public:
+  explicit StopWhenAsked(const std::function<bool()>& stop) : stop_(stop) {}
+
+  ceres::CallbackReturnType operator()(
+      const ceres::IterationSummary& /*step*/) override {
+    if (!stop_()) return ceres::SOLVER_CONTINUE;
+    has_stopped_ = true;
+    return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+  }
+
+  bool has_stopped() const { return has_stopped_; }
+
+ private:
+  const std::function<bool()>& stop_;
+  bool has_stopped_ = false;
+};
+
 struct Block {
   Feature* feature = nullptr;
   TypeInfo* type = nullptr;
@@ -173,21 +193,11 @@ struct SolverSession::Impl {
     return &types.emplace(type, MakeTypeInfo(*type)).first->second;
   }
 
-  RelationArguments ArgumentsOf(const Constraint& constraint) const {
-    RelationArguments arguments;
-    arguments.expected = constraint.expected;
-    arguments.features.reserve(constraint.features.size());
-    for (const FeatureId id : constraint.features) {
-      arguments.features.push_back(&std::as_const(*graph).GetFeature(id));
-    }
-    return arguments;
-  }
-
   std::unique_ptr<ceres::CostFunction> MakeCost(
       const Constraint& constraint) const {
-    RelationArguments arguments = ArgumentsOf(constraint);
-    arguments.sqrt_information = SqrtInformation(constraint.information);
-    return constraint.type->make_cost(arguments);
+    return plumbline::MakeCost(constraint,
+                               SqrtInformation(constraint.information),
+                               FeaturesOf(*graph, constraint));
   }
 
   Residual& ResidualOf(ConstraintId id) { return *residuals[id]; }
@@ -344,11 +354,19 @@ struct SolverSession::Impl {
         solver.function_tolerance = 0.0;
         solver.callbacks.push_back(&coarse_end);
       }
+      StopWhenAsked stop_when_asked(stop);
+      if (stop) solver.callbacks.push_back(&stop_when_asked);
       ceres::Solver::Summary summary;
       ceres::Solve(solver, solved, &summary);
       report.usable = summary.IsSolutionUsable();
-      report.converged = summary.termination_type == ceres::CONVERGENCE ||
-                         summary.termination_type == ceres::USER_SUCCESS;
+      report.converged = !stop_when_asked.has_stopped() &&
+                         (summary.termination_type == ceres::CONVERGENCE ||
+                          summary.termination_type == ceres::USER_SUCCESS);
+      if (report.usable && !std::isfinite(summary.final_cost)) {
+        report.usable = false;
+        report.converged = false;
+        summary.message = "The cost is too large for a number.";
+      }
       report.iterations = summary.num_linear_solves;
       report.initial_cost = summary.initial_cost;
       report.final_cost = summary.final_cost;
@@ -409,26 +427,6 @@ struct SolverSession::Impl {
     if (!report.message.empty()) totals.message = report.message;
   }
 
-  // Residual of a constraint of the graph under any cost function of its
-  // relation; false when it cannot be evaluated.
-  bool Evaluate(const Constraint& constraint, const ceres::CostFunction& cost,
-                double* residual) const {
-    constexpr std::size_t kUsualArity = 4;
-    const double* usual[kUsualArity];
-    std::vector<const double*> unusual;
-    const double** parameters = usual;
-    const std::size_t arity = constraint.features.size();
-    if (arity > kUsualArity) {
-      unusual.resize(arity);
-      parameters = unusual.data();
-    }
-    for (std::size_t i = 0; i < arity; ++i) {
-      parameters[i] =
-          std::as_const(*graph).GetFeature(constraint.features[i]).data();
-    }
-    return cost.Evaluate(parameters, residual, nullptr);
-  }
-
   double SquaredResidual(const Constraint& constraint) const {
     // On the stack for any usual relation.
     constexpr int kUsualSize = 6;
@@ -442,8 +440,8 @@ struct SolverSession::Impl {
     }
     Eigen::Map<Eigen::VectorXd> whitened(
         size <= kUsualSize ? usual.data() : unusual.data(), size);
-    const bool evaluated =
-        Evaluate(constraint, *residuals[constraint.id]->cost, whitened.data());
+    const bool evaluated = Evaluate(
+        *graph, constraint, *residuals[constraint.id]->cost, whitened.data());
     const double squared = whitened.squaredNorm();
     // A residual that cannot be evaluated is as wrong as can be.
     if (!evaluated || std::isnan(squared)) {
@@ -478,43 +476,13 @@ struct SolverSession::Impl {
                                 " is broken and cannot be linearized",
                             "a live constraint");
     }
-    using RowMajor =
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Residual& residual = *residuals[constraint.id];
-    LinearizedConstraint linearized;
-    linearized.residual.resize(constraint.type->residual_size);
-    std::vector<RowMajor> rows;
-    std::vector<const double*> parameters;
-    std::vector<double*> jacobians;
-    for (const FeatureId id : constraint.features) {
-      const Feature& feature = std::as_const(*graph).GetFeature(id);
-      rows.emplace_back(constraint.type->residual_size, feature.type->size);
-      parameters.push_back(feature.data());
-    }
-    for (RowMajor& matrix : rows) jacobians.push_back(matrix.data());
-    bool is_finite = residual.cost->Evaluate(
-        parameters.data(), linearized.residual.data(), jacobians.data());
-    is_finite = is_finite && linearized.residual.allFinite();
-    for (const RowMajor& matrix : rows) {
-      is_finite = is_finite && matrix.allFinite();
-    }
-    if (!is_finite) {
-      throw PLUMBLINE_ERROR(
-          constraint.type->name + " " + std::to_string(constraint.id) +
-              " cannot be linearized",
-          "a state at which the residual and its derivatives are finite");
-    }
-    double weight = 1.0;
-    if (residual.loss != nullptr) {
-      double rho[3];
-      residual.loss->Evaluate(linearized.residual.squaredNorm(), rho);
-      weight = std::sqrt(rho[1]);
-    }
-    linearized.residual *= weight;
-    for (const RowMajor& matrix : rows) {
-      linearized.jacobians.push_back(weight * matrix);
-    }
-    return linearized;
+    LinearizedConstraint linearized =
+        plumbline::Linearize(*graph, constraint, *residual.cost);
+    if (residual.loss == nullptr) return linearized;
+    double rho[3];
+    residual.loss->Evaluate(linearized.residual.squaredNorm(), rho);
+    return Weighted(std::move(linearized), std::sqrt(rho[1]));
   }
 
   void AddCost(const Constraint& constraint, CostReport* report) const {
@@ -541,6 +509,7 @@ struct SolverSession::Impl {
   std::map<const FeatureType*, TypeInfo> types;
   std::vector<Block> blocks;
   std::vector<std::unique_ptr<Residual>> residuals;
+  std::function<bool()> stop;
   SolveReport totals;
   int num_solves = 0;
   ceres::Problem problem;
@@ -644,20 +613,16 @@ SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
                       /*is_coarse=*/false, start);
 }
 
+void SolverSession::SetStop(std::function<bool()> stop) {
+  impl_->stop = std::move(stop);
+}
+
 double SolverSession::SquaredResidual(const Constraint& constraint) const {
   return impl_->SquaredResidual(constraint);
 }
 
 Eigen::VectorXd SolverSession::Error(const Constraint& constraint) const {
-  RelationArguments arguments = impl_->ArgumentsOf(constraint);
-  const int size = constraint.type->residual_size;
-  arguments.sqrt_information = Eigen::MatrixXd::Identity(size, size);
-  const auto cost = constraint.type->make_cost(arguments);
-  Eigen::VectorXd error(size);
-  if (!impl_->Evaluate(constraint, *cost, error.data())) {
-    error.setConstant(std::numeric_limits<double>::infinity());
-  }
-  return error;
+  return ErrorOf(*impl_->graph, constraint);
 }
 
 double SolverSession::Delta(const Constraint& constraint) const {

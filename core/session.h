@@ -1,11 +1,14 @@
 #ifndef PLUMBLINE_CORE_SESSION_H_
 #define PLUMBLINE_CORE_SESSION_H_
 
+#include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
 
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -67,13 +70,6 @@ struct CostReport {
   double total() const { return measurement + structure; }
 };
 
-/// First-order model of a constraint: r(x + d) = residual + sum J_i d_i.
-struct LinearizedConstraint {
-  Eigen::VectorXd residual;
-  /// For each feature in order, rows x parameters (not tangent space).
-  std::vector<Eigen::MatrixXd> jacobians;
-};
-
 /// Keeps one ceres::Problem in step with a graph: residual blocks are added and
 /// removed as constraints are, parameter blocks live in the features. It
 /// listens to the graph for as long as it lives.
@@ -108,6 +104,11 @@ class SolverSession : public GraphListener {
   /// graph. Features that nothing around them holds have no gauge: then the
   /// lowest of them is held as in SolveGlobal.
   SolveReport SolveLocal(const std::vector<FeatureId>& features);
+
+  /// Asked after every step of a solve; when it returns true the solve ends
+  /// with what it has: usable, but not converged. Null: solves go on to their
+  /// end.
+  void SetStop(std::function<bool()> stop);
 
   /// Whitened squared residual s_c at the present state, unweighted; infinite
   /// when it cannot be evaluated. Here and below, `constraint` is one of the
@@ -148,6 +149,22 @@ class SolverSession : public GraphListener {
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
+};
+
+/// Has a session ask whether to stop for as long as it lives.
+class SolveStop {
+ public:
+  /// The session is not owned and must outlive it.
+  SolveStop(SolverSession* session, std::function<bool()> stop)
+      : session_(session) {
+    session_->SetStop(std::move(stop));
+  }
+  SolveStop(const SolveStop&) = delete;
+  SolveStop& operator=(const SolveStop&) = delete;
+  ~SolveStop() { session_->SetStop(nullptr); }
+
+ private:
+  SolverSession* session_;
 };
 
 }  // namespace plumbline

@@ -1,8 +1,8 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/core/solve_schedule.h>
+#include <plumbline/core/stopwatch.h>
 
 #include <algorithm>
-#include <chrono>
 #include <vector>
 
 namespace plumbline {
@@ -10,24 +10,6 @@ namespace {
 
 // Radius of the trust region of a coarse run's first solve.
 constexpr double kFirstRadius = 1e4;
-
-// Adds the time that it lives.
-class Stopwatch {
- public:
-  explicit Stopwatch(double* seconds)
-      : seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-  ~Stopwatch() {
-    *seconds_ +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start_)
-            .count();
-  }
-
- private:
-  double* seconds_;
-  std::chrono::steady_clock::time_point start_;
-};
 
 }  // namespace
 
@@ -70,7 +52,7 @@ void SolveSchedule::OnConstraintChanged(const Constraint& constraint) {
 }
 
 void SolveSchedule::Optimize(const EmScope& scope) {
-  const Stopwatch stopwatch(&seconds_);
+  const ScopedTimer timer(&seconds_);
   if (scope.is_whole()) {
     if (is_dirty_) SolveWhole();
     return;
@@ -114,7 +96,7 @@ void SolveSchedule::SolveWhole() {
 // Solves for the virtual features that gained or lost constraints since the
 // last solve, with all others held.
 void SolveSchedule::SettleInPlace() {
-  const Stopwatch stopwatch(&seconds_);
+  const ScopedTimer timer(&seconds_);
   const std::vector<FeatureId> ids(unsettled_.begin(), unsettled_.end());
   session_->SolveLocal(ids);
   for (const FeatureId id : ids) UpdateExtent(id);

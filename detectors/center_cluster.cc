@@ -202,10 +202,14 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
     has_assigned = assign();
   }
 
+  std::int64_t small = 0;
   ids.resize(static_cast<std::size_t>(centers.size()), kNoId);
   for (int i = num_existing; i < centers.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
-    if (members[k] < options_.minimum_support) continue;
+    if (members[k] < options_.minimum_support) {
+      ++small;
+      continue;
+    }
     Feature feature;
     feature.type = &registry.GetFeature("point");
     feature.level = scope.level + 1;
@@ -215,10 +219,15 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
     feature.source = name_;
     ids[k] = transaction.AddFeature(std::move(feature));
   }
+  std::int64_t alone = 0;
   for (const Circle& circle : circles) {
-    if (circle.common < 0) continue;
-    const FeatureId common = ids[static_cast<std::size_t>(circle.common)];
-    if (common == kNoId) continue;
+    const FeatureId common = circle.common < 0
+                                 ? kNoId
+                                 : ids[static_cast<std::size_t>(circle.common)];
+    if (common == kNoId) {
+      ++alone;
+      continue;
+    }
     Constraint constraint;
     constraint.type = &registry.GetRelation("point_point_coincidence");
     constraint.features = {circle.id, common};
@@ -229,6 +238,11 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
     constraint.source = name_;
     transaction.AddConstraint(std::move(constraint));
   }
+  scope.Count("circles", static_cast<std::int64_t>(circles.size()));
+  scope.Count("circles refused: no centre in common", alone);
+  scope.Count("centres there", num_existing);
+  scope.Count("centres found", centers.size() - num_existing - small);
+  scope.Count("centres refused: too few circles", small);
   return transaction;
 }
 

@@ -56,7 +56,8 @@ class CurveDetection {
         has_changed = true;
         Touch(entry);
       }
-      if (!has_changed && !Search(scope.seed)) break;
+      if (scope.ShouldStop()) break;
+      if (!has_changed && !Search(scope)) break;
     }
   }
 
@@ -458,7 +459,7 @@ class CurveDetection {
   }
 
   // Adds new curves of the kind; false when there are none.
-  bool Search(std::uint64_t seed) {
+  bool Search(const DetectionScope& scope) {
     UpdateClaimed();
     UpdateUnsearched();
     std::vector<bool> is_out = is_claimed_;
@@ -470,7 +471,7 @@ class CurveDetection {
     for (const Entry& entry : entries_) known.push_back(entry.found);
     bool has_found = false;
     for (FoundCurve& found :
-         SearchCurves(points_, is_out, known, seed, options_)) {
+         SearchCurves(points_, is_out, known, scope.seed, options_, scope)) {
       if (found.curve.kind != kind_) continue;
       Entry entry;
       entry.found = std::move(found);

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_DETECTORS_CURVE_SEARCH_H_
 #define PLUMBLINE_DETECTORS_CURVE_SEARCH_H_
 
+#include <plumbline/core/detector.h>
 #include <plumbline/detectors/planar_curve.h>
 #include <plumbline/detectors/point_graph.h>
 #include <plumbline/factors/angle.h>
@@ -92,12 +93,14 @@ struct FoundCurve {
 /// options.max_gap_points + 1 constraints of them alone, so that the rest may
 /// be claimed when it was searched before.
 ///
-/// The same seed gives the same result. The most significant first.
-std::vector<FoundCurve> SearchCurves(const PointGraph& points,
-                                     const std::vector<bool>& is_claimed,
-                                     const std::vector<FoundCurve>& known,
-                                     std::uint64_t seed,
-                                     const CurveSearchOptions& options);
+/// The same seed gives the same result. The most significant first. Counts what
+/// was drawn, kept and refused into `scope`, of which nothing else but stop is
+/// read; once that says so, the result is worthless.
+std::vector<FoundCurve> SearchCurves(
+    const PointGraph& points, const std::vector<bool>& is_claimed,
+    const std::vector<FoundCurve>& known, std::uint64_t seed,
+    const CurveSearchOptions& options,
+    const DetectionScope& scope = DetectionScope());
 
 }  // namespace plumbline
 

@@ -67,14 +67,27 @@ class CandidateList {
     if (feature.level > level_) return;
     if (feature.type->name == "rectangle") return AddRectangle(feature);
     const int parameter = DirectionParameter(feature);
-    if (parameter < 0 || LengthOf(feature) < options_.min_length) return;
-    if (IsTied(graph_, feature, level_)) return;
+    if (parameter < 0) return;
+    if (LengthOf(feature) < options_.min_length) {
+      ++short_;
+      return;
+    }
+    if (IsTied(graph_, feature, level_)) {
+      ++tied_;
+      return;
+    }
     candidates_.push_back({&feature, feature.parameters[parameter], 0.0});
     AddSample(feature.parameters[parameter], LengthOf(feature));
   }
 
   const std::vector<Candidate>& candidates() const { return candidates_; }
   const std::vector<AxialSample>& samples() const { return samples_; }
+  void Count(const DetectionScope& scope) const {
+    scope.Count("walls without a direction",
+                static_cast<std::int64_t>(candidates_.size()));
+    scope.Count("walls refused: too short", short_);
+    scope.Count("walls refused: have a direction", tied_);
+  }
 
  private:
   void AddSample(double angle, double length) {
@@ -124,6 +137,8 @@ class CandidateList {
   std::vector<Candidate> candidates_;
   std::vector<AxialSample> samples_;
   std::set<FeatureId> spoken_for_;
+  std::int64_t short_ = 0;
+  std::int64_t tied_ = 0;
 };
 
 }  // namespace
@@ -151,6 +166,7 @@ Transaction OrientationMixture::Detect(const Graph& graph,
   } else {
     for (const Feature* feature : graph.Features()) list.Consider(*feature);
   }
+  list.Count(scope);
   const std::vector<Candidate>& candidates = list.candidates();
   Transaction transaction;
   if (candidates.empty()) return transaction;
@@ -177,10 +193,14 @@ Transaction OrientationMixture::Detect(const Graph& graph,
     directions.push_back(component.mean);
   }
 
+  std::int64_t far = 0;
   for (const Candidate& candidate : candidates) {
     const int nearest =
         NearestAxial(directions, candidate.angle, options_.mixture.gate);
-    if (nearest < 0) continue;
+    if (nearest < 0) {
+      ++far;
+      continue;
+    }
     Constraint constraint;
     constraint.type =
         &registry.GetRelation(candidate.feature->type->name + "_orientation");
@@ -192,6 +212,8 @@ Transaction OrientationMixture::Detect(const Graph& graph,
     constraint.source = kName;
     transaction.AddConstraint(std::move(constraint));
   }
+  scope.Count("directions found", static_cast<std::int64_t>(components.size()));
+  scope.Count("walls refused: no direction within the gate", far);
   return transaction;
 }
 

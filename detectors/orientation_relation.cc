@@ -65,6 +65,9 @@ Transaction OrientationRelation::Detect(const Graph& graph,
     for (const Feature* feature : graph.Features()) consider(*feature);
   }
 
+  std::int64_t pairs = 0;
+  std::int64_t no_angle = 0;
+  std::int64_t there = 0;
   Transaction transaction;
   for (std::size_t j = 1; j < orientations.size(); ++j) {
     const Feature& second = *orientations[j];
@@ -79,15 +82,22 @@ Transaction OrientationRelation::Detect(const Graph& graph,
     }
     int relations = 0;
     for (std::size_t i = 0; i < j && relations < options_.max_relations; ++i) {
+      ++pairs;
       const Feature& first = *orientations[i];
       const double angle =
           NormalizeAxial(second.parameters[0] - first.parameters[0]);
       const int nearest = NearestAxial(options_.angles, angle, options_.gate);
-      if (nearest < 0) continue;
+      if (nearest < 0) {
+        ++no_angle;
+        continue;
+      }
       // Counted whether it is there or not, so that what is proposed does not
       // depend on what was before.
       ++relations;
-      if (related.count(first.id) > 0) continue;
+      if (related.count(first.id) > 0) {
+        ++there;
+        continue;
+      }
       Constraint constraint;
       constraint.type = &registry.GetRelation("orientation_orientation");
       constraint.features = {first.id, second.id};
@@ -102,6 +112,10 @@ Transaction OrientationRelation::Detect(const Graph& graph,
       transaction.AddConstraint(std::move(constraint));
     }
   }
+  scope.Count("orientations", static_cast<std::int64_t>(orientations.size()));
+  scope.Count("orientation pairs", pairs);
+  scope.Count("orientation pairs refused: at no allowed angle", no_angle);
+  scope.Count("orientation pairs refused: related already", there);
   return transaction;
 }
 

@@ -113,6 +113,8 @@ class Matcher {
 
   PlaceMatch Match() {
     PlaceMatch result;
+    result.outcome = candidates_.empty() ? PlaceMatch::Outcome::kNothingFits
+                                         : PlaceMatch::Outcome::kNoNews;
     if (!has_news_) return result;
     Try(Vector3d::Zero());
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
@@ -126,6 +128,7 @@ class Matcher {
         Try(Solve({candidates_[i], candidates_[j]}));
       }
     }
+    result.outcome = PlaceMatch::Outcome::kNothingFits;
     if (hypotheses_.empty()) return result;
     std::size_t best = 0;
     for (std::size_t i = 1; i < hypotheses_.size(); ++i) {
@@ -388,7 +391,10 @@ class Matcher {
       }
       result.evidence += gain;
     }
-    if (is_wide && result.evidence < options_.min_evidence) {
+    if (result.matches.empty()) {
+      result.outcome = PlaceMatch::Outcome::kAmbiguous;
+    } else if (is_wide && result.evidence < options_.min_evidence) {
+      result.outcome = PlaceMatch::Outcome::kTooLittleEvidence;
       result.matches.clear();
     }
     std::vector<Candidate> kept;

@@ -67,6 +67,21 @@ struct WallMatch {
 
 /// What MatchPlaces found.
 struct PlaceMatch {
+  /// Why there are no matches.
+  enum class Outcome {
+    /// There are.
+    kMatched,
+    /// All walls that could be one are one already.
+    kNoNews,
+    /// No displacement within the gate brings walls together.
+    kNothingFits,
+    /// Explanations that are nearly as good agree on no wall.
+    kAmbiguous,
+    /// In a wide search chance would give as much.
+    kTooLittleEvidence,
+  };
+
+  Outcome outcome = Outcome::kMatched;
   /// Moves the second place onto the first: x, y (m) of the pivot, and the turn
   /// about it (rad); the most probable one given the matches below. Directions
   /// that no match says anything about stay at zero.

@@ -195,17 +195,28 @@ class RectangleSearch {
   }
 
   // Lets walls join what is there and adds what is found.
-  const std::vector<Rectangle>& Run() {
+  const std::vector<Rectangle>& Run(const DetectionScope& scope) {
     for (std::size_t i = 0; i < rectangles_.size(); ++i) {
       Join(&rectangles_[i]);
       Index(static_cast<int>(i));
     }
     FindCorners();
-    for (Rectangle& candidate : Candidates()) {
-      if (IsKnown(candidate)) continue;
+    std::int64_t known = 0;
+    for (Rectangle& candidate : Candidates(scope)) {
+      if (IsKnown(candidate)) {
+        ++known;
+        continue;
+      }
       rectangles_.push_back(std::move(candidate));
       Index(static_cast<int>(rectangles_.size()) - 1);
     }
+    scope.Count("walls", size());
+    scope.Count("corners", static_cast<std::int64_t>(corners_.size()));
+    scope.Count("rectangles", tried_);
+    scope.Count("rectangles refused: size", wrong_size_);
+    scope.Count("rectangles refused: walls not on the sides", not_on_sides_);
+    scope.Count("rectangles refused: sides not covered", not_covered_);
+    scope.Count("rectangles refused: there already", known);
     return rectangles_;
   }
 
@@ -462,9 +473,10 @@ class RectangleSearch {
   }
 
   // Rectangles that could be, the smallest first.
-  std::vector<Rectangle> Candidates() const {
+  std::vector<Rectangle> Candidates(const DetectionScope& scope) {
     std::vector<Rectangle> candidates;
     for (int at = 0; at < static_cast<int>(corners_.size()); ++at) {
+      if (scope.ShouldStop()) return {};
       const Corner& a = corner(at);
       for (const int i : {a.first, a.second}) {
         const int j = a.Other(i);
@@ -497,7 +509,7 @@ class RectangleSearch {
   // adds the rectangle.
   void Close(int at, const std::pair<int, int>& bottom, int k, int l,
              const std::pair<int, int>& left,
-             std::vector<Rectangle>* candidates) const {
+             std::vector<Rectangle>* candidates) {
     for (const int k2 : in_line_[static_cast<std::size_t>(k)]) {
       for (const int l2 : in_line_[static_cast<std::size_t>(l)]) {
         const auto found = corner_between_.find(std::minmax(k2, l2));
@@ -516,9 +528,11 @@ class RectangleSearch {
 
   // Checks the walls that it was fitted to and adds others on its sides; false
   // when it is none.
-  bool Complete(Rectangle* rectangle) const {
+  bool Complete(Rectangle* rectangle) {
+    ++tried_;
     if (2.0 * std::min(rectangle->a, rectangle->b) < options_.min_side ||
         2.0 * std::max(rectangle->a, rectangle->b) > options_.max_side) {
+      ++wrong_size_;
       return false;
     }
     for (int side = 0; side < kNumSides; ++side) {
@@ -526,12 +540,18 @@ class RectangleSearch {
            rectangle->sides[static_cast<std::size_t>(side)]) {
         Face wall;
         MakeFace(*member.feature, &wall);
-        if (!IsOnSide(wall, *rectangle, side, &member.interval)) return false;
+        if (!IsOnSide(wall, *rectangle, side, &member.interval)) {
+          ++not_on_sides_;
+          return false;
+        }
       }
     }
     Join(rectangle);
     for (int side = 0; side < kNumSides; ++side) {
-      if (!IsCovered(*rectangle, side)) return false;
+      if (!IsCovered(*rectangle, side)) {
+        ++not_covered_;
+        return false;
+      }
     }
     return true;
   }
@@ -575,6 +595,11 @@ class RectangleSearch {
   std::vector<Rectangle> rectangles_;
   // Rectangles and their sides that a feature is on.
   std::map<FeatureId, std::set<std::pair<int, int>>> by_feature_;
+  // What was tried and refused.
+  std::int64_t tried_ = 0;
+  std::int64_t wrong_size_ = 0;
+  std::int64_t not_on_sides_ = 0;
+  std::int64_t not_covered_ = 0;
 };
 
 // The side that a live constraint ties a wall to; -1 when it does not.
@@ -672,7 +697,7 @@ Transaction RectangleDetector::Detect(const Graph& graph,
       search.AddExisting(std::move(rectangle));
     }
   }
-  for (const Rectangle& rectangle : search.Run()) {
+  for (const Rectangle& rectangle : search.Run(scope)) {
     FeatureId id = rectangle.id;
     if (id == kNoId) {
       Feature feature;

@@ -225,6 +225,7 @@ void JointAdjustment::Reweigh() {
 }
 
 void JointAdjustment::Adjust(const std::function<bool()>& stop) {
+  const SolveStop solve_stop(session_, stop);
   for (int pass = 0; pass < options_.max_passes; ++pass) {
     const std::vector<Pose2> before = PlacePoses();
     for (int round = 0; round < options_.rounds; ++round) {

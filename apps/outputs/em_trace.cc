@@ -1,7 +1,9 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/outputs/em_trace.h>
 
+#include <cctype>
 #include <charconv>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <string>
@@ -17,6 +19,20 @@ std::string FormatDouble(double value) {
   return std::string(text, result.ptr);
 }
 
+// "same_wall" and "place pairs refused: one visit":
+// same_wall_place_pairs_refused_one_visit.
+std::string ColumnOf(const std::string& detector, const std::string& count) {
+  std::string column;
+  for (const char c : detector + "_" + count) {
+    if (std::isalnum(static_cast<unsigned char>(c))) {
+      column += c;
+    } else if (column.empty() || column.back() != '_') {
+      column += '_';
+    }
+  }
+  return column;
+}
+
 int CountOf(const std::string& name, const std::map<std::string, int>& counts) {
   const auto found = counts.find(name);
   return found == counts.end() ? 0 : found->second;
@@ -27,6 +43,17 @@ int CountOf(const std::string& name, const std::map<std::string, int>& counts) {
 void WriteEmTrace(const std::vector<EmTraceRow>& rows, std::ostream& output) {
   std::set<std::string> types;
   std::set<std::string> relations;
+  std::set<std::string> counts_of_detectors;
+  std::vector<std::map<std::string, std::int64_t>> counts(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (const auto& [detector, its_counts] : rows[i].phase.detections) {
+      for (const auto& [name, number] : its_counts) {
+        const std::string column = ColumnOf(detector, name);
+        counts_of_detectors.insert(column);
+        counts[i][column] += number;
+      }
+    }
+  }
   for (const EmTraceRow& row : rows) {
     for (const auto& entry : row.phase.features) types.insert(entry.first);
     for (const auto* counts :
@@ -40,8 +67,11 @@ void WriteEmTrace(const std::vector<EmTraceRow>& rows, std::ostream& output) {
   for (const std::string& relation : relations) {
     output << ",structure_" << relation << ",broken_" << relation;
   }
-  output << ",seconds,mean_position_error\n";
-  for (const EmTraceRow& row : rows) {
+  output << ",seconds,mean_position_error";
+  for (const std::string& column : counts_of_detectors) output << ',' << column;
+  output << '\n';
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const EmTraceRow& row = rows[i];
     const EmPhase& phase = row.phase;
     output << phase.iteration << ',' << phase.phase << ','
            << FormatDouble(phase.cost.measurement) << ','
@@ -58,6 +88,11 @@ void WriteEmTrace(const std::vector<EmTraceRow>& rows, std::ostream& output) {
     output << ',' << FormatDouble(phase.seconds) << ',';
     if (row.mean_position_error) {
       output << FormatDouble(*row.mean_position_error);
+    }
+    for (const std::string& column : counts_of_detectors) {
+      const auto found = counts[i].find(column);
+      output << ',';
+      if (found != counts[i].end()) output << found->second;
     }
     output << '\n';
   }

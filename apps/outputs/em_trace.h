@@ -22,8 +22,10 @@ struct EmTraceRow {
 /// cost_structure, features_<type> for every type that occurs in any row (by
 /// name; 0 where a row has none), structure_constraints, broken_constraints,
 /// structure_<relation> and broken_<relation> likewise, seconds,
-/// mean_position_error (empty when not known). Numbers read back as the same
-/// doubles.
+/// mean_position_error (empty when not known), and <detector>_<count> for
+/// everything that a detector counted, such as
+/// same_wall_place_pairs_refused_one_visit (empty where it did not run).
+/// Numbers read back as the same doubles.
 void WriteEmTrace(const std::vector<EmTraceRow>& rows, std::ostream& output);
 
 /// The same into a file, whole or not at all. Throws Error when it cannot be

@@ -1,4 +1,5 @@
 #include <plumbline/core/atomic_file.h>
+#include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/version.h>
@@ -113,22 +114,10 @@ const std::map<std::string, std::vector<std::string>>& RowUnits() {
 
 // f(x) (-) u at the present state, in the relation's units; null when it cannot
 // be evaluated.
-Json ErrorOf(const Graph& graph, const Constraint& constraint) {
+Json JsonOfError(const Graph& graph, const Constraint& constraint) {
   try {
-    RelationArguments arguments;
-    arguments.expected = constraint.expected;
-    const Eigen::Index rows = constraint.expected.size();
-    arguments.sqrt_information = Eigen::MatrixXd::Identity(rows, rows);
-    std::vector<const double*> blocks;
-    for (const FeatureId id : constraint.features) {
-      arguments.features.push_back(&graph.GetFeature(id));
-      blocks.push_back(arguments.features.back()->data());
-    }
-    std::vector<double> error(static_cast<std::size_t>(rows));
-    if (!constraint.type->make_cost(arguments)->Evaluate(
-            blocks.data(), error.data(), nullptr)) {
-      return nullptr;
-    }
+    const Eigen::VectorXd error = plumbline::ErrorOf(graph, constraint);
+    if (!error.allFinite()) return nullptr;
     Json array = Json::array();
     for (const double value : error) array.push_back(Digits(value));
     return array;
@@ -220,7 +209,7 @@ Json StructureToJson(const Graph& graph, Names* relations, Names* sources) {
     delta.push_back(Digits(constraint->delta));
     live.push_back(is_live ? 1 : 0);
     // Only the broken ones are listed with their reasons.
-    error.push_back(is_live ? Json(nullptr) : ErrorOf(graph, *constraint));
+    error.push_back(is_live ? Json(nullptr) : JsonOfError(graph, *constraint));
     tolerance.push_back(is_live ? Json(nullptr) : ToleranceOf(*constraint));
     source.push_back(sources->Add(constraint->source));
   }

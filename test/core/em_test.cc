@@ -211,9 +211,7 @@ TEST_F(BuildingTest, SolvesOnlyWhatIsNew) {
 }
 
 TEST_F(BuildingTest, StopEndsTheLoopBetweenPhases) {
-  int asked = 0;
-  const EmReport report = Make().Run([&asked] { return ++asked == 4; });
-  EXPECT_EQ(asked, 4);
+  const EmReport report = Make().Run([this] { return trace_.size() == 4; });
   EXPECT_EQ(trace_.size(), 4u);
   EXPECT_EQ(trace_.back().phase, "detect_0");
   EXPECT_FALSE(report.converged);
@@ -221,6 +219,86 @@ TEST_F(BuildingTest, StopEndsTheLoopBetweenPhases) {
   // It can go on.
   EXPECT_TRUE(em_->Run().converged);
   EXPECT_EQ(Live(), 19);
+}
+
+// Steps of solves ask, too.
+TEST_F(BuildingTest, StopEndsASolve) {
+  int asked = 0;
+  const EmReport report = Make().Run([&asked] { return ++asked == 1; });
+  EXPECT_EQ(asked, 1);
+  EXPECT_FALSE(report.converged);
+  EXPECT_EQ(session_->totals().converged, false);
+  EXPECT_EQ(trace_.size(), 1u);
+  // Nobody is asked any more.
+  EXPECT_TRUE(em_->Run().converged);
+  EXPECT_EQ(asked, 1);
+}
+
+TEST_F(EmTest, WhatADetectorProposesWhenItIsToStopIsNotAdded) {
+  AddSegment(0.0);
+  AddSegment(0.0);
+  const auto find = DirectionDetector({0.0});
+  bool is_asked = false;
+  Add(0, "slow", 2,
+      [&](const Graph& graph, const Registry& registry,
+          const DetectionScope& scope) {
+        is_asked = true;
+        EXPECT_TRUE(scope.ShouldStop());
+        return find(graph, registry, scope);
+      });
+  EXPECT_FALSE(Make().Run([&] { return is_asked; }).converged);
+  EXPECT_EQ(Live(), 0);
+  EXPECT_TRUE(graph_.VirtualFeatures(1).empty());
+}
+
+TEST_F(EmTest, TheTraceTellsWhatDetectorsCounted) {
+  AddSegment(0.0);
+  AddSegment(0.0);
+  const auto find = DirectionDetector({0.0});
+  Add(0, "counting", 2,
+      [&](const Graph& graph, const Registry& registry,
+          const DetectionScope& scope) {
+        scope.Count("walls", 2);
+        return find(graph, registry, scope);
+      });
+  Add(0, "hopeless", 2,
+      [&](const Graph& graph, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        transaction.AddConstraint(Structure(
+            registry, "segment_orientation", segments_[0],
+            transaction.AddFeature(Orientation(registry, 0.0)), 0.0, 0.5));
+        // It is there.
+        transaction.AddConstraint(
+            Structure(registry, "segment_orientation", segments_[0],
+                      graph.VirtualFeatures(1)[0], 0.0, 0.5));
+        return transaction;
+      });
+  Make().Run();
+  std::vector<EmPhase> detecting;
+  for (const EmPhase& phase : trace_) {
+    if (phase.phase == "detect_0") {
+      detecting.push_back(phase);
+    } else {
+      EXPECT_TRUE(phase.detections.empty()) << phase.phase;
+    }
+  }
+  ASSERT_GE(detecting.size(), 2u);
+  DetectionCounts counts = detecting[0].detections["counting"];
+  EXPECT_EQ(counts["walls"], 2);
+  EXPECT_EQ(counts["features proposed"], 1);
+  EXPECT_EQ(counts["features refused: too little support"], 0);
+  EXPECT_EQ(counts["constraints proposed"], 2);
+  counts = detecting[0].detections["hopeless"];
+  EXPECT_EQ(counts["features proposed"], 1);
+  EXPECT_EQ(counts["features refused: too little support"], 1);
+  EXPECT_EQ(counts["constraints proposed"], 2);
+  EXPECT_EQ(counts["constraints refused: there already"], 1);
+  EXPECT_EQ(counts["constraints refused: feature with too little support"], 1);
+  EXPECT_EQ(counts["constraints refused: broken before"], 0);
+  EXPECT_EQ(counts["constraints refused: not expected"], 0);
+  counts = detecting[1].detections["counting"];
+  EXPECT_EQ(counts["walls"], 2);
+  EXPECT_EQ(counts.count("constraints proposed"), 0u);
 }
 
 TEST_F(BuildingTest, NoIterationsSolveTheMeasurements) {
@@ -360,6 +438,64 @@ TEST_F(EmTest, AWanderingDetectorIsNotBelievedForEver) {
   EXPECT_EQ(Live(), 0);
   EXPECT_NEAR(Direction(a), 0.0, 1e-5);
   EXPECT_NEAR(Direction(b), 8.0, 1e-5);
+}
+
+// A wrong angle between two directions, another one each time: nothing raw is
+// in it, and no hypothesis is the same as one before.
+TEST_F(EmTest, WanderingBetweenVirtualFeaturesComesToAnEnd) {
+  for (const double degrees : {0.0, 0.1, 70.0, 70.1}) AddSegment(degrees);
+  Add(0, "directions", 2, DirectionDetector({0.0, 70.0}));
+  int calls = 0;
+  Add(1, "wandering", 1,
+      [&](const Graph& graph, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        const auto& ids = graph.VirtualFeatures(1);
+        if (ids.size() < 2 || HasLive(graph, ids[1], "orientation_orientation"))
+          return transaction;
+        transaction.AddConstraint(
+            Structure(registry, "orientation_orientation", ids[0], ids[1],
+                      DegToRad(90.0 + 0.5 * calls++), 0.1));
+        return transaction;
+      });
+  EmOptions options;
+  options.max_breaks_per_feature = 4;
+  const EmReport report = Make(options).Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_GE(calls, 4);
+  EXPECT_LT(report.iterations, 12);
+  EXPECT_EQ(Live("orientation_orientation"), 0);
+  EXPECT_EQ(Broken("orientation_orientation"), 4);
+}
+
+// The same with a virtual feature that is another one each time, by a proposal
+// that has it between what is there.
+TEST_F(EmTest, AWanderingVirtualFeatureOnVirtualOnesComesToAnEnd) {
+  for (const double degrees : {0.0, 0.1, 70.0, 70.1}) AddSegment(degrees);
+  Add(0, "directions", 2, DirectionDetector({0.0, 70.0}));
+  int calls = 0;
+  Add(1, "summits", 2,
+      [&](const Graph& graph, const Registry& registry, const DetectionScope&) {
+        Transaction transaction;
+        const auto& ids = graph.VirtualFeatures(1);
+        if (ids.size() < 2 || !graph.VirtualFeatures(2).empty()) {
+          return transaction;
+        }
+        const FeatureId summit = transaction.AddFeature(
+            Orientation(registry, DegToRad(20.0 + 3.0 * calls++), 2));
+        for (const FeatureId id : ids) {
+          transaction.AddConstraint(Structure(
+              registry, "orientation_orientation", id, summit, 0.0, 0.1));
+        }
+        return transaction;
+      });
+  EmOptions options;
+  options.max_breaks_per_feature = 4;
+  const EmReport report = Make(options).Run();
+  EXPECT_TRUE(report.converged);
+  EXPECT_GE(calls, 4);
+  EXPECT_LT(report.iterations, 12);
+  EXPECT_TRUE(graph_.VirtualFeatures(2).empty());
+  EXPECT_EQ(graph_.VirtualFeatures(1).size(), 2u);
 }
 
 TEST_F(EmTest, AHypothesisThatBecomesTrueIsBelievedAgain) {

@@ -684,6 +684,8 @@ TEST_F(GraphG2oTest, BrokenLinesAreNamed) {
        "PLUMBLINE_FEATURE has 8 fields: expected 9"},
       {"PLUMBLINE_FEATURE 3 0 0 0 0 0 0 0 a", "no vertex 3"},
       {"PLUMBLINE_FEATURE 1 -1 0 0 0 0 0 0 a", "level is \"-1\""},
+      {"PLUMBLINE_FEATURE 1 2147483647 1 0 0 0 0 0 a",
+       "level is \"2147483647\""},
       {"PLUMBLINE_FEATURE 1 0 2 0 0 0 0 0 a", "virtual is \"2\""},
       {"PLUMBLINE_FEATURE 1 0 0 0 nan 0 0 0 a", "\"nan\""},
       {"PLUMBLINE_FEATURE 1 0 0 0 0 0 0 1.5 a", "observations is \"1.5\""},

@@ -223,6 +223,9 @@ TEST_F(GraphJsonTest, BrokenPlacesAreNamed) {
        "features[2].type is \"planet\": expected one of circle, "},
       {"\"orientation\"", "7", "features[2].type is 7: expected a string"},
       {"\"level\": 1", "\"level\": 3000000000", "features[2].level is 3000000"},
+      {"\"level\": 1", "\"level\": 2147483647",
+       "features[2].level is 2147483647: expected a whole number from 0 to "
+       "1000"},
       {"\"virtual\": true", "\"virtual\": 1",
        "features[2].virtual is 1: expected true or false"},
       {"\"parameters\": [1, 2, 3]", "\"parameters\": [1, 2]",

@@ -283,6 +283,11 @@ TEST_F(GraphTest, RefusesWhatDoesNotFit) {
   Transaction level;
   level.AddFeature(negative);
   ExpectRefused(level, "level -1");
+  Feature high = Dot();
+  high.level = kMaxLevel + 1;
+  Transaction too_high;
+  too_high.AddFeature(high);
+  ExpectRefused(too_high, "level 1001: expected a level from 0 to 1000");
 }
 
 TEST_F(GraphTest, RefusesBadNumbers) {

@@ -168,5 +168,33 @@ TEST_F(HypothesisMemoryTest, AnotherExpectedValueIsAnotherHypothesis) {
   EXPECT_TRUE(memory.MayBeProposed(relation(80.0), between));
 }
 
+TEST_F(HypothesisMemoryTest, TheRootIsTheFirstRawFeatureBelow) {
+  const FeatureId a = AddSegment(0.0);
+  const FeatureId b = AddSegment(0.0);
+  const FeatureId low = AddOrientation(0.0, {b});
+  Transaction transaction;
+  const FeatureId provisional =
+      transaction.AddFeature(Orientation(registry_, 0.0, 2));
+  transaction.AddConstraint(Structure(registry_, "orientation_orientation", low,
+                                      provisional, 0.0, 0.5));
+  const FeatureId high = graph_.Apply(transaction).features[0];
+  HypothesisMemory memory(&graph_, options_);
+  for (const Constraint* constraint : graph_.Constraints()) {
+    memory.OnConstraintAdded(*constraint);
+  }
+  EXPECT_EQ(memory.RootOf(a), a);
+  EXPECT_EQ(memory.RootOf(low), b);
+  EXPECT_EQ(memory.RootOf(high), b);
+  EXPECT_EQ(memory.RootOf(77), kNoId);
+  Transaction more;
+  more.AddConstraint(
+      Structure(registry_, "segment_orientation", a, low, 0.0, 0.5));
+  memory.OnConstraintAdded(
+      graph_.GetConstraint(graph_.Apply(more).constraints[0]));
+  EXPECT_EQ(memory.RootOf(low), a);
+  memory.OnFeatureRemoved(graph_.GetFeature(low));
+  EXPECT_EQ(memory.RootOf(low), kNoId);
+}
+
 }  // namespace
 }  // namespace plumbline

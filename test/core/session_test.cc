@@ -103,6 +103,41 @@ class SessionTest : public ::testing::Test {
 
 constexpr ConstraintClass kStructure = ConstraintClass::kStructure;
 
+TEST_F(SessionTest, StopEndsASolveWithWhatItHas) {
+  const FeatureId a = Add("pose", {0.0, 0.0, 0.0}, /*fixed=*/true);
+  const FeatureId b = Add("pose", {5.0, 5.0, 2.0});
+  const FeatureId c = Add("pose", {-3.0, 9.0, -2.0});
+  Add(Step(a, b, 1.0, 0.0, 0.1));
+  Add(Step(b, c, 1.0, 0.0, 0.1));
+  Add(Step(a, c, 2.0, 0.5, 0.3));
+  const auto session = MakeSession();
+  const double before = session->Cost().total();
+  int asked = 0;
+  {
+    const SolveStop stop(session.get(), [&asked] { return ++asked == 2; });
+    const SolveReport report = session->SolveGlobal();
+    EXPECT_TRUE(report.usable);
+    EXPECT_FALSE(report.converged);
+    EXPECT_EQ(asked, 2);
+    EXPECT_LT(session->Cost().total(), before);
+  }
+  EXPECT_TRUE(session->SolveGlobal().converged);
+}
+
+// Squares that no number holds: nothing was found, whatever the solver says.
+TEST_F(SessionTest, ACostThatOverflowsIsNotConverged) {
+  const FeatureId a = Add("pose", {0.0, 0.0, 0.0}, /*fixed=*/true);
+  const FeatureId b = Add("pose", {0.0, 0.0, 0.0}, /*fixed=*/true);
+  const FeatureId c = Add("pose", {1.0, 0.0, 0.0});
+  Add(Step(a, c, 1e200, 0.0, 0.0));
+  Add(Step(b, c, -1e200, 0.0, 0.0));
+  const auto session = MakeSession();
+  const SolveReport report = session->SolveGlobal();
+  EXPECT_FALSE(report.usable);
+  EXPECT_FALSE(report.converged);
+  EXPECT_FALSE(report.message.empty());
+}
+
 // A session made for graphs that keep their constraints takes them out all the
 // same, to the same result.
 TEST_F(SessionTest, WithoutFastRemoval) {

@@ -220,6 +220,45 @@ TEST_F(SameWallTest, ARevisitIsClosed) {
   EXPECT_GT(closed.size(), (seen_.size() - once) * 2 / 3);
 }
 
+TEST_F(SameWallTest, CountsWhatWasSearchedAndRefused) {
+  Walk(Round(20.0, 6), Pose2::Zero(), Pose2(0.3, -0.25, 0.0));
+  DetectionCounts counts;
+  DetectionScope scope;
+  scope.counts = &counts;
+  const Transaction transaction = registry_.GetDetector("same_wall")
+                                      .make(WithDefaults({}))
+                                      ->Detect(graph_, registry_, scope);
+  const auto sum = [&counts](const std::string& start) {
+    std::int64_t total = 0;
+    for (const auto& [name, number] : counts) {
+      if (name.rfind(start, 0) == 0) total += number;
+    }
+    return total;
+  };
+  EXPECT_EQ(counts.at("walls"), static_cast<std::int64_t>(seen_.size()));
+  const std::int64_t places = counts.at("places");
+  EXPECT_EQ(counts.at("place pairs"), places * (places - 1) / 2);
+  // Every pair was refused for a reason, or brought matches.
+  EXPECT_GT(counts.at("place pairs"), sum("place pairs refused"));
+  EXPECT_GT(counts.at("place pairs refused: one visit"), 0);
+  EXPECT_GT(counts.at("place pairs refused: out of reach"), 0);
+  EXPECT_GT(counts.at("wall matches"), 0);
+  EXPECT_EQ(static_cast<std::int64_t>(transaction.added_constraints().size()),
+            counts.at("candidates") - sum("candidates refused"));
+}
+
+TEST_F(SameWallTest, StopsWhenItIsTold) {
+  Walk(Round(20.0, 6), Pose2::Zero(), Pose2(0.3, -0.25, 0.0));
+  int asked = 0;
+  DetectionScope scope;
+  scope.stop = [&asked] { return ++asked >= 5; };
+  EXPECT_TRUE(registry_.GetDetector("same_wall")
+                  .make(WithDefaults({}))
+                  ->Detect(graph_, registry_, scope)
+                  .empty());
+  EXPECT_LT(asked, 12);
+}
+
 TEST_F(SameWallTest, NothingIsProposedTwice) {
   Walk(Round(20.0, 6), Pose2::Zero(), Pose2(0.2, 0.2, 0.0));
   RunEm();

@@ -26,6 +26,8 @@ TEST(EmTraceTest, OneColumnAFeatureTypeOfAnyRow) {
   second.phase.broken_by_relation = {{"segment_orientation", 1},
                                      {"segment_segment_collinearity", 2}};
   second.phase.seconds = 2.0;
+  second.phase.detections["same_wall"] = {
+      {"place pairs", 7}, {"place pairs refused: one visit", 3}};
   second.mean_position_error = 0.0;
   std::ostringstream output;
   WriteEmTrace({first, second}, output);
@@ -36,9 +38,10 @@ TEST(EmTraceTest, OneColumnAFeatureTypeOfAnyRow) {
             "structure_segment_orientation,broken_segment_orientation,"
             "structure_segment_segment_collinearity,"
             "broken_segment_segment_collinearity,seconds,"
-            "mean_position_error\n"
-            "0,measurements,0.1,0,0,1,12,0,0,0,0,0,0,0.25,\n"
-            "1,detect_0,1e-09,2.5,2,0,12,10,3,10,1,0,2,2,0\n");
+            "mean_position_error,same_wall_place_pairs,"
+            "same_wall_place_pairs_refused_one_visit\n"
+            "0,measurements,0.1,0,0,1,12,0,0,0,0,0,0,0.25,,,\n"
+            "1,detect_0,1e-09,2.5,2,0,12,10,3,10,1,0,2,2,0,7,3\n");
 }
 
 TEST(EmTraceTest, WithoutRowsThereIsAHeader) {

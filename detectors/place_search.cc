@@ -1,0 +1,301 @@
+#include <plumbline/detectors/place_search.h>
+#include <plumbline/detectors/wall_ways.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+
+// How well an anchor is known in the frame of its part of the graph: standard
+// deviations of the position (both coordinates together, m) and of the
+// direction (rad).
+struct AnchorSigma {
+  double position = 0.0;
+  double direction = 0.0;
+};
+
+class PlaceSearch {
+ public:
+  PlaceSearch(const WallGraph& walls, const SameWallOptions& options,
+              const DetectionScope& scope, Marginals* marginals,
+              ClosureCandidates* candidates)
+      : walls_(walls),
+        options_(options),
+        scope_(scope),
+        marginals_(*marginals),
+        candidates_(*candidates),
+        ways_(walls, options.place_links),
+        places_(FindPlaces(walls, options)) {}
+
+  void Run() {
+    MeasureAnchors();
+    for (std::size_t i = 0; i < places_.size() && !is_stopped_; ++i) {
+      ComparePlace(i);
+    }
+    scope_.Count("places", static_cast<std::int64_t>(places_.size()));
+    scope_.Count("place pairs", pairs_);
+    scope_.Count("place pairs refused: one visit", same_visit_);
+    scope_.Count("place pairs refused: no way between them", no_way_);
+    scope_.Count("place pairs refused: out of reach", out_of_reach_);
+    scope_.Count("place pairs refused: no news", no_news_);
+    scope_.Count("place pairs refused: nothing fits", nothing_fits_);
+    scope_.Count("place pairs refused: ambiguous", ambiguous_);
+    scope_.Count("place pairs refused: too little evidence", weak_);
+    scope_.Count("wall matches", matches_);
+    scope_.Count("wall matches refused: contradicted", contradicted_);
+    scope_.Count("wall matches refused: one already", one_already_);
+  }
+
+ private:
+  // A place that explains the one that is compared.
+  struct Found {
+    std::size_t place;
+    PlaceMatch match;
+  };
+
+  const PlaceWall& Anchor(std::size_t place) const {
+    return walls_.wall(places_[place].anchor);
+  }
+
+  // Of each place that there is a way from to another.
+  void MeasureAnchors() {
+    const std::vector<std::size_t> parts = ways_.Parts();
+    std::vector<int> places_in(parts.size(), 0);
+    for (const WallPlace& place : places_) ++places_in[parts[place.anchor]];
+    std::vector<FeatureId> anchors(places_.size(), kNoId);
+    std::vector<FeatureId> wanted;
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (places_in[parts[places_[p].anchor]] < 2) continue;
+      anchors[p] = Anchor(p).id;
+      wanted.push_back(anchors[p]);
+    }
+    marginals_.Compute(wanted);
+    sigmas_.resize(places_.size());
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (anchors[p] == kNoId) continue;
+      const Eigen::MatrixXd covariance = marginals_.Covariance(anchors[p]);
+      sigmas_[p] = {
+          std::sqrt(std::max(0.0, covariance(0, 0) + covariance(1, 1))),
+          std::sqrt(std::max(0.0, covariance(2, 2)))};
+    }
+  }
+
+  // Of either coordinate, beyond what the graph says, m^2.
+  double AddedVariance(double way) const {
+    const double drift = options_.drift_rate * way;
+    return drift * drift +
+           options_.least_position_sigma * options_.least_position_sigma;
+  }
+
+  // Covariance of a place's displacement in the axes of the map, from that of
+  // its anchor seen from another of this heading.
+  Matrix3d Prior(const Matrix3d& relative, double heading, double way) const {
+    const double c = std::cos(heading);
+    const double s = std::sin(heading);
+    Matrix3d rotation = Matrix3d::Identity();
+    rotation.topLeftCorner<2, 2>() << c, -s, s, c;
+    Matrix3d prior = options_.covariance_scale * options_.covariance_scale *
+                     (rotation * relative * rotation.transpose());
+    prior(0, 0) += AddedVariance(way);
+    prior(1, 1) += AddedVariance(way);
+    prior(2, 2) += options_.least_angle_sigma * options_.least_angle_sigma;
+    return prior;
+  }
+
+  // No more than this is unknown of the second place's position seen from the
+  // first, m: the relative position is a sum of what moves the second, what
+  // moves the first, and what turns the first, and the deviation of a sum is
+  // at most the sum of the deviations.
+  double LargestSigma(std::size_t from, std::size_t to) const {
+    const double distance =
+        (Anchor(to).position - Anchor(from).position).norm();
+    return sigmas_[from].position + sigmas_[to].position +
+           distance * sigmas_[from].direction;
+  }
+
+  // Whether a place that is known like this may be the other, as far as their
+  // distance tells.
+  bool IsInReach(const WallPlace& own, const WallPlace& other,
+                 double variance_of_position) const {
+    return (other.center - own.center).norm() <=
+           options_.match.gate *
+                   std::sqrt(std::max(variance_of_position, 0.0)) +
+               0.5 * options_.place_radius;
+  }
+
+  std::vector<PlaceWall> WallsOf(const WallPlace& place) const {
+    std::vector<PlaceWall> walls;
+    for (const int i : place.walls) walls.push_back(walls_.wall(i));
+    return walls;
+  }
+
+  // Compares a place with those before it: each pair once.
+  void ComparePlace(std::size_t index) {
+    const std::vector<double> ways = ways_.From(places_[index].anchor);
+    const std::vector<std::size_t> others = WithinReach(index, ways);
+    if (others.empty()) return;
+    const std::vector<Found> found = Match(index, others, ways);
+    for (const Found& one : found) AddMatches(places_[index], one, found);
+  }
+
+  std::vector<std::size_t> WithinReach(std::size_t index,
+                                       const std::vector<double>& ways) {
+    const WallPlace& own = places_[index];
+    const std::map<int, int> near =
+        walls_.Within(own.anchor, options_.min_links - 1);
+    std::vector<std::size_t> others;
+    for (std::size_t p = 0; p < index; ++p) {
+      ++pairs_;
+      if (near.count(places_[p].anchor) > 0) {
+        ++same_visit_;
+        continue;
+      }
+      const double way = ways[places_[p].anchor];
+      if (!std::isfinite(way)) {
+        ++no_way_;
+        continue;
+      }
+      const double sigma = options_.covariance_scale * LargestSigma(index, p);
+      if (!IsInReach(own, places_[p],
+                     sigma * sigma + 2.0 * AddedVariance(way))) {
+        ++out_of_reach_;
+        continue;
+      }
+      others.push_back(p);
+    }
+    return others;
+  }
+
+  std::vector<Found> Match(std::size_t index,
+                           const std::vector<std::size_t>& others,
+                           const std::vector<double>& ways) {
+    std::vector<FeatureId> anchors;
+    for (const std::size_t p : others) anchors.push_back(Anchor(p).id);
+    const std::vector<Matrix3d> covariances =
+        marginals_.RelativeCovariances(Anchor(index).id, anchors);
+    const std::vector<PlaceWall> own_walls = WallsOf(places_[index]);
+    std::vector<Found> found;
+    for (std::size_t k = 0; k < others.size(); ++k) {
+      if ((is_stopped_ = scope_.ShouldStop())) return {};
+      const WallPlace& other = places_[others[k]];
+      const Matrix3d prior =
+          Prior(covariances[k], Anchor(index).direction, ways[other.anchor]);
+      if (!IsInReach(places_[index], other, prior(0, 0) + prior(1, 1))) {
+        ++out_of_reach_;
+        continue;
+      }
+      PlaceMatch match =
+          MatchPlaces(own_walls, WallsOf(other), Anchor(others[k]).position,
+                      prior, options_.match);
+      Count(match.outcome);
+      if (!match.matches.empty()) {
+        found.push_back({others[k], std::move(match)});
+      }
+    }
+    return found;
+  }
+
+  void Count(PlaceMatch::Outcome outcome) {
+    no_news_ += outcome == PlaceMatch::Outcome::kNoNews;
+    nothing_fits_ += outcome == PlaceMatch::Outcome::kNothingFits;
+    ambiguous_ += outcome == PlaceMatch::Outcome::kAmbiguous;
+    weak_ += outcome == PlaceMatch::Outcome::kTooLittleEvidence;
+  }
+
+  void AddMatches(const WallPlace& own, const Found& one,
+                  const std::vector<Found>& found) {
+    for (const WallMatch& match : one.match.matches) {
+      ++matches_;
+      const int i = own.walls[match.first];
+      const int j = places_[one.place].walls[match.second];
+      if (IsContradicted(walls_.wall(i), one, found)) {
+        ++contradicted_;
+      } else if (!candidates_.Add(i, j, match, one.match.search,
+                                  one.match.evidence)) {
+        ++one_already_;
+      }
+    }
+  }
+
+  // Another place that explains nearly as much puts the wall elsewhere.
+  bool IsContradicted(const PlaceWall& wall, const Found& one,
+                      const std::vector<Found>& found) const {
+    const Vector2d normal(-std::sin(wall.direction), std::cos(wall.direction));
+    return std::any_of(found.begin(), found.end(), [&](const Found& other) {
+      return &other != &one &&
+             other.match.evidence >
+                 one.match.evidence - options_.match.rival_margin &&
+             std::abs(
+                 normal.dot((other.match.displacement - one.match.displacement)
+                                .head<2>())) > options_.contradiction;
+    });
+  }
+
+  const WallGraph& walls_;
+  const SameWallOptions& options_;
+  const DetectionScope& scope_;
+  Marginals& marginals_;
+  ClosureCandidates& candidates_;
+  WallWays ways_;
+  std::vector<WallPlace> places_;
+  std::vector<AnchorSigma> sigmas_;
+  bool is_stopped_ = false;
+
+  std::int64_t pairs_ = 0;
+  std::int64_t same_visit_ = 0;
+  std::int64_t no_way_ = 0;
+  std::int64_t out_of_reach_ = 0;
+  std::int64_t no_news_ = 0;
+  std::int64_t nothing_fits_ = 0;
+  std::int64_t ambiguous_ = 0;
+  std::int64_t weak_ = 0;
+  std::int64_t matches_ = 0;
+  std::int64_t contradicted_ = 0;
+  std::int64_t one_already_ = 0;
+};
+
+}  // namespace
+
+std::vector<WallPlace> FindPlaces(const WallGraph& walls,
+                                  const SameWallOptions& options) {
+  std::vector<WallPlace> places;
+  std::vector<std::vector<std::size_t>> places_of(
+      static_cast<std::size_t>(walls.size()));
+  for (int i = 0; i < walls.size(); ++i) {
+    if (walls.Length(i) < options.min_length) continue;
+    const Vector2d center = walls.Middle(i);
+    const bool is_covered = std::any_of(
+        places_of[i].begin(), places_of[i].end(), [&](std::size_t p) {
+          return (places[p].center - center).norm() < options.place_spacing;
+        });
+    if (is_covered) continue;
+    WallPlace place;
+    place.anchor = i;
+    place.center = center;
+    for (const auto& entry : walls.Within(i, options.place_links)) {
+      if (walls.Length(entry.first) < options.min_length ||
+          walls.DistanceTo(entry.first, center) > options.place_radius) {
+        continue;
+      }
+      place.walls.push_back(entry.first);
+      places_of[entry.first].push_back(places.size());
+    }
+    places.push_back(std::move(place));
+  }
+  return places;
+}
+
+void ComparePlaces(const WallGraph& walls, const SameWallOptions& options,
+                   const DetectionScope& scope, Marginals* marginals,
+                   ClosureCandidates* candidates) {
+  PlaceSearch(walls, options, scope, marginals, candidates).Run();
+}
+
+}  // namespace plumbline

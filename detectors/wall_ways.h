@@ -1,0 +1,47 @@
+#ifndef PLUMBLINE_DETECTORS_WALL_WAYS_H_
+#define PLUMBLINE_DETECTORS_WALL_WAYS_H_
+
+#include <plumbline/detectors/wall_graph.h>
+
+#include <cstddef>
+#include <vector>
+
+namespace plumbline {
+
+/// Ways from wall to wall along measurement links: how far the robot went, at
+/// least, between looking at one and at the other.
+///
+/// Closures that hold two directions are links too: the way round a loop that
+/// is closed adds nothing to what its ends do not know of each other. A closure
+/// holds two directions when the surroundings of its walls, up to
+/// `closure_links` measurement links away, have another wall in common across
+/// them: then nothing is free to move between the two visits.
+class WallWays {
+ public:
+  WallWays(const WallGraph& walls, int closure_links);
+
+  /// Length of the shortest way from a wall to every other, m; infinite where
+  /// there is none.
+  std::vector<double> From(int wall);
+
+  /// Of each wall, the number of the part in which there are ways between all:
+  /// the smallest index in it.
+  std::vector<std::size_t> Parts() const;
+
+ private:
+  struct Way {
+    int to = -1;
+    double length = 0.0;  // m
+  };
+
+  // Those of one wall after those of the one before.
+  std::vector<Way> ways_;
+  std::vector<int> begin_;
+  // Of the search: ways by the steps of their length, m.
+  double step_ = 1.0;
+  std::vector<std::vector<Way>> buckets_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_WALL_WAYS_H_

@@ -168,8 +168,10 @@ struct EmOrchestrator::Impl final : public GraphListener {
       }
       graph->Apply(std::move(transaction));
       has_broken = true;
-      if (verdict.is_final || is_stopped) break;
+      if (verdict.is_final) break;
       schedule.Optimize(scope);
+      // Nor do those of a solve that was cut short.
+      if (is_stopped) break;
     }
     return has_broken;
   }

@@ -441,7 +441,8 @@ TEST_F(EmTest, AWanderingDetectorIsNotBelievedForEver) {
 }
 
 // A wrong angle between two directions, another one each time: nothing raw is
-// in it, and no hypothesis is the same as one before.
+// in it, and no hypothesis is the same as one before. It is too loose to have
+// the walls' own hypotheses broken with it.
 TEST_F(EmTest, WanderingBetweenVirtualFeaturesComesToAnEnd) {
   for (const double degrees : {0.0, 0.1, 70.0, 70.1}) AddSegment(degrees);
   Add(0, "directions", 2, DirectionDetector({0.0, 70.0}));
@@ -454,7 +455,7 @@ TEST_F(EmTest, WanderingBetweenVirtualFeaturesComesToAnEnd) {
           return transaction;
         transaction.AddConstraint(
             Structure(registry, "orientation_orientation", ids[0], ids[1],
-                      DegToRad(90.0 + 0.5 * calls++), 0.1));
+                      DegToRad(90.0 + 0.5 * calls++), 5.0));
         return transaction;
       });
   EmOptions options;
@@ -467,8 +468,7 @@ TEST_F(EmTest, WanderingBetweenVirtualFeaturesComesToAnEnd) {
   EXPECT_EQ(Broken("orientation_orientation"), 4);
 }
 
-// The same with a virtual feature that is another one each time, by a proposal
-// that has it between what is there.
+// The same with a virtual feature between what is there, another one each time.
 TEST_F(EmTest, AWanderingVirtualFeatureOnVirtualOnesComesToAnEnd) {
   for (const double degrees : {0.0, 0.1, 70.0, 70.1}) AddSegment(degrees);
   Add(0, "directions", 2, DirectionDetector({0.0, 70.0}));
@@ -480,11 +480,12 @@ TEST_F(EmTest, AWanderingVirtualFeatureOnVirtualOnesComesToAnEnd) {
         if (ids.size() < 2 || !graph.VirtualFeatures(2).empty()) {
           return transaction;
         }
-        const FeatureId summit = transaction.AddFeature(
-            Orientation(registry, DegToRad(20.0 + 3.0 * calls++), 2));
+        const double expected = DegToRad(0.01 * calls++);
+        const FeatureId summit =
+            transaction.AddFeature(Orientation(registry, DegToRad(35.0), 2));
         for (const FeatureId id : ids) {
           transaction.AddConstraint(Structure(
-              registry, "orientation_orientation", id, summit, 0.0, 0.1));
+              registry, "orientation_orientation", id, summit, expected, 5.0));
         }
         return transaction;
       });

@@ -23,7 +23,7 @@ class CurvePoints {
   /// Points and options are not owned. A claimed point is not free.
   CurvePoints(const PointGraph& points, const std::vector<bool>& is_claimed,
               const CurveSearchOptions& options);
-
+  /// As they were given; points by their index in the PointGraph.
   const CurveSearchOptions& options() const { return options_; }
   int size() const { return points_.size(); }
   const Eigen::Vector2d& position(int i) const { return points_.position(i); }

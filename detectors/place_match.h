@@ -80,7 +80,7 @@ struct PlaceMatch {
     /// In a wide search chance would give as much.
     kTooLittleEvidence,
   };
-
+  /// Of this comparison.
   Outcome outcome = Outcome::kMatched;
   /// Moves the second place onto the first: x, y (m) of the pivot, and the turn
   /// about it (rad); the most probable one given the matches below. Directions

@@ -1,3 +1,4 @@
+#include <plumbline/core/wall.h>
 #include <plumbline/detectors/curve_detection.h>
 #include <plumbline/detectors/point_graph.h>
 
@@ -118,12 +119,10 @@ class CurveDetection {
         const Feature& feature = graph.GetFeature(constraint.features[1]);
         PlanarCurve curve;
         if (constraint.type->name == "point_line_distance") {
-          const double d = feature.parameters[0];
-          const double alpha = feature.parameters[1];
           curve.kind = CurveKind::kLine;
-          curve.direction = alpha;
-          curve.position = {feature.anchor[0] - d * std::sin(alpha),
-                            feature.anchor[1] + d * std::cos(alpha)};
+          curve.direction = feature.parameters[1];
+          curve.position = FootPoint({feature.anchor[0], feature.anchor[1]},
+                                     feature.parameters[0], curve.direction);
         } else if (constraint.type->name == "point_circle_distance") {
           curve.kind = CurveKind::kCircle;
           curve.position = {feature.parameters[0], feature.parameters[1]};

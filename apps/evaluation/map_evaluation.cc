@@ -1,5 +1,6 @@
 #include <plumbline/apps/evaluation/map_evaluation.h>
 #include <plumbline/core/disjoint_sets.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/detectors/merged_walls.h>
 
 #include <algorithm>
@@ -69,11 +70,7 @@ double AxialDifferenceDeg(double a_deg, double b_deg) {
 }
 
 // A truth wall made ready, and what matched it.
-struct Wall {
-  Eigen::Vector2d begin;
-  Eigen::Vector2d direction;
-  double angle = 0.0;
-  double length = 0.0;
+struct TrueWall : Wall {
   std::vector<std::pair<double, double>> seen;
   // Parts covered by map segments, m along the wall.
   std::vector<std::pair<double, double>> covered;
@@ -110,15 +107,15 @@ std::vector<MapSegment> Merged(const StraightMap& map) {
   return merged;
 }
 
-std::vector<Wall> MakeWalls(const MapTruth& truth) {
-  std::vector<Wall> walls;
+std::vector<TrueWall> MakeWalls(const MapTruth& truth) {
+  std::vector<TrueWall> walls;
   for (const TruthWall& truth_wall : truth.walls) {
-    Wall wall;
-    wall.begin = truth_wall.begin;
+    TrueWall wall;
+    wall.position = truth_wall.begin;
     const Eigen::Vector2d along = truth_wall.end - truth_wall.begin;
-    wall.length = along.norm();
-    wall.direction = wall.length > 0.0 ? Eigen::Vector2d(along / wall.length)
-                                       : Eigen::Vector2d(1.0, 0.0);
+    wall.end = along.norm();
+    wall.direction = wall.end > 0.0 ? Eigen::Vector2d(along / wall.end)
+                                    : Eigen::Vector2d(1.0, 0.0);
     wall.angle = std::atan2(wall.direction.y(), wall.direction.x());
     wall.seen = Unite(truth_wall.seen);
     walls.push_back(wall);
@@ -126,33 +123,20 @@ std::vector<Wall> MakeWalls(const MapTruth& truth) {
   return walls;
 }
 
-// A wall of the map in the world frame.
-struct PlacedSegment {
-  Pose2 pose;
-  Eigen::Vector2d direction;
-  double begin = 0.0;
-  double end = 0.0;
-  double length = 0.0;
-};
-
 // The walls, parallel and near enough, that some of the segment may lie on.
-void FindCandidates(const PlacedSegment& segment,
-                    const MapTruthOptions& options, std::vector<Wall>* walls,
-                    std::vector<Wall*>* candidates) {
+void FindCandidates(const Wall& segment, const MapTruthOptions& options,
+                    std::vector<TrueWall>* walls,
+                    std::vector<TrueWall*>* candidates) {
   candidates->clear();
-  const Eigen::Vector2d center =
-      segment.pose.head<2>() +
-      0.5 * (segment.begin + segment.end) * segment.direction;
-  for (Wall& wall : *walls) {
-    if (std::abs(NormalizeAxial(segment.pose[2] - wall.angle)) >
+  const Eigen::Vector2d center = segment.Middle();
+  for (TrueWall& wall : *walls) {
+    if (std::abs(NormalizeAxial(segment.angle - wall.angle)) >
         DegToRad(options.maximum_angle_deg)) {
       continue;
     }
-    const Eigen::Vector2d wall_center =
-        wall.begin + 0.5 * wall.length * wall.direction;
-    const double reach = 0.5 * (segment.length + wall.length) +
+    const double reach = 0.5 * (segment.length() + wall.length()) +
                          options.end_slack + options.maximum_offset;
-    if ((center - wall_center).squaredNorm() <= reach * reach) {
+    if ((center - wall.Middle()).squaredNorm() <= reach * reach) {
       candidates->push_back(&wall);
     }
   }
@@ -160,24 +144,21 @@ void FindCandidates(const PlacedSegment& segment,
 
 // Where a point lies on the nearest wall; null: on none.
 struct Foot {
-  Wall* wall = nullptr;
+  TrueWall* wall = nullptr;
   double along = 0.0;
   double offset = 0.0;
 };
 
 Foot NearestWall(const Eigen::Vector2d& point, const MapTruthOptions& options,
-                 const std::vector<Wall*>& candidates) {
+                 const std::vector<TrueWall*>& candidates) {
   Foot nearest;
   nearest.offset = options.maximum_offset;
-  for (Wall* wall : candidates) {
-    const Eigen::Vector2d from_begin = point - wall->begin;
-    const double along = from_begin.dot(wall->direction);
-    if (along < -options.end_slack ||
-        along > wall->length + options.end_slack) {
+  for (TrueWall* wall : candidates) {
+    const double along = wall->Along(point);
+    if (along < -options.end_slack || along > wall->end + options.end_slack) {
       continue;
     }
-    const double offset = std::abs(wall->direction.x() * from_begin.y() -
-                                   wall->direction.y() * from_begin.x());
+    const double offset = std::abs(wall->Across(point));
     if (offset < nearest.offset ||
         (nearest.wall == nullptr && offset == nearest.offset)) {
       nearest = {wall, along, offset};
@@ -188,26 +169,23 @@ Foot NearestWall(const Eigen::Vector2d& point, const MapTruthOptions& options,
 
 // Counts every piece of the segment for the wall that it lies on. Returns how
 // much of it lies on any, m.
-double MatchSegment(const PlacedSegment& segment,
-                    const MapTruthOptions& options,
-                    const std::vector<Wall*>& candidates) {
+double MatchSegment(const Wall& segment, const MapTruthOptions& options,
+                    const std::vector<TrueWall*>& candidates) {
   const int samples = static_cast<int>(
-      std::clamp(std::ceil(segment.length / kStep), 1.0, kMostSamples));
-  const double step = segment.length / samples;
+      std::clamp(std::ceil(segment.length() / kStep), 1.0, kMostSamples));
+  const double step = segment.length() / samples;
   double matched = 0.0;
   for (int k = 0; k < samples; ++k) {
-    const Eigen::Vector2d point =
-        segment.pose.head<2>() +
-        (segment.begin + (k + 0.5) * step) * segment.direction;
+    const Eigen::Vector2d point = segment.At(segment.begin + (k + 0.5) * step);
     const Foot foot = NearestWall(point, options, candidates);
     if (foot.wall == nullptr) continue;
     matched += step;
-    Wall& wall = *foot.wall;
+    TrueWall& wall = *foot.wall;
     wall.covered.emplace_back(foot.along - 0.5 * step, foot.along + 0.5 * step);
     wall.matched += step;
-    const double turn = RadToDeg(NormalizeAxial(segment.pose[2] - wall.angle));
+    const double turn = RadToDeg(NormalizeAxial(segment.angle - wall.angle));
     wall.direction_sum += step * std::abs(turn);
-    if (segment.length >= options.minimum_length) {
+    if (segment.length() >= options.minimum_length) {
       wall.long_matched += step;
       wall.turn_sum += step * turn;
     }
@@ -218,44 +196,41 @@ double MatchSegment(const PlacedSegment& segment,
 
 // Precision, false walls, and what each true wall was matched by.
 void MatchMap(const StraightMap& map, const MapTruthOptions& options,
-              std::vector<Wall>* walls, MapTruthEvaluation* evaluation) {
+              std::vector<TrueWall>* walls, MapTruthEvaluation* evaluation) {
   double map_length = 0.0;
   double right_length = 0.0;
-  std::vector<Wall*> candidates;
+  std::vector<TrueWall*> candidates;
   for (const MapSegment& segment : Merged(map)) {
-    PlacedSegment placed;
-    placed.pose = Compose(evaluation->alignment, segment.pose);
-    placed.direction = {std::cos(placed.pose[2]), std::sin(placed.pose[2])};
-    placed.begin = segment.begin;
-    placed.end = segment.end;
-    placed.length = segment.end - segment.begin;
-    if (!(placed.length > 0.0)) continue;
+    // In the world frame.
+    const Wall placed = MakeWall(Compose(evaluation->alignment, segment.pose),
+                                 segment.begin, segment.end);
+    if (!(placed.length() > 0.0)) continue;
     FindCandidates(placed, options, walls, &candidates);
     const double matched = MatchSegment(placed, options, candidates);
-    if (placed.length < options.minimum_length) continue;
-    map_length += placed.length;
+    if (placed.length() < options.minimum_length) continue;
+    map_length += placed.length();
     right_length += matched;
-    if (matched < options.minimum_overlap * placed.length) {
+    if (matched < options.minimum_overlap * placed.length()) {
       evaluation->false_walls.push_back(segment.id);
     }
   }
   if (map_length > 0.0) evaluation->precision = right_length / map_length;
 }
 
-bool IsAskedFor(const Wall& wall, const MapTruthOptions& options) {
+bool IsAskedFor(const TrueWall& wall, const MapTruthOptions& options) {
   return !(TotalLength(wall.seen) < options.minimum_length);
 }
 
 // Recall, missed and doubled walls, and errors of those that were found.
 void JudgeWalls(const MapTruth& truth, const MapTruthOptions& options,
-                const std::vector<Wall>& walls,
+                const std::vector<TrueWall>& walls,
                 MapTruthEvaluation* evaluation) {
   double seen_length = 0.0;
   double found_length = 0.0;
   std::vector<double> direction_errors;
   std::vector<double> offset_errors;
   for (std::size_t i = 0; i < walls.size(); ++i) {
-    const Wall& wall = walls[i];
+    const TrueWall& wall = walls[i];
     if (!IsAskedFor(wall, options)) continue;
     WallResult result;
     result.id = truth.walls[i].id;
@@ -284,7 +259,7 @@ void JudgeWalls(const MapTruth& truth, const MapTruthOptions& options,
 
 // How far the walls of each direction are turned, and how far that bends the
 // building.
-void JudgeDirections(const MapTruth& truth, const std::vector<Wall>& walls,
+void JudgeDirections(const MapTruth& truth, const std::vector<TrueWall>& walls,
                      MapTruthEvaluation* evaluation) {
   double all_length = 0.0;
   for (std::size_t d = 0; d < truth.orientations_deg.size(); ++d) {
@@ -312,7 +287,7 @@ void JudgeDirections(const MapTruth& truth, const std::vector<Wall>& walls,
 // Orientation features against the directions of the building.
 void JudgeOrientations(const StraightMap& map, const MapTruth& truth,
                        const MapTruthOptions& options,
-                       const std::vector<Wall>& walls,
+                       const std::vector<TrueWall>& walls,
                        MapTruthEvaluation* evaluation) {
   std::vector<int> matches(truth.orientations_deg.size(), 0);
   for (const MapOrientation& orientation : map.orientations) {
@@ -356,7 +331,7 @@ MapTruthEvaluation EvaluateMap(const StraightMap& map, const MapTruth& truth,
                                const MapTruthOptions& options) {
   MapTruthEvaluation evaluation;
   evaluation.alignment = alignment;
-  std::vector<Wall> walls = MakeWalls(truth);
+  std::vector<TrueWall> walls = MakeWalls(truth);
   MatchMap(map, options, &walls, &evaluation);
   JudgeWalls(truth, options, walls, &evaluation);
   JudgeDirections(truth, walls, &evaluation);

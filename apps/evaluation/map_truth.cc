@@ -1,6 +1,7 @@
 #include <plumbline/apps/evaluation/map_truth.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/utf8.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/detectors/same_wall.h>
 
 #include <algorithm>
@@ -231,11 +232,11 @@ StraightMap ReadStraightMap(InputStream* input) {
       const std::vector<double> p = entry["parameters"].Numbers(3);
       segment.pose = Pose2(p[0], p[1], p[2]);
     } else {
-      // (d, alpha) from the anchor: the foot point is d to the left.
       const std::vector<double> p = entry["parameters"].Numbers(2);
       const std::vector<double> anchor = entry["anchor"].Numbers(2);
-      segment.pose = Pose2(anchor[0] - p[0] * std::sin(p[1]),
-                           anchor[1] + p[0] * std::cos(p[1]), p[1]);
+      const Eigen::Vector2d foot =
+          FootPoint({anchor[0], anchor[1]}, p[0], p[1]);
+      segment.pose = Pose2(foot.x(), foot.y(), p[1]);
     }
     const std::vector<double> extent = entry["extent"].Numbers(2);
     segment.begin = std::min(extent[0], extent[1]);

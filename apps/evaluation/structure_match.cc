@@ -1,5 +1,6 @@
 #include <plumbline/apps/evaluation/structure_match.h>
 #include <plumbline/core/transaction.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/factors/angle.h>
 
 #include <algorithm>
@@ -24,10 +25,9 @@ struct PlacedLine {
   double direction;
 
   PlacedLine(const Feature& line, const RigidTransform& transform) {
-    const double d = line.parameters[0];
     const double alpha = line.parameters[1];
-    point = transform * Eigen::Vector2d(line.anchor[0] - d * std::sin(alpha),
-                                        line.anchor[1] + d * std::cos(alpha));
+    point = transform * FootPoint({line.anchor[0], line.anchor[1]},
+                                  line.parameters[0], alpha);
     direction =
         alpha + std::atan2(transform.rotation(1, 0), transform.rotation(0, 0));
   }

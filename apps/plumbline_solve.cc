@@ -8,9 +8,9 @@
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/initial_guess.h>
 #include <plumbline/core/plugin.h>
+#include <plumbline/core/stopwatch.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/detectors/builtins.h>
-#include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
@@ -19,6 +19,7 @@
 #include <plumbline/outputs/output_folder.h>
 #include <plumbline/outputs/solve_outputs.h>
 #include <plumbline/outputs/summary.h>
+#include <plumbline/pipeline/graph_solver.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/without_structure.h>
 
@@ -28,6 +29,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -325,6 +327,60 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   return kExitSuccess;
 }
 
+// Reads a graph; nothing when that was interrupted.
+std::optional<G2oFile> ReadGraph(InputStream* input, const Registry& registry,
+                                 Graph* graph) {
+  const ReadingProgress progress(input);
+  std::istringstream text(input->ReadRest());
+  if (InterruptRequested()) {
+    std::fprintf(stderr, "interrupted: the graph is not read whole\n");
+    return std::nullopt;
+  }
+  if (!input->damage().empty()) {
+    throw Error(input->name(), 0, input->damage(), "a whole graph");
+  }
+  return ReadG2o(text, input->name(), registry, graph, G2oOptionsFromFlags());
+}
+
+// Places the features where --initial_guess says.
+void PlaceStart(const InputStream& input, const G2oFile& g2o, Graph* graph,
+                Summary::Solver* figures) {
+  InitialGuessOptions start = InitialGuessOptionsFromFlags();
+  if (!g2o.named_by_edges.empty() &&
+      start.method == InitialGuessMethod::kFile) {
+    if (!gflags::GetCommandLineFlagInfoOrDie("initial_guess").is_default) {
+      throw Error("--initial_guess", 0,
+                  "'file', but " + input.name() + " lists edges only",
+                  "odometry, spanning_tree or chordal");
+    }
+    start.method = InitialGuessMethod::kChordal;
+    Remark("%s: lists edges only: poses start by --initial_guess=chordal",
+           input.name().c_str());
+  }
+  if (start.method == InitialGuessMethod::kFile) return;
+  const Stopwatch watch;
+  const InitialGuessReport made = MakeInitialGuess(start, graph);
+  figures->start_poses = made.poses;
+  figures->start_landmarks = made.landmarks;
+  figures->start_kept = made.kept;
+  figures->start_seconds = watch.Seconds();
+  Detail("start: %lld poses in %d parts and %lld landmarks placed, %lld kept",
+         static_cast<long long>(made.poses), made.parts,
+         static_cast<long long>(made.landmarks),
+         static_cast<long long>(made.kept));
+}
+
+// What the summary says of the solves of a graph.
+void SummarizeSolves(const GraphSolverResult& result,
+                     Summary::Solver* figures) {
+  figures->solves = result.num_solves;
+  figures->converged = result.solves.converged;
+  figures->iterations = result.solves.iterations;
+  figures->evaluation_seconds = result.solves.evaluation_seconds;
+  figures->linear_solver_seconds = result.solves.linear_solver_seconds;
+  figures->setup_seconds = result.solves.setup_seconds;
+}
+
 int SolveGraph(InputStream* input, const Registry& registry, double begin,
                OutputFolder* folder) {
   SolveOutcome outcome;
@@ -332,26 +388,15 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin,
   summary.input = FLAGS_input;
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
-  LogSolverOptions options = LogSolverOptionsFromFlags(registry);
+  const GraphSolverOptions options = GraphSolverOptionsFromFlags(registry);
   RemarkOnFlags(input->name(), "graph", "logs", LogFlags());
 
   const double parse_begin = Now();
   Graph graph;
-  G2oFile g2o;
-  {
-    const ReadingProgress progress(input);
-    std::istringstream text(input->ReadRest());
-    if (InterruptRequested()) {
-      std::fprintf(stderr, "interrupted: the graph is not read whole\n");
-      return kExitInterrupted;
-    }
-    if (!input->damage().empty()) {
-      throw Error(input->name(), 0, input->damage(), "a whole graph");
-    }
-    g2o = ReadG2o(text, input->name(), registry, &graph, G2oOptionsFromFlags());
-  }
+  const std::optional<G2oFile> g2o = ReadGraph(input, registry, &graph);
+  if (!g2o) return kExitInterrupted;
   summary.parse_seconds = Now() - parse_begin;
-  for (const auto& tag : g2o.unknown_tags) {
+  for (const auto& tag : g2o->unknown_tags) {
     Remark("%s: %d lines with the unknown tag %s kept as they are",
            input->name().c_str(), tag.second, tag.first.c_str());
   }
@@ -360,89 +405,40 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin,
     CheckGauge(graph, ParseMarginalsSelection(FLAGS_marginals, registry));
   }
   Summary::Solver figures;
-  InitialGuessOptions start = InitialGuessOptionsFromFlags();
-  if (!g2o.named_by_edges.empty() &&
-      start.method == InitialGuessMethod::kFile) {
-    if (!gflags::GetCommandLineFlagInfoOrDie("initial_guess").is_default) {
-      throw Error("--initial_guess", 0,
-                  "'file', but " + input->name() + " lists edges only",
-                  "odometry, spanning_tree or chordal");
-    }
-    start.method = InitialGuessMethod::kChordal;
-    Remark("%s: lists edges only: poses start by --initial_guess=chordal",
-           input->name().c_str());
-  }
-  if (start.method != InitialGuessMethod::kFile) {
-    const double start_begin = Now();
-    const InitialGuessReport made = MakeInitialGuess(start, &graph);
-    figures.start_poses = made.poses;
-    figures.start_landmarks = made.landmarks;
-    figures.start_kept = made.kept;
-    figures.start_seconds = Now() - start_begin;
-    Detail("start: %lld poses in %d parts and %lld landmarks placed, %lld kept",
-           static_cast<long long>(made.poses), made.parts,
-           static_cast<long long>(made.landmarks),
-           static_cast<long long>(made.kept));
-  }
+  PlaceStart(*input, *g2o, &graph, &figures);
 
-  Hierarchy hierarchy;
-  if (options.structure) {
-    std::set<std::string> raw;
-    for (const Feature* feature : graph.Features()) {
-      if (feature->level == 0) raw.insert(feature->type->name);
-    }
-    options.em.full_weight_test = FullWeightTestFromFlags(raw);
-    const double tolerance = ProfileOf(raw).graph_loop_tolerance;
-    if (tolerance > 0.0) options.em.loop_tolerance = tolerance;
-    hierarchy = MakeHierarchy(
-        options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
-        registry, {raw.begin(), raw.end()}, options.detector_parameters);
-  }
-  options.session.max_iterations = FLAGS_max_solver_iterations;
-  // Only structure is ever broken.
-  options.session.fast_removal = options.structure;
-  SolverSession session(&graph, registry, options.session);
-  const CostReport initial_cost = session.Cost();
-  if (!std::isfinite(initial_cost.total())) {
+  GraphSolver solver(registry, options, &graph);
+  if (!std::isfinite(solver.initial_cost().total())) {
     throw Error(input->name(), 0,
                 "the sum of squared residuals at the start is no finite number",
                 "smaller values, or less information");
   }
-  EmOrchestrator em(&graph, &session, registry, std::move(hierarchy),
-                    options.em);
-  em.SetTrace([&](const EmPhase& phase) {
-    outcome.trace.push_back(phase);
-    TellPhase(phase);
-  });
-  EmReport report;
+  GraphSolverResult result;
   {
     Progress progress("solving", "steps", 0);
     std::int64_t steps = 0;
-    report = em.Run([&] {
-      progress.Update(++steps);
-      return InterruptRequested();
-    });
+    result = solver.Run(
+        [&] {
+          progress.Update(++steps);
+          return InterruptRequested();
+        },
+        TellPhase);
   }
-  Summarize(initial_cost, session.Cost(), report, &summary);
-  const SolveReport& totals = session.totals();
-  figures.solves = session.num_solves();
-  figures.converged = totals.converged;
-  figures.iterations = totals.iterations;
-  figures.evaluation_seconds = totals.evaluation_seconds;
-  figures.linear_solver_seconds = totals.linear_solver_seconds;
-  figures.setup_seconds = totals.setup_seconds;
+  Summarize(result.initial_cost, result.final_cost, result.em, &summary);
+  SummarizeSolves(result, &figures);
   summary.solver = figures;
-  if (!totals.converged) {
+  if (!figures.converged) {
+    const std::string& why = result.solves.message;
     Remark(
         "%s: the solver did not converge%s; --max_solver_iterations and "
         "--initial_guess may help",
-        input->name().c_str(),
-        totals.message.empty() ? "" : (" (" + totals.message + ")").c_str());
+        input->name().c_str(), why.empty() ? "" : (" (" + why + ")").c_str());
   }
   outcome.graph = &graph;
   outcome.registry = &registry;
-  TakeMarginals(&session, &outcome);
-  outcome.g2o = &g2o;
+  outcome.trace = std::move(result.trace);
+  TakeMarginals(&solver.session(), &outcome);
+  outcome.g2o = &*g2o;
   outcome.without_structure = [&] {
     return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
   };

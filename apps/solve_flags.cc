@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
+#include <utility>
 
 DEFINE_string(
     input, "",
@@ -322,9 +323,19 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   return options;
 }
 
-bool FullWeightTestFromFlags(const std::set<std::string>& raw_feature_types) {
-  if (FLAGS_full_weight_test != "auto") return FLAGS_full_weight_test == "true";
-  return ProfileOf(raw_feature_types).full_weight_test;
+GraphSolverOptions GraphSolverOptionsFromFlags(const Registry& registry) {
+  LogSolverOptions of_log = LogSolverOptionsFromFlags(registry);
+  GraphSolverOptions options;
+  options.structure = of_log.structure;
+  options.hierarchy = std::move(of_log.hierarchy);
+  options.detector_parameters = std::move(of_log.detector_parameters);
+  options.session = of_log.session;
+  options.session.max_iterations = FLAGS_max_solver_iterations;
+  options.em = std::move(of_log.em);
+  if (FLAGS_full_weight_test != "auto") {
+    options.full_weight_test = FLAGS_full_weight_test == "true";
+  }
+  return options;
 }
 
 InitialGuessOptions InitialGuessOptionsFromFlags() {

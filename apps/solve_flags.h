@@ -8,9 +8,9 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/log_reader.h>
 #include <plumbline/outputs/occupancy_grid.h>
+#include <plumbline/pipeline/graph_solver.h>
 #include <plumbline/pipeline/log_solver.h>
 
-#include <set>
 #include <string>
 #include <vector>
 
@@ -45,8 +45,8 @@ std::vector<std::string> LogFlags();
 /// not fit together or do not parse.
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry);
 
-/// EmOptions::full_weight_test for a graph with these types of raw features.
-bool FullWeightTestFromFlags(const std::set<std::string>& raw_feature_types);
+/// The same for a graph. Throws Error likewise.
+GraphSolverOptions GraphSolverOptionsFromFlags(const Registry& registry);
 
 /// Where a graph starts: --initial_guess.
 InitialGuessOptions InitialGuessOptionsFromFlags();

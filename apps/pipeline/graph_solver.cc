@@ -23,15 +23,6 @@ SessionOptions SessionOf(const GraphSolverOptions& options) {
   return session;
 }
 
-Hierarchy HierarchyOf(const GraphSolverOptions& options, const Graph& graph,
-                      const Registry& registry) {
-  if (!options.structure) return {};
-  const std::set<std::string> raw = RawTypes(graph);
-  return MakeHierarchy(
-      options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
-      registry, {raw.begin(), raw.end()}, options.detector_parameters);
-}
-
 EmOptions EmOf(const GraphSolverOptions& options, const Graph& graph) {
   EmOptions em = options.em;
   if (!options.structure) return em;
@@ -46,10 +37,19 @@ EmOptions EmOf(const GraphSolverOptions& options, const Graph& graph) {
 
 }  // namespace
 
+Hierarchy MakeGraphHierarchy(const GraphSolverOptions& options,
+                             const Graph& graph, const Registry& registry) {
+  if (!options.structure) return {};
+  const std::set<std::string> raw = RawTypes(graph);
+  return MakeHierarchy(
+      options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
+      registry, {raw.begin(), raw.end()}, options.detector_parameters);
+}
+
 GraphSolver::GraphSolver(const Registry& registry,
                          const GraphSolverOptions& options, Graph* graph)
-    : GraphSolver(registry, options, HierarchyOf(options, *graph, registry),
-                  graph) {}
+    : GraphSolver(registry, options,
+                  MakeGraphHierarchy(options, *graph, registry), graph) {}
 
 GraphSolver::GraphSolver(const Registry& registry,
                          const GraphSolverOptions& options, Hierarchy hierarchy,

@@ -3,6 +3,7 @@
 
 #include <plumbline/core/em.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/core/hierarchy.h>
 #include <plumbline/core/hierarchy_spec.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/session.h>
@@ -29,6 +30,11 @@ struct GraphSolverOptions {
   /// EmOptions::full_weight_test; unset: that of the raw features' profile.
   std::optional<bool> full_weight_test;
 };
+
+/// The detectors that a graph is solved with; none without structure. Throws
+/// Error when the hierarchy asked for does not fit the graph's raw features.
+Hierarchy MakeGraphHierarchy(const GraphSolverOptions& options,
+                             const Graph& graph, const Registry& registry);
 
 /// What solving a graph came to; the map itself is in the graph.
 struct GraphSolverResult {

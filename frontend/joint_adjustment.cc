@@ -15,8 +15,10 @@ namespace {
 
 constexpr char kSource[] = "refinement";
 
-// A wall's place along itself is free: any value holds it, m.
-constexpr double kAlongSigma = 0.1;
+// Where along a wall its position is, is a choice and no measurement, m: as
+// good as exact, or what it is wide would be in every covariance as seen from
+// the fixed wall, which only this ties along itself.
+constexpr double kAlongSigma = 1e-3;
 
 Pose2 PoseOf(const Feature& feature) {
   return Pose2(feature.parameters[0], feature.parameters[1],

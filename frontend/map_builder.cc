@@ -275,6 +275,8 @@ void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
       Feature& wall =
           transaction.added_features()[Transaction::ProvisionalIndex(
               provisional[piece_of])];
+      // The gauge is that of the whole wall.
+      wall.fixed = wall.fixed || fresh[k] == gauge;
       const Pose2 relative = Between(
           Pose2(wall.parameters[0], wall.parameters[1], wall.parameters[2]),
           pose);

@@ -15,14 +15,16 @@ namespace plumbline {
 struct WallVoteOptions {
   /// A return votes for the wall that it lies nearest to: so near across, so
   /// far past its ends at most (m), with a surface turned by no more (rad) and
-  /// seen from the wall's own side.
-  double max_offset = 0.15;
+  /// seen from the wall's own side. A door set back by a hand's breadth is
+  /// another wall: were its returns to vote for the wall beside it, they would
+  /// tilt it.
+  double max_offset = 0.04;
   double max_gap = 0.2;
   double max_turn = DegToRad(25.0);
   /// Standard deviation of a return off its wall, m, and distance in standard
   /// deviations at which it counts half (Cauchy).
   double point_sigma = 0.03;
-  double loss_scale = 2.0;
+  double loss_scale = 1.0;
   /// A return counts as so many independent ones: whatever the number of
   /// returns and visits, they share the wall's own errors (panels, frames,
   /// bends) and those of its poses.

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/marginals.h>
 #include <plumbline/frontend/joint_adjustment.h>
 
 #include <cmath>
@@ -143,6 +144,20 @@ TEST_F(JointAdjustmentTest, PosesAndWallsComeTrue) {
                 std::hypot(offsets[i], i == 0 ? 0.0 : 0.3), 0.05)
         << i;
   }
+}
+
+TEST_F(JointAdjustmentTest,
+       NothingIsUncertainOnlyBecauseOfWhereAWallsPositionIs) {
+  graph_.GetFeature(walls_[0]).fixed = true;
+  SolverSession session(&graph_, registry_, {});
+  JointAdjustment adjustment(&graph_, &session, registry_, scans_, refined_,
+                             records_, keys_, robot_, options_);
+  adjustment.Adjust();
+  Marginals marginals(graph_, session);
+  // Across the next wall: along the fixed one.
+  const Eigen::MatrixXd covariance = marginals.Covariance(walls_[1]);
+  EXPECT_LT(std::sqrt(covariance(0, 0)), 0.05);
+  EXPECT_GT(std::sqrt(covariance(0, 0)), 0.0005);
 }
 
 TEST_F(JointAdjustmentTest, WhatStoodForThePosesGoes) {

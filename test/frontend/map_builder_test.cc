@@ -362,6 +362,21 @@ TEST_F(MapBuilderTest, TwoPiecesOfAWallInTheFirstScanAreOneFeature) {
               ElementsAre(segments[0]->id, segments[1]->id));
 }
 
+// The longest piece belongs to a wall that a shorter one has made.
+TEST_F(MapBuilderTest, TheGaugeIsFixedWhereTheLongestPieceIsOfAnothersWall) {
+  MapBuilder builder(&graph_, registry_, Options());
+  const Pose2 robot(0.0, 2.0, 0.0);
+  builder.AddKeyScan(0, Motion(Pose2::Zero()),
+                     ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
+                                        {{0.05, 0.0}, {3.0, 0.0}},
+                                        {{-1.0, 4.0}, {1.0, 4.0}}}),
+                     robot);
+  const std::vector<const Feature*> segments = Segments();
+  ASSERT_EQ(segments.size(), 2u);
+  EXPECT_TRUE(segments[0]->fixed);
+  EXPECT_FALSE(segments[1]->fixed);
+}
+
 // A door leaf 10 cm behind its wall, or a wall at an angle, is another feature.
 TEST_F(MapBuilderTest, WhatIsNotInLineInTheFirstScanStaysApart) {
   MapBuilder builder(&graph_, registry_, Options());

@@ -141,6 +141,21 @@ TEST_F(WallVotesTest, TheNearestWallGetsTheVote) {
   EXPECT_EQ(votes[0][1].points, 2);
 }
 
+// A shut door 5.5 cm behind its wall: by default neither has the other's
+// returns, also where a piece of the one is missing in the map.
+TEST_F(WallVotesTest, ADoorSetBackDoesNotVoteForItsWall) {
+  options_ = WallVoteOptions();
+  AddWall(-1.0);
+  Place wall;
+  Place door;
+  for (int i = -5; i <= 5; ++i) {
+    wall.returns.push_back(Return(0.1 * i, -1.0, 0.0, 1.0));
+    door.returns.push_back(Return(0.1 * i, -1.055, 0.0, 1.0));
+  }
+  EXPECT_EQ(Collect(wall, Pose2::Zero())[0].size(), 1u);
+  EXPECT_EQ(Collect(door, Pose2::Zero())[0].size(), 0u);
+}
+
 TEST_F(WallVotesTest, SameForAnyNumberOfThreads) {
   AddWall(-1.0);
   AddWall(-0.9);

@@ -22,7 +22,8 @@
 #include <thread>
 #include <vector>
 
-DEFINE_string(experiment, "", "S1, S2, S3, S4, S5, S6, R1, R2, B1 or all.");
+DEFINE_string(experiment, "",
+              "S1, S2, S3, S4, S5, S6, R1, R2, B1, B2, N1 or all.");
 DEFINE_int32(trials, 20, "Trials of each condition (R1, R2: one).");
 PLUMBLINE_FLAG_RANGE(trials, 1, 100000);
 DEFINE_uint64(seed, 1, "Seed of the first trial; the next have the next ones.");
@@ -58,7 +59,7 @@ std::vector<std::string> SelectedExperiments() {
                 FLAGS_experiment.empty()
                     ? "it is missing"
                     : "there is no experiment '" + FLAGS_experiment + "'",
-                "S1, S2, S3, S4, S5, S6, R1, R2, B1 or all");
+                "S1, S2, S3, S4, S5, S6, R1, R2, B1, B2, N1 or all");
   }
   return {FLAGS_experiment};
 }
@@ -166,7 +167,8 @@ int main(int argc, char** argv) {
       "and the figures as SVG, and summary.json with the claims and means of "
       "all. R1 and R2 need the public logs: the environment "
       "variable PLUMBLINE_DATASETS names their folder.";
-  info.usage = {"--experiment=S1|...|S6|R1|R2|B1|all --output_dir=DIR [flags]"};
+  info.usage = {
+      "--experiment=S1|...|S6|R1|R2|B1|B2|N1|all --output_dir=DIR [flags]"};
   info.example =
       "plumbline_experiments --experiment=S1 --trials=20 --output_dir=results";
   info.groups = {

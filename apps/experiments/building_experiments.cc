@@ -1,10 +1,12 @@
 #include <plumbline/apps/experiments/building_experiments.h>
 #include <plumbline/apps/experiments/building_trial.h>
 #include <plumbline/apps/experiments/experiment_jobs.h>
+#include <plumbline/apps/simulation/bent_world.h>
 #include <plumbline/pipeline/log_solver.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <string>
 #include <utility>
@@ -14,6 +16,49 @@ namespace {
 
 // Of the walls seen on several visits so many shall be one in the map.
 constexpr double kClosedShare = 0.95;
+
+// A map with structure may be so much worse than the one without, as a share
+// and m, and may bend the building by so many degrees.
+constexpr double kWorseShare = 1.05;
+constexpr double kWorseBy = 0.003;
+constexpr double kBendDeg = 0.3;
+
+// Between these the ratio of errors to covariances is sound.
+constexpr double kSmallestRatio = 0.6;
+constexpr double kLargestRatio = 1.5;
+
+// How a log is solved.
+struct Mode {
+  const char* name;
+  bool structure;
+  bool closures;
+  Refinement refine;
+};
+
+LogSolverOptions SolverOptions(const ExperimentOptions& options) {
+  LogSolverOptions solver;
+  solver.session.delta_mode = options.delta_mode;
+  solver.em.delta_threshold = options.delta_threshold;
+  solver.em.seed = options.seed;
+  return solver;
+}
+
+LogSolverOptions SolverOptions(const ExperimentOptions& options,
+                               const Mode& mode) {
+  LogSolverOptions solver = SolverOptions(options);
+  solver.structure = mode.structure;
+  solver.global_association = mode.closures;
+  solver.refine = mode.refine;
+  return solver;
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half]
+                                : 0.5 * (values[half - 1] + values[half]);
+}
 
 }  // namespace
 
@@ -31,10 +76,7 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
       job.seed = options.seed + static_cast<std::uint64_t>(trial);
       const bool is_drawn = trial == 0;
       job.run = [shape, is_drawn, &options, &registry](Job* self) {
-        LogSolverOptions solver;
-        solver.session.delta_mode = options.delta_mode;
-        solver.em.delta_threshold = options.delta_threshold;
-        solver.em.seed = options.seed;
+        const LogSolverOptions solver = SolverOptions(options);
         const BuildingTrial run = RunBuildingTrial(
             MakeWorld(shape, self->seed, 1.0), SimulatorOptions(), self->seed,
             registry, solver, options.stop);
@@ -95,6 +137,140 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
       "A closure is wrong when it joins segments of different true walls; "
       "closures_near join a shut door and the wall that it is in. Errors are "
       "m.");
+}
+
+void RunB2(const ExperimentOptions& options, const Registry& registry,
+           ExperimentResult* result) {
+  result->title = "Two corridors that meet at a small angle";
+  result->paper =
+      "The paper's buildings have right angles only, and structure is broken "
+      "where the measurements contradict it.";
+  static const Mode kModes[] = {{"none", false, false, Refinement::kMap},
+                                {"structure", true, true, Refinement::kFull}};
+  static const int kBends[] = {1, 2, 3, 5, 7, 9};
+  std::vector<Job> jobs;
+  for (const bool has_niches : {false, true}) {
+    for (const int bend : kBends) {
+      for (const Mode& mode : kModes) {
+        for (int trial = 0; trial < options.trials; ++trial) {
+          Job job;
+          job.condition = std::string(has_niches ? "niches " : "plain ") +
+                          std::to_string(bend) + " deg, " + mode.name;
+          job.seed = options.seed + static_cast<std::uint64_t>(trial);
+          job.run = [=, &mode, &options, &registry](Job* self) {
+            BentOptions bent = has_niches ? NichesOptions() : BentOptions();
+            bent.bend_deg = bend;
+            const BuildingTrial run = RunBuildingTrial(
+                MakeBentWorld(bent, self->seed), SimulatorOptions(), self->seed,
+                registry, SolverOptions(options, mode), options.stop);
+            if (run.is_stopped) return;
+            self->values = {{"position_error", run.mean_position_error},
+                            {"bend_error_deg", run.map.bend_error_deg}};
+          };
+          jobs.push_back(std::move(job));
+        }
+      }
+    }
+  }
+  RunJobs(options, &jobs);
+  Collect(&jobs, result);
+  if (result->interrupted) return;
+  for (const char* kind : {"plain ", "niches "}) {
+    std::vector<double> no_worse;
+    std::vector<double> right;
+    for (const int bend : kBends) {
+      const std::string condition = kind + std::to_string(bend) + " deg, ";
+      const std::vector<double> none =
+          Column(*result, condition + "none", "position_error");
+      const std::vector<double> with =
+          Column(*result, condition + "structure", "position_error");
+      for (std::size_t i = 0; i < std::min(none.size(), with.size()); ++i) {
+        no_worse.push_back(with[i] <=
+                           std::max(kWorseShare * none[i], none[i] + kWorseBy));
+      }
+      for (const char* mode : {"none", "structure"}) {
+        for (const double error :
+             Column(*result, condition + mode, "bend_error_deg")) {
+          right.push_back(error <= kBendDeg);
+        }
+      }
+    }
+    AddShare(std::string(kind) + "corridors: structure is no worse than none",
+             no_worse, 20, result);
+    AddShare(std::string(kind) + "corridors: the bend is right to 0.3 degrees",
+             right, 20, result);
+  }
+  result->notes.push_back(
+      "position_error: m, the trajectory laid on the true one as a whole. "
+      "bend_error_deg: how far the map turns one corridor against the other. "
+      "Without structure nothing closes loops and poses are found again on a "
+      "map that stays as it is.");
+}
+
+void RunN1(const ExperimentOptions& options, const Registry& registry,
+           ExperimentResult* result) {
+  result->title = "Errors of walls against their covariances (NEES)";
+  result->paper =
+      "The paper reports no covariances; structure is judged by them all the "
+      "same.";
+  static const Mode kModes[] = {
+      {"none", false, false, Refinement::kMap},
+      {"structure alone", true, false, Refinement::kMap},
+      {"default", true, true, Refinement::kFull}};
+  static const char* const kShapes[] = {"office", "killian_like"};
+  std::vector<Job> jobs;
+  for (const char* shape : kShapes) {
+    for (const Mode& mode : kModes) {
+      for (int trial = 0; trial < options.trials; ++trial) {
+        Job job;
+        job.condition = std::string(shape) + ", " + mode.name;
+        job.seed = options.seed + static_cast<std::uint64_t>(trial);
+        job.run = [=, &mode, &options, &registry](Job* self) {
+          const BuildingTrial run = RunBuildingTrial(
+              MakeWorld(shape, self->seed, 1.0), SimulatorOptions(), self->seed,
+              registry, SolverOptions(options, mode), options.stop);
+          if (run.is_stopped) return;
+          const Consistency& consistency = run.consistency;
+          self->values = {
+              {"ratio", consistency.ratio()},
+              {"ratio_of_each_wall", consistency.mean_wall_ratio},
+              {"degrees_of_freedom",
+               static_cast<double>(consistency.degrees_of_freedom)},
+              {"offset_error", consistency.offset_error},
+              {"offset_sigma", consistency.offset_sigma},
+              {"direction_error_deg", consistency.direction_error_deg},
+              {"direction_sigma_deg", consistency.direction_sigma_deg}};
+        };
+        jobs.push_back(std::move(job));
+      }
+    }
+  }
+  RunJobs(options, &jobs);
+  Collect(&jobs, result);
+  if (result->interrupted) return;
+  for (const char* shape : kShapes) {
+    for (const Mode& mode : kModes) {
+      const std::string condition = std::string(shape) + ", " + mode.name;
+      const std::vector<double> ratios = Column(*result, condition, "ratio");
+      Claim claim;
+      claim.text = condition + ": median ratio of NEES to degrees of freedom";
+      claim.required =
+          Format("%g", kSmallestRatio) + " to " + Format("%g", kLargestRatio);
+      claim.measured = Bootstrap(
+          ratios.size(), [&ratios](const std::vector<std::size_t>& trials) {
+            std::vector<double> drawn;
+            for (const std::size_t i : trials) drawn.push_back(ratios[i]);
+            return Median(std::move(drawn));
+          });
+      claim.holds = claim.measured.value >= kSmallestRatio &&
+                    claim.measured.value <= kLargestRatio;
+      result->claims.push_back(std::move(claim));
+    }
+  }
+  result->notes.push_back(
+      "ratio: 1 is right, below 1 covariances are too wide, above 1 too small. "
+      "Of walls that lie on one true wall as a whole, in the frame that fits "
+      "best (generalized least squares); offsets in m.");
 }
 
 }  // namespace plumbline

@@ -6,8 +6,12 @@
 
 namespace plumbline {
 
-/// The experiment on simulated buildings (RunExperiment says what it is).
+/// The experiments on simulated buildings (RunExperiment says what they are).
 void RunB1(const ExperimentOptions& options, const Registry& registry,
+           ExperimentResult* result);
+void RunB2(const ExperimentOptions& options, const Registry& registry,
+           ExperimentResult* result);
+void RunN1(const ExperimentOptions& options, const Registry& registry,
            ExperimentResult* result);
 
 }  // namespace plumbline

@@ -74,6 +74,8 @@ BuildingTrial RunBuildingTrial(const World& world,
             .norm() /
         static_cast<double>(count);
   }
+  trial.consistency =
+      EvaluateConsistency(solver.graph(), solver.session(), truth, trajectory);
   trial.drawing = DrawingFromGraph(solver.graph(), result.trajectory);
   return trial;
 }

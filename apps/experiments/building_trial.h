@@ -2,6 +2,7 @@
 #define PLUMBLINE_APPS_EXPERIMENTS_BUILDING_TRIAL_H_
 
 #include <plumbline/apps/evaluation/closure_truth.h>
+#include <plumbline/apps/evaluation/consistency.h>
 #include <plumbline/apps/evaluation/map_evaluation.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/world.h>
@@ -27,6 +28,8 @@ struct BuildingTrial {
   /// Mean distance of the poses of scans from the true ones once the trajectory
   /// is laid on them as a whole, m.
   double mean_position_error = 0.0;
+  /// Errors of the map's walls against the covariances that it gives them.
+  Consistency consistency;
   MapDrawing drawing;
   /// `stop` said so: the rest is empty.
   bool is_stopped = false;

@@ -15,8 +15,9 @@ using Runner = void (*)(const ExperimentOptions&, const Registry&,
 
 const std::vector<std::pair<std::string, Runner>>& Runners() {
   static const std::vector<std::pair<std::string, Runner>> runners = {
-      {"S1", RunS1}, {"S2", RunS2}, {"S3", RunS3}, {"S4", RunS4}, {"S5", RunS5},
-      {"S6", RunS6}, {"R1", RunR1}, {"R2", RunR2}, {"B1", RunB1}};
+      {"S1", RunS1}, {"S2", RunS2}, {"S3", RunS3}, {"S4", RunS4},
+      {"S5", RunS5}, {"S6", RunS6}, {"R1", RunR1}, {"R2", RunR2},
+      {"B1", RunB1}, {"B2", RunB2}, {"N1", RunN1}};
   return runners;
 }
 

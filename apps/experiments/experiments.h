@@ -11,7 +11,7 @@
 
 namespace plumbline {
 
-/// "S1" to "S6", "R1", "R2", "B1".
+/// "S1" to "S6", "R1", "R2", "B1", "B2", "N1".
 const std::vector<std::string>& ExperimentNames();
 
 /// Runs an experiment of core/method.md, section 8.
@@ -28,6 +28,10 @@ const std::vector<std::string>& ExperimentNames();
 ///       Research Lab, without structure and with
 ///   B1  simulated buildings of several shapes (building_trial.h): right
 ///       and wrong loop closures, errors of walls
+///   B2  two corridors that meet at 1 to 9 degrees (bent_world.h), without
+///       structure and with
+///   N1  errors of walls against their covariances (consistency.h) in offices
+///       and long corridors: without structure, structure alone, with closures
 ///
 /// The registry needs the built-ins. Throws Error for an unknown name and for
 /// options that do not fit.

@@ -398,7 +398,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin,
   summary.parse_seconds = Now() - parse_begin;
   for (const auto& tag : g2o->unknown_tags) {
     Remark("%s: %d lines with the unknown tag %s kept as they are",
-           input->name().c_str(), tag.second, tag.first.c_str());
+           input->name().c_str(), tag.second, PrintableUtf8(tag.first).c_str());
   }
 
   if (!FLAGS_marginals_hold_gauge) {

@@ -357,7 +357,8 @@ class Reader {
 
   [[noreturn]] void Fail(int line, const std::string& what,
                          const std::string& expected) const {
-    throw Error(name_, line, what, expected);
+    // Fields of the file may be any bytes.
+    throw Error(name_, line, PrintableUtf8(what), expected);
   }
 
   std::int64_t Integer(std::string_view field, const std::string& what,

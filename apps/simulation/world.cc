@@ -1,5 +1,6 @@
 #include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/utf8.h>
 #include <plumbline/factors/angle.h>
 
 #include <algorithm>
@@ -204,7 +205,7 @@ World ReadWorld(std::istream& input, const std::string& name) {
     for (std::string word; words >> word;) {
       double value = 0.0;
       if (!ParseNumber(word, &value)) {
-        throw Error(name, line, "'" + word + "' is not a number",
+        throw Error(name, line, "'" + PrintableUtf8(word) + "' is not a number",
                     "a finite number");
       }
       values.push_back(value);
@@ -250,7 +251,7 @@ World ReadWorld(std::istream& input, const std::string& name) {
         world.path.emplace_back(values[i], values[i + 1]);
       }
     } else {
-      throw Error(name, line, "'" + keyword + "' is unknown",
+      throw Error(name, line, "'" + PrintableUtf8(keyword) + "' is unknown",
                   "wall, door, circle, arc, box or path");
     }
   }

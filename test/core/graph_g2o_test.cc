@@ -168,6 +168,10 @@ TEST_F(GraphG2oTest, EdgesAloneThatDoNotTellTheTypes) {
             std::string::npos);
   EXPECT_NE(message("EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nFIX 9\n").find(":2: "),
             std::string::npos);
+  // Whatever bytes a field has, the message is whole.
+  EXPECT_NE(message(std::string("VERTEX_SE2 1 0 0 \0\x1b[2J\n", 22))
+                .find(":1: \"\xEF\xBF\xBD\xEF\xBF\xBD[2J\": expected a finite"),
+            std::string::npos);
   // One vertex, and the others are missed.
   EXPECT_NE(message("VERTEX_SE2 1 0 0 0\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n")
                 .find(":2: no vertex 2"),

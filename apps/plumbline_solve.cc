@@ -297,6 +297,16 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   summary.scans = static_cast<std::int64_t>(result.trajectory.size());
   summary.scans_in_log = static_cast<std::int64_t>(log.scans.size());
   summary.skipped = log.skipped;
+  for (const LooseTrack& part : result.loose) {
+    const Scan& begin_scan = log.scans[static_cast<std::size_t>(part.begin)];
+    const Scan& end_scan = log.scans[static_cast<std::size_t>(part.end)];
+    summary.tracking.loose.push_back(
+        {begin_scan.timestamp, end_scan.timestamp, part.why});
+    if (!part.found) ++summary.tracking.pieces;
+    Remark("%s: the map hangs by a thread, %.3f s to %.3f s: %s",
+           input->name().c_str(), begin_scan.timestamp, end_scan.timestamp,
+           part.why.c_str());
+  }
   summary.frontend_seconds =
       result.frontend_seconds + result.relocalization_seconds;
   summary.scan_seconds.assign(result.scan_seconds.begin(),

@@ -25,9 +25,15 @@ namespace plumbline {
 struct KeyScan {
   /// Index of the scan in the log.
   int index = 0;
-  /// Motion since the key scan before, in that scan's frame; ignored for the
-  /// first.
+  /// Motion since the key scan before, or since `since`, in that scan's frame;
+  /// ignored for the first.
   UncertainPose2 motion;
+  /// Index in the log of the key scan that `motion` counts from when it is not
+  /// the one before: the robot was lost and found elsewhere. -1 otherwise.
+  int since = -1;
+  /// `motion` is a guess: nothing that was seen before can be recognized from
+  /// here.
+  bool is_loose = false;
   /// Where the first one stands, map frame; ignored for the others.
   Pose2 start = Pose2::Zero();
   /// Its returns in the order of beams, robot's frame.
@@ -49,8 +55,14 @@ struct FeatureMatch {
 struct KeyScanRecord {
   /// Index of the scan in the log.
   int scan = 0;
-  /// Motion since the key scan before, in that scan's frame.
+  /// Motion since the key scan before, or since the record `from`, in that
+  /// scan's frame.
   UncertainPose2 motion;
+  /// Index of the record that `motion` counts from when it is not the one
+  /// before; -1 otherwise.
+  int from = -1;
+  /// `motion` is a guess.
+  bool is_loose = false;
   /// Pose (map frame) as it was when the scan came in.
   Pose2 pose = Pose2::Zero();
   /// Recognized segments, and those that this scan made.
@@ -103,6 +115,10 @@ class GraphBuilder {
   GraphBuilder(Graph* graph, const Registry& registry)
       : graph_(graph), registry_(registry), robot_(graph) {}
 
+  /// To be called before BeginScan with what AddScan got: takes the robot and
+  /// its links to the key scan `scan.since`, if that is given.
+  void Place(const KeyScan& scan);
+
   /// Begins a key scan: the first starts at `start`, for others the robot goes
   /// by `motion` and its links to features that are farther away than
   /// `link_radius` by `distance` (RobotLinks::Cut) are cut.
@@ -110,6 +126,10 @@ class GraphBuilder {
       int scan, const UncertainPose2& motion, const Pose2& start,
       double link_radius,
       const std::function<double(const Feature&)>& distance);
+
+  /// Ends a key scan. After a loose one the robot is linked to what that one
+  /// saw alone, if it saw anything.
+  void EndScan(KeyScanRecord record);
 
   /// Corrects the robot by what was recognized, if anything was.
   /// `associate(pose)` gives the associations at a pose, which must have the
@@ -145,6 +165,11 @@ class GraphBuilder {
   std::vector<KeyScanRecord> records_;
   std::int64_t num_matches_ = 0;
   std::int64_t num_created_ = 0;
+
+ private:
+  // Of the key scan that begins.
+  int from_ = -1;
+  bool is_loose_ = false;
 };
 
 }  // namespace plumbline

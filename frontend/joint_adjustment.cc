@@ -34,20 +34,35 @@ void AddReturns(const std::vector<ScanPoint>& points, const Pose2& pose,
   }
 }
 
+// The records that places begin with: every so many, and where the robot was
+// lost.
+std::vector<std::size_t> PlaceBegins(const std::vector<KeyScanRecord>& records,
+                                     std::size_t stride) {
+  std::vector<std::size_t> begins;
+  for (std::size_t k = 0; k < records.size(); ++k) {
+    if (begins.empty() || k - begins.back() == stride || records[k].from >= 0 ||
+        records[k].is_loose) {
+      begins.push_back(k);
+    }
+  }
+  return begins;
+}
+
 std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
                                 const std::vector<RefinedScan>& refined,
                                 const std::vector<KeyScanRecord>& records,
+                                const std::vector<std::size_t>& begins,
                                 const JointAdjustmentOptions& options) {
-  const std::size_t stride = options.place_stride;
-  std::vector<Place> places((records.size() + stride - 1) / stride);
+  std::vector<Place> places(begins.size());
   ParallelFor(places.size(), options.num_threads, [&](std::size_t p) {
     Place& place = places[p];
     place.num_scans = 0;
     std::vector<ScanPoint> points;
     Pose2 key = Pose2::Zero();
-    for (std::size_t k = p * stride;
-         k < std::min(records.size(), (p + 1) * stride); ++k) {
-      if (k > p * stride) key = Compose(key, records[k].motion.mean);
+    const std::size_t last =
+        p + 1 < begins.size() ? begins[p + 1] : records.size();
+    for (std::size_t k = begins[p]; k < last; ++k) {
+      if (k > begins[p]) key = Compose(key, records[k].motion.mean);
       const std::size_t begin = records[k].scan;
       const std::size_t end =
           k + 1 < records.size() ? records[k + 1].scan : refined.size();
@@ -93,11 +108,10 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
   }
   options_.relations.num_threads = options_.num_threads;
   options_.votes.num_threads = options_.num_threads;
-  places_ = GatherPlaces(scans, refined, records_, options_);
+  begins_ = PlaceBegins(records_, options_.place_stride);
+  places_ = GatherPlaces(scans, refined, records_, begins_, options_);
   std::vector<Pose2> poses;
-  for (std::size_t k = 0; k < key_poses.size(); k += options_.place_stride) {
-    poses.push_back(key_poses[k]);
-  }
+  for (const std::size_t k : begins_) poses.push_back(key_poses[k]);
   finder_ = std::make_unique<ScanMatchFinder>(places_, options_.relations);
 
   Transaction transaction;
@@ -113,15 +127,26 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
     provisional.push_back(transaction.AddFeature(feature));
   }
   for (std::size_t p = 1; p < poses.size(); ++p) {
+    // Its first record's motion counts from another place when the robot was
+    // lost and found.
+    const std::size_t end = begins_[p];
+    const int from = records_[end].from;
+    const std::size_t before =
+        from < 0 ? p - 1
+                 : std::upper_bound(begins_.begin(), begins_.end(),
+                                    static_cast<std::size_t>(from)) -
+                       begins_.begin() - 1;
+    const std::size_t until =
+        from < 0 ? end - 1 : static_cast<std::size_t>(from);
     UncertainPose2 motion;
-    const std::size_t end = p * options_.place_stride;
-    for (std::size_t k = end - options_.place_stride + 1; k <= end; ++k) {
+    for (std::size_t k = begins_[before] + 1; k <= until; ++k) {
       motion = Compose(motion, records_[k].motion);
     }
+    motion = Compose(motion, records_[end].motion);
     Constraint constraint;
     constraint.type = &pose_pose;
     constraint.features =
-        std::vector<FeatureId>{provisional[p - 1], provisional[p]};
+        std::vector<FeatureId>{provisional[before], provisional[p]};
     constraint.expected = motion.mean;
     const Eigen::Matrix3d information = motion.covariance.inverse();
     constraint.information = 0.5 * (information + information.transpose());
@@ -261,24 +286,25 @@ std::vector<Pose2> JointAdjustment::PlacePoses() const {
 
 std::vector<Pose2> JointAdjustment::KeyPoses() const {
   const std::vector<Pose2> places = PlacePoses();
-  const std::size_t stride = options_.place_stride;
   std::vector<Pose2> keys(records_.size(), Pose2::Zero());
   for (std::size_t p = 0; p < places.size(); ++p) {
-    const std::size_t begin = p * stride;
-    const std::size_t end = std::min(begin + stride, records_.size());
+    const std::size_t begin = begins_[p];
+    const std::size_t end =
+        p + 1 < places.size() ? begins_[p + 1] : records_.size();
     Pose2 relative = Pose2::Zero();
     for (std::size_t k = begin; k < end; ++k) {
       if (k > begin) relative = Compose(relative, records_[k].motion.mean);
       keys[k] = relative;
     }
     Pose2 missing = Pose2::Zero();
-    if (p + 1 < places.size()) {
+    if (p + 1 < places.size() && records_[end].from < 0 &&
+        !records_[end].is_loose) {
       missing = Between(
           Compose(places[p], Compose(relative, records_[end].motion.mean)),
           places[p + 1]);
     }
     for (std::size_t k = begin; k < end; ++k) {
-      const double share = static_cast<double>(k - begin) / stride;
+      const double share = static_cast<double>(k - begin) / (end - begin);
       keys[k] = Compose(Compose(places[p], keys[k]), Pose2(share * missing));
     }
   }

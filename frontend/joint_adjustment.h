@@ -11,6 +11,7 @@
 #include <plumbline/frontend/scan_relations.h>
 #include <plumbline/frontend/wall_votes.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -93,6 +94,8 @@ class JointAdjustment {
   JointAdjustmentOptions options_;
   const std::vector<KeyScanRecord>& records_;
   std::vector<Place> places_;
+  // The record that each place begins with.
+  std::vector<std::size_t> begins_;
   // By place.
   std::vector<FeatureId> poses_;
   std::unique_ptr<ScanMatchFinder> finder_;

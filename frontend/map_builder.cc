@@ -64,6 +64,7 @@ MapBuilder::MapBuilder(Graph* graph, const Registry& registry,
     : GraphBuilder(graph, registry), options_(options) {}
 
 void MapBuilder::AddScan(const KeyScan& scan) {
+  Place(scan);
   AddKeyScan(scan.index, scan.motion,
              ExtractSegments(scan.returns, scan.laser, scan.angle_step,
                              options_.extraction),
@@ -83,7 +84,7 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
   std::vector<AssociationCandidate> candidates;
   const Eigen::Matrix3d widest = robot_.Widest();
   for (FeatureId id : Neighborhood(options_.association_depth)) {
-    if (id == robot_.id()) continue;
+    if (id == robot_.id() || record.is_loose) continue;
     const Feature& feature = graph_->GetFeature(id);
     if (feature.is_virtual) continue;
     AssociationCandidate candidate;
@@ -131,8 +132,7 @@ void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,
   }
   SecondLook(record.matches);
   Grow(observations, used, &record);
-  record.pose = robot_.pose();
-  records_.push_back(std::move(record));
+  EndScan(std::move(record));
 }
 
 void MapBuilder::SecondLook(const std::vector<FeatureMatch>& matches) {

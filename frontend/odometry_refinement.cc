@@ -1,10 +1,81 @@
 #include <plumbline/frontend/odometry_refinement.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
 
 namespace plumbline {
+namespace {
+
+// Points of a track that are searched with lie so far apart, m, and those that
+// are kept of old key scans.
+constexpr double kSearchSpacing = 0.2;
+constexpr double kArchiveSpacing = 0.1;
+// First and last key scans of a track that are searched with.
+constexpr std::size_t kLocalKeys = 12;
+constexpr std::size_t kGlobalKeys = 24;
+// Key scans that far from a pose say what was seen around it, m.
+constexpr double kNearArchive = 5.0;
+// Key scans of one visit to a place.
+constexpr std::size_t kShortestVisit = 4;
+constexpr std::size_t kLongestVisit = 40;
+// Scans that wait for a tie at most while nothing can be tracked.
+constexpr std::size_t kMostPending = 1000;
+// So far from itself a place may lie that is visited again, m and rad.
+constexpr double kVisitDistance = 3.0;
+constexpr double kVisitRotation = DegToRad(15.0);
+// Peaks of a search that are looked at, the least score of one and its share of
+// the best.
+constexpr int kPeaks = 16;
+constexpr double kLeastScore = 0.25;
+constexpr double kPeakShare = 0.6;
+// The usual time between scans follows with this share.
+constexpr double kUsualShare = 0.05;
+// Counted returns from which on a share of them says something.
+constexpr int kLeastIntruders = 5;
+constexpr int kLeastSeenThrough = 20;
+// A returns' share of what is known is not divided by less.
+constexpr double kLeastKnown = 0.4;
+// Standard deviations of a tie: m and rad, and those that grow with the way.
+constexpr double kTieSigma = 0.03;
+constexpr double kTieAngle = DegToRad(0.5);
+// Where the returns say nothing, m.
+constexpr double kOpenSigma = 2.0;
+// Of a loose one, m and rad: a weak pull that keeps the map in one frame, not a
+// belief.
+constexpr double kLooseSigma = 3.0;
+constexpr double kLooseAngle = DegToRad(20.0);
+
+Eigen::Matrix3d Diagonal(double translation, double rotation) {
+  return Eigen::Vector3d(translation * translation, translation * translation,
+                         rotation * rotation)
+      .asDiagonal();
+}
+
+double SeenThrough(const ScanAgreement& a) {
+  return a.seen > 0 ? static_cast<double>(a.seen_through) / a.seen : 0.0;
+}
+
+// Share of the returns that do not lie in the unknown.
+double KnownShare(const ScanAgreement& a) {
+  const int known = a.hits + a.intruders;
+  return static_cast<double>(known) / std::max(1, known + a.unknown);
+}
+
+// How much of a scan the reference explains, at most 1.
+double Quality(const ScanAgreement& a) {
+  return (a.hits * (1.0 - SeenThrough(a)) - 2.0 * a.intruders) /
+         std::max(1, a.hits + a.intruders + a.unknown);
+}
+
+}  // namespace
 
 Eigen::Matrix3d OdometryCovariance(const Pose2& motion,
                                    const OdometryNoise& noise) {
@@ -15,122 +86,667 @@ Eigen::Matrix3d OdometryCovariance(const Pose2& motion,
                              noise.translation_per_radian * turn;
   const double rotation = noise.rotation + noise.rotation_per_metre * distance +
                           noise.rotation_per_radian * turn;
-  return Eigen::Vector3d(translation * translation, translation * translation,
-                         rotation * rotation)
-      .asDiagonal();
+  return Diagonal(translation, rotation);
 }
 
-OdometryRefiner::OdometryRefiner(const OdometryRefinementOptions& options)
-    : options_(options), matcher_(options.matcher) {}
+struct OdometryRefiner::Outcome {
+  enum class Verdict { kBelieved, kOdometry, kContradicted };
+  Verdict verdict = Verdict::kOdometry;
+  RefinedScan refined;
+  std::string why;
+  // Share of the reference that the scan before looked through.
+  double seen_through = 0.0;
+};
 
-void OdometryRefiner::RebuildReference() {
+OdometryRefiner::OdometryRefiner(const OdometryRefinementOptions& options)
+    : options_(options), track_(options.matcher) {}
+
+void OdometryRefiner::RebuildReference(Track* track) {
   std::vector<ScanPoint> reference;
-  for (const KeyScan& key : keys_) {
+  std::vector<Viewpoint> viewpoints;
+  for (const KeyScan& key : track->keys) {
     // Where odometry has jumped: nothing is in sight of both.
-    if ((key.pose - keys_.back().pose).head<2>().norm() >
+    if ((key.pose - track->keys.back().pose).head<2>().norm() >
         2.0 * options_.points.usable_range) {
       continue;
     }
     const PoseTransform transform(key.pose);
+    viewpoints.push_back({transform.Point(key.laser), reference.size()});
     for (const ScanPoint& point : key.points) {
       reference.push_back(Moved(point, transform));
     }
   }
-  matcher_.SetReference(std::move(reference));
+  track->matcher.SetReference(std::move(reference), std::move(viewpoints));
+}
+
+OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
+                                                const Pose2& motion) {
+  const TrackingOptions& tracking = options_.tracking;
+  Track& track = track_;
+  const Eigen::Matrix3d motion_covariance =
+      OdometryCovariance(motion, options_.noise);
+  const Pose2 key_pose = track.keys.back().pose;
+  const double turn = std::abs(motion[2]);
+  const double distance = motion.head<2>().norm();
+
+  Outcome outcome;
+  RefinedScan& result = outcome.refined;
+  result.since_key = Compose(track.since_key, {motion, motion_covariance});
+  result.pose = Compose(track.last_pose, motion);
+  result.odometry_only = true;
+  if (!options_.match_scans || track.matcher.empty() ||
+      static_cast<int>(points_.size()) < options_.minimum_points) {
+    return outcome;
+  }
+  MatchPrior prior;
+  prior.pose = result.pose;
+  // What was not matched since adds up.
+  prior.information = track.refused == 0
+                          ? motion_covariance.inverse()
+                          : OdometryCovariance(Pose2(distance + track.way, 0.0,
+                                                     turn + track.turn),
+                                               options_.noise)
+                                .inverse();
+  MatchResult match = track.matcher.Refine(points_, result.pose, prior);
+  if (match.inlier_ratio < options_.good_inlier_ratio ||
+      turn > options_.search_turn) {
+    ++wide_searches_;
+    // Twice the distance: some odometry gives the way travelled backwards
+    // as if it were forwards.
+    const Pose2 found = track.matcher.Search(
+        points_, result.pose,
+        std::min(options_.search_translation + 2.0 * (distance + track.way),
+                 options_.max_search_translation),
+        std::min(kPi, options_.search_rotation + turn + track.turn), nullptr);
+    MatchPrior overruled = prior;
+    overruled.information.row(2).setZero();
+    overruled.information.col(2).setZero();
+    const MatchResult wide = track.matcher.Refine(points_, found, overruled);
+    // The scan has to speak clearly for another pose than odometry's.
+    if (wide.cost < match.cost - 0.02) match = wide;
+  }
+  bool believed = match.inlier_ratio >= options_.good_inlier_ratio;
+  if (!believed || track.after_gap) {
+    const Eigen::Vector2d laser = scan.laser_offset.head<2>();
+    std::vector<bool> intruders;
+    ScanAgreement there =
+        track.matcher.Compare(points_, prior.pose, laser, &intruders);
+    ScanAgreement here = track.matcher.Compare(points_, match.pose, laser);
+    if (there.intruders >= kLeastIntruders && !track.after_gap) {
+      // What moves is not what stands: without what has come into the way the
+      // scan may speak for odometry.
+      std::vector<ScanPoint> standing;
+      for (std::size_t i = 0; i < points_.size(); ++i) {
+        if (!intruders[i]) standing.push_back(points_[i]);
+      }
+      const MatchResult other =
+          track.matcher.Refine(standing, prior.pose, prior);
+      const ScanAgreement agreement =
+          track.matcher.Compare(points_, other.pose, laser);
+      if (Quality(agreement) >= Quality(here)) {
+        match = other;
+        here = agreement;
+      }
+    }
+    // What contradicted the scan before already is no news.
+    const double before = track.after_gap
+                              ? SeenThrough(track.matcher.Compare(
+                                    track.last_points, track.last_pose, laser))
+                              : 0.0;
+    const auto contradicts = [&](const ScanAgreement& a) {
+      const double most = track.after_gap ? tracking.max_intruders_after_gap
+                                          : tracking.max_intruders;
+      const double through = track.after_gap
+                                 ? tracking.max_seen_through_after_gap
+                                 : tracking.max_seen_through;
+      return (a.intruders >= kLeastIntruders &&
+              a.intruders > most * (a.hits + a.intruders)) ||
+             (a.seen_through >= kLeastSeenThrough &&
+              SeenThrough(a) > through + before);
+    };
+    const double ratio =
+        match.inlier_ratio / std::max(kLeastKnown, KnownShare(here));
+    Eigen::Vector3d innovation = match.pose - prior.pose;
+    innovation[2] = NormalizeAngle(innovation[2]);
+    const double squared = innovation.dot(prior.information * innovation);
+    const bool agrees = squared <= tracking.max_innovation;
+    // After a gap a match must be better.
+    const double least = !track.after_gap ? options_.minimum_inlier_ratio
+                         : agrees         ? tracking.min_ratio_after_gap
+                                          : options_.good_inlier_ratio;
+    believed = ratio >= least && match.inliers >= options_.minimum_points &&
+               !((track.after_gap || !agrees) && contradicts(here));
+    if (!believed && (track.after_gap || contradicts(there))) {
+      outcome.verdict = Outcome::Verdict::kContradicted;
+      outcome.why = track.after_gap
+                        ? "scans are missing and the next one does not fit"
+                        : "what the robot sees contradicts what it saw before";
+    }
+    outcome.seen_through = before;
+    if (trace_) {
+      char text[256];
+      std::snprintf(text, sizeof text,
+                    "%s gap %d ratio %.2f/%.2f n %d chi %.1f hits %d intr %d "
+                    "unk %d seen %d thr %d before %.2f refused %d",
+                    believed              ? "believed"
+                    : outcome.why.empty() ? "odometry"
+                                          : "contra",
+                    static_cast<int>(track.after_gap), match.inlier_ratio,
+                    ratio, match.inliers, squared, here.hits, here.intruders,
+                    here.unknown, here.seen, here.seen_through, before,
+                    track.refused);
+      trace_(text);
+    }
+  }
+  if (!believed) {
+    ++refusals_;
+    return outcome;
+  }
+  outcome.verdict = Outcome::Verdict::kBelieved;
+  result.pose = match.pose;
+  result.odometry_only = false;
+  result.since_key.mean = Between(key_pose, match.pose);
+  // From the refined frame's axes to the key scan's.
+  const double c = std::cos(key_pose[2]);
+  const double s = std::sin(key_pose[2]);
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  rotation.topLeftCorner<2, 2>() << c, s, -s, c;
+  // What the returns leave open is as uncertain as all the odometry since
+  // the key scan, not as that of the last step alone.
+  result.since_key.covariance =
+      (rotation * match.information * rotation.transpose() +
+       result.since_key.covariance.inverse())
+          .inverse();
+  const MatchDrift& drift = options_.drift;
+  const double way = result.since_key.mean.head<2>().norm();
+  const double turned = std::abs(result.since_key.mean[2]);
+  const double translation =
+      drift.translation_per_root_metre * drift.translation_per_root_metre * way;
+  const double heading =
+      drift.rotation_per_root_metre * drift.rotation_per_root_metre * way +
+      drift.rotation_per_root_radian * drift.rotation_per_root_radian * turned;
+  result.since_key.covariance.diagonal() +=
+      Eigen::Vector3d(translation, translation, heading);
+  return outcome;
 }
 
 RefinedScan OdometryRefiner::Process(const Scan& scan) {
   ExtractScanPoints(scan, options_.points, &points_);
-  RefinedScan result;
+  const int index = count_++;
+  const Eigen::Vector2d laser = scan.laser_offset.head<2>();
+  SettledScan done;
+  done.index = index;
+  RefinedScan& result = done.refined;
   if (!started_) {
     started_ = true;
     result.pose = scan.odometry;
     result.is_key = true;
     last_odometry_ = scan.odometry;
-    last_pose_ = scan.odometry;
-    keys_.push_back({last_pose_, points_});
-    RebuildReference();
+    last_time_ = scan.timestamp;
+    track_.last_pose = scan.odometry;
+    track_.last_points = points_;
+    track_.keys.push_back({index, scan.odometry, points_, laser});
+    RebuildReference(&track_);
+    Archive(track_.keys.back());
+    done.points = points_;
+    settled_.push_back(done);
     return result;
   }
 
+  const TrackingOptions& tracking = options_.tracking;
   const Pose2 motion = Between(last_odometry_, scan.odometry);
-  const Eigen::Matrix3d motion_covariance =
-      OdometryCovariance(motion, options_.noise);
-  const Pose2 key_pose = keys_.back().pose;
-  const double turn = std::abs(motion[2]);
-  const double distance = motion.head<2>().norm();
-
-  result.since_key = Compose(since_key_, {motion, motion_covariance});
-  result.pose = Compose(last_pose_, motion);
-  result.odometry_only = true;
-  if (options_.match_scans && !matcher_.empty() &&
-      static_cast<int>(points_.size()) >= options_.minimum_points) {
-    MatchPrior prior;
-    prior.pose = result.pose;
-    prior.information = motion_covariance.inverse();
-    MatchResult match = matcher_.Refine(points_, result.pose, prior);
-    if (match.inlier_ratio < options_.good_inlier_ratio ||
-        turn > options_.search_turn) {
-      ++wide_searches_;
-      // Twice the distance: some odometry gives the way travelled backwards
-      // as if it were forwards.
-      const Pose2 found =
-          matcher_.Search(points_, result.pose,
-                          std::min(options_.search_translation + 2.0 * distance,
-                                   options_.max_search_translation),
-                          options_.search_rotation + turn, nullptr);
-      MatchPrior overruled = prior;
-      overruled.information.row(2).setZero();
-      overruled.information.col(2).setZero();
-      const MatchResult wide = matcher_.Refine(points_, found, overruled);
-      // The scan has to speak clearly for another pose than odometry's.
-      if (wide.cost < match.cost - 0.02) match = wide;
-    }
-    if (match.inlier_ratio >= options_.minimum_inlier_ratio) {
-      result.pose = match.pose;
-      result.odometry_only = false;
-      result.since_key.mean = Between(key_pose, match.pose);
-      // From the refined frame's axes to the key scan's.
-      const double c = std::cos(key_pose[2]);
-      const double s = std::sin(key_pose[2]);
-      Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-      rotation.topLeftCorner<2, 2>() << c, s, -s, c;
-      // What the returns leave open is as uncertain as all the odometry since
-      // the key scan, not as that of the last step alone.
-      result.since_key.covariance =
-          (rotation * match.information * rotation.transpose() +
-           result.since_key.covariance.inverse())
-              .inverse();
-    } else {
-      ++refusals_;
-    }
-  }
-
-  since_key_ = result.since_key;
-  if (!result.odometry_only) {
-    const MatchDrift& drift = options_.drift;
-    const double way = result.since_key.mean.head<2>().norm();
-    const double turned = std::abs(result.since_key.mean[2]);
-    const double translation = drift.translation_per_root_metre *
-                               drift.translation_per_root_metre * way;
-    const double rotation =
-        drift.rotation_per_root_metre * drift.rotation_per_root_metre * way +
-        drift.rotation_per_root_radian * drift.rotation_per_root_radian *
-            turned;
-    result.since_key.covariance.diagonal() +=
-        Eigen::Vector3d(translation, translation, rotation);
-  }
-  if (result.since_key.mean.head<2>().norm() >= options_.key_distance ||
-      std::abs(result.since_key.mean[2]) >= options_.key_rotation) {
-    result.is_key = true;
-    keys_.push_back({result.pose, points_});
-    while (static_cast<int>(keys_.size()) > options_.window) keys_.pop_front();
-    RebuildReference();
-    since_key_ = UncertainPose2();
-  }
+  const double seconds = scan.timestamp - last_time_;
   last_odometry_ = scan.odometry;
-  last_pose_ = result.pose;
+  last_time_ = scan.timestamp;
+  if (seconds > tracking.gap_seconds &&
+      seconds > tracking.gap_factor * usual_step_) {
+    track_.after_gap = true;
+  }
+  if (seconds > 0.0) {
+    usual_step_ = usual_step_ == 0.0
+                      ? seconds
+                      : usual_step_ + kUsualShare * (seconds - usual_step_);
+  }
+  if (open_ != nullptr) {
+    open_->way += motion.head<2>().norm();
+    open_->seconds += std::max(0.0, seconds);
+  }
+
+  Outcome outcome = Match(scan, motion);
+  result = outcome.refined;
+  const double way = motion.head<2>().norm();
+  const double turn = std::abs(motion[2]);
+  if (outcome.verdict == Outcome::Verdict::kBelieved) {
+    track_.way = 0.0;
+    track_.turn = 0.0;
+    track_.refused = 0;
+    track_.after_gap = false;
+  } else if (options_.match_scans) {
+    track_.way += way;
+    track_.turn += turn;
+    ++track_.refused;
+    const bool contradicted =
+        outcome.verdict == Outcome::Verdict::kContradicted;
+    if (contradicted || track_.way > tracking.max_blind_way ||
+        track_.turn > tracking.max_blind_turn) {
+      if (trace_) trace_("LOST " + outcome.why);
+      const UncertainPose2 since_key = result.since_key;
+      const Pose2 pose = result.pose;
+      const double blind_way = track_.way;
+      const bool tiny =
+          open_ != nullptr &&
+          static_cast<int>(open_->keys.size()) < tracking.min_tie_keys &&
+          pending_.size() < kMostPending;
+      if (open_ != nullptr && !tiny) Tie(true);
+      ++losses_;
+      if (open_ == nullptr) {
+        open_ = std::make_unique<OpenTie>(std::move(track_));
+        open_->last_sure = index - open_->before.refused;
+        open_->why = outcome.why.empty()
+                         ? "nothing that the robot saw could be matched"
+                         : outcome.why;
+        open_->way = blind_way;
+        open_->seconds = std::max(0.0, seconds);
+        // The scans that were refused are settled already.
+      } else {
+        // What has been tracked since is too little to be a track.
+        for (SettledScan& pending : pending_) {
+          pending.refined.is_key = false;
+          pending.refined.odometry_only = true;
+          pending.refined.tie = TrackTie::kNone;
+          pending.refined.since_key = UncertainPose2();
+          pending.refined.since_key.mean =
+              Between(open_->before.keys.back().pose, pending.refined.pose);
+          pending.points.clear();
+        }
+        open_->keys.clear();
+      }
+      open_->seen_through = outcome.seen_through;
+      open_->odometry_holds = open_->odometry_holds && !contradicted;
+      open_->first = index;
+      open_->next_attempt = tracking.min_tie_keys;
+      open_->next_global = tracking.first_global_keys;
+      track_ = Track(options_.matcher);
+      result = RefinedScan();
+      result.pose = pose;
+      result.since_key = since_key;
+      result.is_key = true;
+      result.odometry_only = true;
+      track_.last_pose = pose;
+      track_.last_points = points_;
+      track_.keys.push_back({index, pose, points_, laser});
+      RebuildReference(&track_);
+      open_->keys.push_back(track_.keys.back());
+      done.points = points_;
+      pending_.push_back(done);
+      return result;
+    }
+  }
+
+  track_.since_key = result.since_key;
+  track_.last_pose = result.pose;
+  track_.last_points = points_;
+  const bool moved =
+      result.since_key.mean.head<2>().norm() >= options_.key_distance ||
+      std::abs(result.since_key.mean[2]) >= options_.key_rotation;
+  // A scan that was refused anchors nothing.
+  if (moved && (!result.odometry_only || !options_.match_scans)) {
+    result.is_key = true;
+    track_.keys.push_back({index, result.pose, points_, laser});
+    while (static_cast<int>(track_.keys.size()) > options_.window) {
+      track_.keys.pop_front();
+    }
+    RebuildReference(&track_);
+    track_.since_key = UncertainPose2();
+    done.points = points_;
+  }
+  if (open_ == nullptr) {
+    if (result.is_key) Archive(track_.keys.back());
+    settled_.push_back(done);
+    return result;
+  }
+  pending_.push_back(done);
+  if (result.is_key) {
+    open_->keys.push_back(track_.keys.back());
+    const int keys = static_cast<int>(open_->keys.size());
+    if (keys >= tracking.max_open_keys) {
+      Tie(true);
+    } else if (keys >= open_->next_attempt) {
+      Tie(false);
+    }
+  }
   return result;
+}
+
+bool OdometryRefiner::FindTie(
+    const ScanMatcher& reference,
+    const std::function<std::vector<Visit>(const Pose2&)>& visits,
+    const Pose2& center, double translation_window, std::size_t begin,
+    std::size_t end, Hypothesis* found) {
+  const TrackingOptions& tracking = options_.tracking;
+  const std::vector<KeyScan>& keys = open_->keys;
+  const KeyScan& middle = keys[(begin + end) / 2];
+  // What the track has seen, in the frame of its middle.
+  std::vector<Eigen::Vector2d> sparse;
+  std::vector<ScanPoint> dense;
+  std::set<std::array<long, 2>> taken;
+  std::set<std::array<long, 2>> taken_dense;
+  std::vector<Pose2> relative;
+  for (std::size_t k = begin; k < end; ++k) {
+    relative.push_back(Between(middle.pose, keys[k].pose));
+    const PoseTransform transform(relative.back());
+    for (const ScanPoint& point : keys[k].points) {
+      const ScanPoint moved = Moved(point, transform);
+      const auto cell = [&](double spacing) {
+        return std::array<long, 2>{std::lround(moved.position.x() / spacing),
+                                   std::lround(moved.position.y() / spacing)};
+      };
+      if (taken.insert(cell(kSearchSpacing)).second) {
+        sparse.push_back(moved.position);
+      }
+      if (moved.normal.squaredNorm() > 0.0 &&
+          taken_dense.insert(cell(kArchiveSpacing)).second) {
+        dense.push_back(moved);
+      }
+    }
+  }
+  if (trace_) {
+    char text[256];
+    std::snprintf(text, sizeof text, "MID %d A %d %.6f %.6f %.6f points %d",
+                  middle.scan, archive_.back().scan, archive_.back().pose[0],
+                  archive_.back().pose[1], archive_.back().pose[2],
+                  static_cast<int>(sparse.size()));
+    trace_(text);
+  }
+  const std::vector<ScoredPose> peaks = reference.Peaks(
+      sparse, center, translation_window, kPi, kLeastScore, kPeakShare, kPeaks);
+  std::vector<Hypothesis> hypotheses;
+  for (const ScoredPose& peak : peaks) {
+    MatchPrior none;
+    none.pose = peak.pose;
+    for (const Visit& visit : visits(peak.pose)) {
+      const MatchResult match = visit.matcher->Refine(dense, peak.pose, none);
+      const Pose2 moved = Between(peak.pose, match.pose);
+      // Nothing there to hold it.
+      if (moved.head<2>().norm() > ScanMatcher::kPeakDistance ||
+          std::abs(moved[2]) > ScanMatcher::kPeakRotation) {
+        continue;
+      }
+      Hypothesis hypothesis;
+      hypothesis.pose = match.pose;
+      hypothesis.information = match.information;
+      hypothesis.begin = visit.begin;
+      hypothesis.end = visit.end;
+      ScanAgreement sum;
+      for (std::size_t k = begin; k < end; ++k) {
+        const ScanAgreement a = visit.matcher->Compare(
+            keys[k].points, Compose(match.pose, relative[k - begin]),
+            keys[k].laser);
+        sum.hits += a.hits;
+        sum.intruders += a.intruders;
+        sum.unknown += a.unknown;
+        sum.seen += a.seen;
+        sum.seen_through += a.seen_through;
+      }
+      const double inliers =
+          match.inlier_ratio / std::max(kLeastKnown, KnownShare(sum));
+      hypothesis.quality = Quality(sum) * std::min(1.0, inliers);
+      hypothesis.holds =
+          peak.score >= tracking.min_tie_score &&
+          sum.hits >= tracking.min_tie_support * (sum.hits + sum.intruders) &&
+          inliers >= tracking.min_tie_inliers &&
+          SeenThrough(sum) <=
+              tracking.max_tie_seen_through + open_->seen_through &&
+          KnownShare(sum) >= tracking.min_tie_known &&
+          sum.hits >= tracking.min_tie_hits * static_cast<int>(end - begin);
+      if (trace_) {
+        char text[256];
+        std::snprintf(text, sizeof text,
+                      "  peak %.2f visit %d-%d -> %.2f %.2f %.1f ratio %.2f "
+                      "hits %d intr %d unk %d seen %d thr %d q %.3f holds %d",
+                      peak.score, static_cast<int>(visit.begin),
+                      static_cast<int>(visit.end), match.pose[0], match.pose[1],
+                      RadToDeg(match.pose[2]), match.inlier_ratio, sum.hits,
+                      sum.intruders, sum.unknown, sum.seen, sum.seen_through,
+                      hypothesis.quality, static_cast<int>(hypothesis.holds));
+        trace_(text);
+      }
+      hypotheses.push_back(hypothesis);
+    }
+  }
+  const Hypothesis* best = nullptr;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    if (best == nullptr || hypothesis.quality > best->quality) {
+      best = &hypothesis;
+    }
+  }
+  if (best == nullptr || !best->holds) return false;
+  for (const Hypothesis& rival : hypotheses) {
+    // Seen on another visit a place lies beside itself.
+    const bool same_visit = rival.begin < best->end
+                                ? best->begin < rival.end
+                                : rival.begin == best->begin;
+    const Pose2 apart = Between(best->pose, rival.pose);
+    if (apart.head<2>().norm() <
+            (same_visit ? ScanMatcher::kPeakDistance : kVisitDistance) &&
+        std::abs(apart[2]) <
+            (same_visit ? ScanMatcher::kPeakRotation : kVisitRotation)) {
+      continue;
+    }
+    if (rival.quality > tracking.rival_share * best->quality) return false;
+  }
+  *found = *best;
+  return true;
+}
+
+void OdometryRefiner::Tie(bool last) {
+  const TrackingOptions& tracking = options_.tracking;
+  const int count = static_cast<int>(open_->keys.size());
+  // In steps that grow.
+  open_->next_attempt = count + std::max(1, count / 3);
+  if (trace_) trace_("TIE attempt keys " + std::to_string(count));
+  RefinedScan first;
+  Hypothesis found;
+  const KeyScan& start = open_->keys.front();
+  std::size_t middle = 0;
+  if (count >= tracking.min_tie_keys) {
+    const std::size_t end =
+        std::min<std::size_t>(open_->keys.size(), kLocalKeys);
+    middle = end / 2;
+    const double window =
+        std::min(tracking.max_local_search,
+                 0.5 + 0.5 * open_->way + tracking.gap_speed * open_->seconds);
+    const ScanMatcher& reference = open_->before.matcher;
+    if (FindTie(
+            reference,
+            [&reference](const Pose2&) {
+              return std::vector<Visit>{{&reference, 0, 0}};
+            },
+            open_->keys[middle].pose, window, 0, end, &found)) {
+      first.tie = TrackTie::kMatched;
+    }
+  }
+  if (first.tie == TrackTie::kNone && count >= tracking.first_global_keys &&
+      (last || count >= open_->next_global)) {
+    open_->next_global = 2 * count;
+    Eigen::Vector2d low = archive_.front().pose.head<2>();
+    Eigen::Vector2d high = low;
+    for (const ArchivedKey& key : archive_) {
+      low = low.cwiseMin(key.pose.head<2>());
+      high = high.cwiseMax(key.pose.head<2>());
+    }
+    ScanMatcher matcher(options_.matcher);
+    SetArchive(0, archive_.size(), &matcher);
+    std::deque<ScanMatcher> around;
+    const auto visits = [&](const Pose2& pose) {
+      std::vector<Visit> result;
+      around.clear();
+      std::size_t k = 0;
+      while (k < archive_.size()) {
+        const auto is_near = [&](std::size_t i) {
+          return (archive_[i].pose - pose).head<2>().norm() <= kNearArchive;
+        };
+        if (!is_near(k)) {
+          ++k;
+          continue;
+        }
+        const std::size_t begin = k;
+        while (k < archive_.size() && is_near(k) && k - begin < kLongestVisit) {
+          ++k;
+        }
+        if (k - begin < kShortestVisit) continue;
+        around.emplace_back(options_.matcher);
+        SetArchive(begin, k, &around.back());
+        result.push_back({&around.back(), begin, k});
+      }
+      return result;
+    };
+    const std::size_t end = open_->keys.size();
+    const std::size_t begin = end > kGlobalKeys ? end - kGlobalKeys : 0;
+    middle = (begin + end) / 2;
+    const Eigen::Vector2d center = 0.5 * (low + high);
+    const double window = 0.5 * (high - low).maxCoeff() + 1.0;
+    if (FindTie(matcher, visits, Pose2(center.x(), center.y(), 0.0), window,
+                begin, end, &found)) {
+      first.tie = TrackTie::kMatched;
+      double smallest = 0.0;
+      for (std::size_t k = found.begin; k < found.end; ++k) {
+        const double distance =
+            (archive_[k].pose - found.pose).head<2>().norm();
+        if (first.since < 0 || distance < smallest) {
+          first.since = archive_[k].scan;
+          first.since_key.mean = archive_[k].pose;
+          smallest = distance;
+        }
+      }
+    }
+  }
+  if (first.tie == TrackTie::kMatched) {
+    const Pose2 from =
+        first.since < 0 ? open_->before.keys.back().pose : first.since_key.mean;
+    const Pose2 back = Between(open_->keys[middle].pose, start.pose);
+    first.pose = Compose(found.pose, back);
+    first.since_key.mean = Between(from, first.pose);
+    // What the returns leave open, and the drift up to the middle.
+    const double way = back.head<2>().norm();
+    const MatchDrift& drift = options_.drift;
+    first.since_key.covariance =
+        (found.information + Diagonal(kOpenSigma, kPi).inverse()).inverse() +
+        Diagonal(kTieSigma + drift.translation_per_root_metre * std::sqrt(way),
+                 kTieAngle + drift.rotation_per_root_metre * std::sqrt(way));
+  }
+  if (first.tie == TrackTie::kNone) {
+    if (!last) return;
+    first.pose = start.pose;
+    first.since_key.mean = Between(open_->before.keys.back().pose, start.pose);
+    if (open_->odometry_holds && open_->way <= tracking.max_odometry_way) {
+      first.tie = TrackTie::kOdometry;
+      first.since_key.covariance =
+          pending_.front().refined.since_key.covariance;
+    } else {
+      first.tie = TrackTie::kLoose;
+      first.since_key.covariance = Diagonal(kLooseSigma, kLooseAngle);
+    }
+  }
+  if (trace_) {
+    trace_("TIED as " + std::to_string(static_cast<int>(first.tie)) +
+           " since " + std::to_string(first.since));
+  }
+  Settle(Compose(first.pose, Inverse(start.pose)), first);
+}
+
+void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
+  for (SettledScan& done : pending_) {
+    if (done.index == open_->first) {
+      done.refined.tie = first.tie;
+      done.refined.since = first.since;
+      done.refined.since_key = first.since_key;
+    } else if (done.index < open_->first) {
+      // Lost between the tracks: with the one that follows.
+    }
+    if (done.index >= open_->first) {
+      done.refined.pose = Compose(shift, done.refined.pose);
+    }
+    settled_.push_back(std::move(done));
+  }
+  pending_.clear();
+  if (first.tie == TrackTie::kLoose || first.since >= 0) {
+    if (guessed_ >= 0) loose_[guessed_].end = open_->last_sure;
+    guessed_ = -1;
+    LooseTrack part;
+    part.begin = open_->last_sure;
+    part.end = open_->first;
+    part.found = first.tie != TrackTie::kLoose;
+    part.why = open_->why + (part.found ? "; found again on what it saw earlier"
+                                        : "; where it went on is a guess");
+    if (!part.found) guessed_ = static_cast<int>(loose_.size());
+    loose_.push_back(std::move(part));
+  }
+  for (KeyScan& key : open_->keys) {
+    key.pose = Compose(shift, key.pose);
+    Archive(key);
+  }
+  for (KeyScan& key : track_.keys) key.pose = Compose(shift, key.pose);
+  track_.last_pose = Compose(shift, track_.last_pose);
+  // What was seen before goes on being the reference.
+  if (first.tie == TrackTie::kMatched && first.since < 0) {
+    std::deque<KeyScan>& before = open_->before.keys;
+    while (static_cast<int>(track_.keys.size()) < options_.window &&
+           !before.empty()) {
+      track_.keys.push_front(std::move(before.back()));
+      before.pop_back();
+    }
+  }
+  RebuildReference(&track_);
+  open_.reset();
+}
+
+void OdometryRefiner::SetArchive(std::size_t begin, std::size_t end,
+                                 ScanMatcher* matcher) const {
+  std::vector<ScanPoint> reference;
+  std::vector<Viewpoint> viewpoints;
+  for (std::size_t k = begin; k < end; ++k) {
+    const ArchivedKey& key = archive_[k];
+    const PoseTransform transform(key.pose);
+    viewpoints.push_back({transform.Point(key.laser), reference.size()});
+    for (const Eigen::Vector4f& values : key.points) {
+      ScanPoint point{};
+      point.position = values.head<2>().cast<double>();
+      point.normal = values.tail<2>().cast<double>();
+      reference.push_back(Moved(point, transform));
+    }
+  }
+  matcher->SetReference(std::move(reference), std::move(viewpoints));
+}
+
+void OdometryRefiner::Archive(const KeyScan& key) {
+  ArchivedKey kept;
+  kept.scan = key.scan;
+  kept.piece = static_cast<int>(loose_.size());
+  kept.pose = key.pose;
+  kept.laser = key.laser;
+  Eigen::Vector2d last = Eigen::Vector2d::Constant(1e9);
+  for (const ScanPoint& point : key.points) {
+    if ((point.position - last).norm() < kArchiveSpacing) continue;
+    last = point.position;
+    Eigen::Vector4f values;
+    values << point.position.cast<float>(), point.normal.cast<float>();
+    kept.points.push_back(values);
+  }
+  archive_.push_back(std::move(kept));
+}
+
+bool OdometryRefiner::TakeSettled(SettledScan* settled) {
+  if (settled_.empty()) return false;
+  *settled = std::move(settled_.front());
+  settled_.pop_front();
+  return true;
+}
+
+void OdometryRefiner::Finish() {
+  if (open_ != nullptr) Tie(true);
+  if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
+  guessed_ = -1;
 }
 
 }  // namespace plumbline

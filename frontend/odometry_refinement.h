@@ -8,6 +8,10 @@
 
 #include <Eigen/Core>
 #include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -42,6 +46,57 @@ struct MatchDrift {
   double rotation_per_root_radian = DegToRad(0.7);
 };
 
+/// When the track of the scans is lost, and how its tie to what was before is
+/// found again.
+struct TrackingOptions {
+  /// Shares of the returns that stand where the reference has looked through,
+  /// and of the reference's points that the scan looks through, from which on
+  /// they contradict a match. After a gap in the log the second pair counts.
+  double max_intruders = 0.2;
+  double max_seen_through = 0.25;
+  double max_intruders_after_gap = 0.15;
+  double max_seen_through_after_gap = 0.15;
+  /// Inlier ratio, of what is known, that a match after a gap needs when it
+  /// agrees with odometry; else OdometryRefinementOptions::good_inlier_ratio.
+  double min_ratio_after_gap = 0.6;
+  /// Chi-square of a match against odometry from which on contradictions count
+  /// without a gap, too: people contradict, but odometry agrees.
+  double max_innovation = 15.0;
+  /// A time between scans that is longer than this, s, and so many times the
+  /// usual one is a gap.
+  double gap_seconds = 1.0;
+  double gap_factor = 4.0;
+  /// Way (m) and turn (rad) without any match after which a track of its own
+  /// begins.
+  double max_blind_way = 1.5;
+  double max_blind_turn = DegToRad(40.0);
+  /// A tie by odometry alone is believed up to this way, m, when there was
+  /// neither a gap nor a contradiction.
+  double max_odometry_way = 3.0;
+  /// What a tie needs: scans of the track, share of returns that lie on what
+  /// the reference knows of all that do not lie in the unknown, the same by
+  /// the directions of surfaces too, score of the search, largest share
+  /// of the reference that is looked through, share of the returns that are
+  /// not in the unknown, and returns a scan that lie on the reference.
+  int min_tie_keys = 3;
+  double min_tie_support = 0.85;
+  double min_tie_inliers = 0.5;
+  double min_tie_score = 0.4;
+  double max_tie_seen_through = 0.15;
+  double min_tie_known = 0.4;
+  int min_tie_hits = 15;
+  /// A rival pose must be worse by this factor.
+  double rival_share = 0.75;
+  /// Speed at which the robot may have gone in a gap, m/s, and how far the
+  /// search near the last pose goes at most, m.
+  double gap_speed = 0.8;
+  double max_local_search = 6.0;
+  /// Key scans of the track at which the whole map is searched first, and after
+  /// which the tie is given up.
+  int first_global_keys = 10;
+  int max_open_keys = 150;
+};
+
 /// How scans are matched with what was seen last, and how far odometry is
 /// trusted.
 struct OdometryRefinementOptions {
@@ -72,6 +127,19 @@ struct OdometryRefinementOptions {
   double max_search_translation = 5.0;
   /// A turn between scans from which on the wide search is always made, rad.
   double search_turn = DegToRad(4.0);
+  TrackingOptions tracking;
+};
+
+/// How a track of scans hangs on what was before it.
+enum class TrackTie {
+  /// It goes on: nothing was lost.
+  kNone,
+  /// Lost, and found again on what had been seen before.
+  kMatched,
+  /// By odometry over a short way, which nothing speaks against.
+  kOdometry,
+  /// Unknown: where the track lies is a guess from odometry.
+  kLoose,
 };
 
 /// What became of one scan.
@@ -82,20 +150,62 @@ struct RefinedScan {
   /// Motion since the last key scan before this one, in that scan's frame, and
   /// its covariance. For the first scan: zero.
   UncertainPose2 since_key;
+  /// Index of the scan that since_key counts from when it is not the last key
+  /// scan before this one; -1 otherwise.
+  int since = -1;
   bool is_key = false;
   /// The match was refused or impossible: odometry stands.
   bool odometry_only = false;
+  /// Of the first scan of a track that was lost; a key scan.
+  TrackTie tie = TrackTie::kNone;
+};
+
+/// A scan whose place in the track is settled.
+struct SettledScan {
+  /// Counted from 0 in the order of Process.
+  int index = 0;
+  RefinedScan refined;
+  /// The returns of a key scan, robot's frame; empty otherwise.
+  std::vector<ScanPoint> points;
+};
+
+/// A part of the track that hangs on the rest by a thread.
+struct LooseTrack {
+  /// Last scan before it that is sure, and its own last one, or the first one
+  /// that was found again.
+  int begin = 0;
+  int end = 0;
+  std::string why;
+  /// It was found again on what had been seen earlier: the tie is one match,
+  /// not a guess.
+  bool found = false;
 };
 
 /// Refines odometry by matching each scan with the last key scans
 /// (core/method.md, section 7, step 0).
+///
+/// A scan that contradicts what was seen before it, or that follows a gap or a
+/// way without matches and cannot be matched, begins a track of its own. Its
+/// tie to the rest is open: it is looked for by matching the track's key scans
+/// with what was seen last, over the full circle, and then with all that was
+/// ever seen, and holds when one pose explains them clearly better than every
+/// other. Until then the track's scans are not settled. When it cannot be told
+/// the track is settled as loose.
 class OdometryRefiner {
  public:
   /// Starts with nothing seen.
   explicit OdometryRefiner(const OdometryRefinementOptions& options);
 
-  /// Scans in the order of the log.
+  /// Scans in the order of the log. Returns what is known of the scan now;
+  /// while a tie is open its pose is a guess.
   RefinedScan Process(const Scan& scan);
+
+  /// Takes out the next scan that is settled, in the order of Process; false
+  /// when there is none.
+  bool TakeSettled(SettledScan* settled);
+
+  /// Settles what is open: no scan follows.
+  void Finish();
 
   /// The returns of the last scan that was processed, in the robot's frame.
   const std::vector<ScanPoint>& points() const { return points_; }
@@ -103,25 +213,126 @@ class OdometryRefiner {
   /// Scans that took the wide search, and that fell back on odometry.
   int wide_searches() const { return wide_searches_; }
   int refusals() const { return refusals_; }
+  /// Tracks that were lost, and those of them that were tied again.
+  int losses() const { return losses_; }
+  /// Where the track hangs by a thread, in the order of scans. What hangs by a
+  /// guess ends where the next such part begins.
+  const std::vector<LooseTrack>& loose() const { return loose_; }
+
+  /// Calls `trace` with a line on each decision that was not plain.
+  void SetTrace(std::function<void(const std::string&)> trace) {
+    trace_ = std::move(trace);
+  }
 
  private:
   struct KeyScan {
+    int scan;
     Pose2 pose;
     std::vector<ScanPoint> points;
+    // Position of the laser in the robot's frame, m.
+    Eigen::Vector2d laser;
   };
+  // Scans that are matched with each other.
+  struct Track {
+    std::deque<KeyScan> keys;
+    ScanMatcher matcher;
+    Pose2 last_pose = Pose2::Zero();
+    UncertainPose2 since_key;
+    // Since the last scan that was matched: way (m), turn (rad), scans.
+    double way = 0.0;
+    double turn = 0.0;
+    int refused = 0;
+    bool after_gap = false;
+    // Returns of the last scan.
+    std::vector<ScanPoint> last_points;
+    explicit Track(const ScanMatcherOptions& options) : matcher(options) {}
+  };
+  // A track whose tie to the one before is not known.
+  struct OpenTie {
+    explicit OpenTie(Track lost) : before(std::move(lost)) {}
+    Track before;
+    // Last scan that is sure, first one of the track.
+    int last_sure = 0;
+    int first = 0;
+    // Way by odometry since the last scan that is sure, m; time, s.
+    double way = 0.0;
+    double seconds = 0.0;
+    // Neither a gap nor a contradiction.
+    bool odometry_holds = true;
+    // Share of the reference that was looked through before all this.
+    double seen_through = 0.0;
+    std::string why;
+    // Key scans of the track.
+    std::vector<KeyScan> keys;
+    int next_attempt = 0;
+    int next_global = 0;
+  };
+  struct Outcome;
+  struct Agreement;
 
-  void RebuildReference();
+  void RebuildReference(Track* track);
+  Outcome Match(const Scan& scan, const Pose2& motion);
+  void Lose(const Scan& scan, const std::string& why, bool odometry_holds);
+  // Looks for the tie; settles the track when it is found or `last`.
+  void Tie(bool last);
+  // Scans that a tie is judged by, and where it would hang.
+  struct Visit {
+    const ScanMatcher* matcher;
+    // Of the archive, [begin, end); empty for what was seen last.
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+  struct Hypothesis {
+    Pose2 pose = Pose2::Zero();
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    double quality = 0.0;
+    bool holds = false;
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+  // The pose of the middle of the open track's key scans [begin, end) that
+  // explains them best, if it is clear. `visits` gives what was seen around a
+  // pose, each time that the robot was there.
+  bool FindTie(const ScanMatcher& reference,
+               const std::function<std::vector<Visit>(const Pose2&)>& visits,
+               const Pose2& center, double translation_window,
+               std::size_t begin, std::size_t end, Hypothesis* found);
+  // Sets what was seen from the archive's key scans [begin, end).
+  void SetArchive(std::size_t begin, std::size_t end,
+                  ScanMatcher* matcher) const;
+  void Settle(const Pose2& shift, const RefinedScan& first);
+  void Archive(const KeyScan& key);
 
   OdometryRefinementOptions options_;
-  ScanMatcher matcher_;
-  std::deque<KeyScan> keys_;
+  std::function<void(const std::string&)> trace_;
+  Track track_;
   std::vector<ScanPoint> points_;
   bool started_ = false;
+  int count_ = 0;
   Pose2 last_odometry_ = Pose2::Zero();
-  Pose2 last_pose_ = Pose2::Zero();
-  UncertainPose2 since_key_;
+  double last_time_ = 0.0;
+  double usual_step_ = 0.0;
+  // Order of settled scans: front to be taken first.
+  std::deque<SettledScan> settled_;
+  // Scans of the open track, and what was lost with it.
+  std::vector<SettledScan> pending_;
+  std::unique_ptr<OpenTie> open_;
+  // What was seen from key scans that are settled, thinned out.
+  struct ArchivedKey {
+    int scan;
+    int piece;
+    Pose2 pose;
+    Eigen::Vector2d laser;
+    // Position and normal, robot's frame.
+    std::vector<Eigen::Vector4f> points;
+  };
+  std::vector<ArchivedKey> archive_;
   int wide_searches_ = 0;
   int refusals_ = 0;
+  int losses_ = 0;
+  std::vector<LooseTrack> loose_;
+  // The one that goes on and is a guess; -1: none.
+  int guessed_ = -1;
 };
 
 }  // namespace plumbline

@@ -92,6 +92,7 @@ PointMapBuilder::PointMapBuilder(Graph* graph, const Registry& registry,
 }
 
 void PointMapBuilder::AddScan(const KeyScan& scan) {
+  Place(scan);
   AddKeyScan(scan.index, scan.motion,
              ExtractSegments(scan.returns, scan.laser, scan.angle_step,
                              options_.extraction),
@@ -133,7 +134,8 @@ void PointMapBuilder::AddKeyScan(
                   return (PositionOf(feature) - robot_.pose().head<2>()).norm();
                 });
 
-  const std::vector<PointCandidate> candidates = Candidates();
+  const std::vector<PointCandidate> candidates =
+      record.is_loose ? std::vector<PointCandidate>() : Candidates();
   const auto associate = [&](const Pose2& pose) {
     return AssociatePoints(pose, surfaces, candidates, options_.association);
   };
@@ -173,8 +175,7 @@ void PointMapBuilder::AddKeyScan(
   }
   SecondLook(record.points);
   Grow(FreePlaces(surfaces, associations, laser), &record);
-  record.pose = robot_.pose();
-  records_.push_back(std::move(record));
+  EndScan(std::move(record));
 }
 
 void PointMapBuilder::SecondLook(const std::vector<PointMatch>& matches) {

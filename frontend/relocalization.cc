@@ -36,7 +36,11 @@ std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
       problem.AddResidualBlock(
           PosePose::Create(record.motion.mean, SqrtInformationFromCovariance(
                                                    record.motion.covariance)),
-          nullptr, poses[k - 1].data(), poses[k].data());
+          nullptr,
+          poses[record.from >= 0 ? static_cast<std::size_t>(record.from)
+                                 : k - 1]
+              .data(),
+          poses[k].data());
     }
     for (const FeatureMatch& match : record.matches) {
       const Feature* feature = graph.FindFeature(match.feature);
@@ -137,7 +141,10 @@ std::vector<Pose2> InterpolateScans(const std::vector<RefinedScan>& refined,
       whole += step.head<2>().norm() + 0.5 * std::abs(step[2]);
       way[i - begin] = whole;
     }
-    if (!last) {
+    // The robot was lost in between: nothing tells what is missing.
+    const bool goes_on =
+        !last && records[k + 1].from < 0 && !records[k + 1].is_loose;
+    if (goes_on) {
       const Pose2 step = Between(refined[end - 1].pose, refined[end].pose);
       whole += step.head<2>().norm() + 0.5 * std::abs(step[2]);
       missing = Between(Compose(key_poses[k], refined[end].since_key.mean),

@@ -38,6 +38,9 @@ class RobotLinks {
     links_.emplace(id, covariance);
   }
 
+  /// Cuts all links.
+  void ClearLinks() { links_.clear(); }
+
   /// Composes a motion, given in the robot's frame, onto the pose and its
   /// covariances.
   void Predict(const UncertainPose2& motion);

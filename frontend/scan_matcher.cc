@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <queue>
+#include <tuple>
+#include <utility>
 
 namespace plumbline {
 namespace {
@@ -21,12 +24,52 @@ constexpr double kFarthestBucket = 1e9;
 constexpr double kFieldSigmaCells = 1.0;
 constexpr int kFieldRadius = 3;
 
+// A beam says that all is free up to so far before its return, m, and no
+// farther away than this: grazing beams are not where they seem to be.
+constexpr double kFreeMargin = 0.3;
+constexpr double kFreeReach = 20.0;
+// Likelihood from which on a return lies on something: two cells away.
+constexpr int kHitLikelihood = 34;
+// Returns that are compared lie so far apart, m.
+constexpr double kCompareSpacing = 0.15;
+// Bearings of a scan for what it looks through, and the share of the distance
+// that counts as margin.
+constexpr int kBearings = 360;
+constexpr double kFreeShare = 0.03;
+
+// Peaks: levels of the pyramid, the cells that it reaches beyond the grid, what
+// a point costs where the reference has looked through, the error at the
+// farthest point that a step of the rotation makes, m, and its bounds, rad.
+constexpr int kLevels = 5;
+constexpr int kLevelPad = 1 << (kLevels - 1);
+constexpr std::int16_t kThrough = -128;
+constexpr double kRotationError = 0.15;
+constexpr double kLeastRotation = DegToRad(1.0);
+constexpr double kMostRotation = DegToRad(3.0);
+// Search nodes after which Peaks gives up.
+constexpr int kMaxNodes = 3000000;
+
 }  // namespace
 
 ScanMatcher::ScanMatcher(const ScanMatcherOptions& options)
     : options_(options) {}
 
 void ScanMatcher::SetReference(std::vector<ScanPoint> points) {
+  SetReference(std::move(points), {});
+}
+
+void ScanMatcher::SetReference(std::vector<ScanPoint> points,
+                               std::vector<Viewpoint> viewpoints) {
+  viewpoints_ = std::move(viewpoints);
+  rays_.clear();
+  if (!viewpoints_.empty()) {
+    rays_.reserve(points.size());
+    for (const ScanPoint& point : points) {
+      rays_.push_back({point.position, point.normal});
+    }
+  }
+  free_valid_ = false;
+  levels_.clear();
   reference_.clear();
   bucket_begin_.assign(1, 0);
   bucket_columns_ = 0;
@@ -284,6 +327,273 @@ void ScanMatcher::BuildField() const {
     }
   }
   field_valid_ = true;
+}
+
+void ScanMatcher::BuildFree() const {
+  if (!field_valid_) BuildField();
+  const double resolution = options_.grid_resolution;
+  free_.assign(field_.size(), 0);
+  for (std::size_t v = 0; v < viewpoints_.size(); ++v) {
+    const Eigen::Vector2d origin =
+        (viewpoints_[v].position - origin_) / resolution;
+    const std::size_t end =
+        v + 1 < viewpoints_.size() ? viewpoints_[v + 1].begin : rays_.size();
+    for (std::size_t i = viewpoints_[v].begin; i < end; ++i) {
+      const Eigen::Vector2d ray =
+          (rays_[i].position - origin_) / resolution - origin;
+      const double length = ray.norm();
+      const double reach =
+          std::min(length - kFreeMargin / resolution, kFreeReach / resolution);
+      if (!(reach > 0.0)) continue;
+      const Eigen::Vector2d step = ray / length;
+      for (double along = 0.0; along < reach; along += 1.0) {
+        const Eigen::Vector2d cell = origin + along * step;
+        if (!(cell.x() >= 0.0 && cell.y() >= 0.0 && cell.x() < field_columns_ &&
+              cell.y() < field_rows_)) {
+          break;
+        }
+        free_[static_cast<std::size_t>(cell.y()) * field_columns_ +
+              static_cast<std::size_t>(cell.x())] = 1;
+      }
+    }
+  }
+  free_valid_ = true;
+}
+
+void ScanMatcher::BuildLevels() const {
+  if (!free_valid_) BuildFree();
+  const int columns = field_columns_ + kLevelPad;
+  const int rows = field_rows_ + kLevelPad;
+  levels_.assign(kLevels, {});
+  levels_[0].assign(static_cast<std::size_t>(columns) * rows, 0);
+  for (int y = 0; y < field_rows_; ++y) {
+    for (int x = 0; x < field_columns_; ++x) {
+      const std::size_t cell = static_cast<std::size_t>(y) * field_columns_ + x;
+      levels_[0][static_cast<std::size_t>(y + kLevelPad) * columns + x +
+                 kLevelPad] = field_[cell] == 0 && free_[cell] != 0
+                                  ? kThrough
+                                  : static_cast<std::int16_t>(field_[cell]);
+    }
+  }
+  for (int level = 1; level < kLevels; ++level) {
+    const std::vector<std::int16_t>& finer = levels_[level - 1];
+    std::vector<std::int16_t>& best = levels_[level];
+    best.resize(finer.size());
+    const int half = 1 << (level - 1);
+    // Beyond the grid nothing is known.
+    const auto at = [&](int x, int y) -> std::int16_t {
+      return x < columns && y < rows
+                 ? finer[static_cast<std::size_t>(y) * columns + x]
+                 : static_cast<std::int16_t>(0);
+    };
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < columns; ++x) {
+        best[static_cast<std::size_t>(y) * columns + x] =
+            std::max({at(x, y), at(x + half, y), at(x, y + half),
+                      at(x + half, y + half)});
+      }
+    }
+  }
+}
+
+std::vector<ScoredPose> ScanMatcher::Peaks(
+    const std::vector<Eigen::Vector2d>& points, const Pose2& center,
+    double translation_window, double rotation_window, double minimum_score,
+    double share, int max_peaks) const {
+  std::vector<ScoredPose> peaks;
+  if (reference_.empty() || points.empty()) return peaks;
+  if (levels_.empty()) BuildLevels();
+  double reach = 1.0;
+  for (const Eigen::Vector2d& point : points) {
+    reach = std::max(reach, point.norm());
+  }
+  const double step =
+      std::clamp(kRotationError / reach, kLeastRotation, kMostRotation);
+  const int rotations = static_cast<int>(std::ceil(rotation_window / step));
+  const double resolution = options_.grid_resolution;
+  const int window =
+      static_cast<int>(std::ceil(translation_window / resolution));
+  const int columns = field_columns_ + kLevelPad;
+  const int rows = field_rows_ + kLevelPad;
+
+  // Cells of the points by rotation, the pad included.
+  struct Cell {
+    int x;
+    int y;
+  };
+  std::vector<std::vector<Cell>> cells(2 * rotations + 1);
+  const auto angle = [&](int k) {
+    return center[2] + (rotations > 0
+                            ? (k - rotations) * (rotation_window / rotations)
+                            : 0.0);
+  };
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    const double c = std::cos(angle(static_cast<int>(k))) / resolution;
+    const double s = std::sin(angle(static_cast<int>(k))) / resolution;
+    const Eigen::Vector2d shift = (center.head<2>() - origin_) / resolution;
+    for (const Eigen::Vector2d& point : points) {
+      const double x = shift.x() + c * point.x() - s * point.y();
+      const double y = shift.y() + s * point.x() + c * point.y();
+      cells[k].push_back({static_cast<int>(std::floor(x)) + kLevelPad,
+                          static_cast<int>(std::floor(y)) + kLevelPad});
+    }
+  }
+
+  struct Node {
+    int bound;
+    int level;
+    int rotation;
+    int x;
+    int y;
+    bool operator<(const Node& other) const {
+      return std::tie(bound, other.level, other.rotation, other.x, other.y) <
+             std::tie(other.bound, level, rotation, x, y);
+    }
+  };
+  const auto bound = [&](int level, int rotation, int x, int y) {
+    const std::vector<std::int16_t>& scores = levels_[level];
+    int sum = 0;
+    for (const Cell& cell : cells[rotation]) {
+      const int column = cell.x + x;
+      const int row = cell.y + y;
+      if (static_cast<unsigned>(column) < static_cast<unsigned>(columns) &&
+          static_cast<unsigned>(row) < static_cast<unsigned>(rows)) {
+        sum += scores[static_cast<std::size_t>(row) * columns + column];
+      }
+    }
+    return sum;
+  };
+  const double unit = 255.0 * static_cast<double>(points.size());
+  double least = minimum_score * unit;
+  std::priority_queue<Node> open;
+  int nodes = 0;
+  const auto push = [&](int level, int rotation, int x, int y) {
+    ++nodes;
+    const int value = bound(level, rotation, x, y);
+    if (value >= least && value > 0) open.push({value, level, rotation, x, y});
+  };
+  const int stride = 1 << (kLevels - 1);
+  for (int k = 0; k < static_cast<int>(cells.size()); ++k) {
+    for (int y = -window; y <= window; y += stride) {
+      for (int x = -window; x <= window; x += stride) {
+        push(kLevels - 1, k, x, y);
+      }
+    }
+  }
+  while (!open.empty() && static_cast<int>(peaks.size()) < max_peaks &&
+         nodes < kMaxNodes) {
+    const Node node = open.top();
+    open.pop();
+    if (node.bound < least) break;
+    const double heading = angle(node.rotation);
+    // All of the node lies beside a peak.
+    bool beside = false;
+    const double size = ((1 << node.level) - 1) * resolution;
+    for (const ScoredPose& peak : peaks) {
+      const double dx = center[0] + node.x * resolution - peak.pose[0];
+      const double dy = center[1] + node.y * resolution - peak.pose[1];
+      beside =
+          beside ||
+          (std::abs(NormalizeAngle(heading - peak.pose[2])) < kPeakRotation &&
+           std::hypot(std::max(std::abs(dx), std::abs(dx + size)),
+                      std::max(std::abs(dy), std::abs(dy + size))) <
+               kPeakDistance);
+    }
+    if (beside) continue;
+    if (node.level == 0) {
+      ScoredPose peak;
+      peak.pose =
+          Pose2(center[0] + node.x * resolution,
+                center[1] + node.y * resolution, NormalizeAngle(heading));
+      peak.score = node.bound / unit;
+      if (peaks.empty()) least = std::max(least, share * node.bound);
+      peaks.push_back(peak);
+      continue;
+    }
+    const int half = 1 << (node.level - 1);
+    for (int y = node.y; y <= std::min(node.y + half, window); y += half) {
+      for (int x = node.x; x <= std::min(node.x + half, window); x += half) {
+        push(node.level - 1, node.rotation, x, y);
+      }
+    }
+  }
+  return peaks;
+}
+
+ScanAgreement ScanMatcher::Compare(const std::vector<ScanPoint>& scan,
+                                   const Pose2& pose,
+                                   const Eigen::Vector2d& laser,
+                                   std::vector<bool>* intruders) const {
+  ScanAgreement agreement;
+  if (intruders != nullptr) intruders->assign(scan.size(), false);
+  if (reference_.empty() || scan.empty()) return agreement;
+  if (!free_valid_) BuildFree();
+  const double resolution = options_.grid_resolution;
+  const PoseTransform transform(pose);
+  Eigen::Vector2d last = Eigen::Vector2d::Constant(1e9);
+  // Nearest and farthest return by bearing.
+  std::vector<double> nearest(kBearings, 0.0);
+  for (const ScanPoint& point : scan) {
+    const Eigen::Vector2d ray = point.position - laser;
+    const int bearing = static_cast<int>((std::atan2(ray.y(), ray.x()) + kPi) *
+                                         (kBearings / (2.0 * kPi))) %
+                        kBearings;
+    double& range = nearest[bearing];
+    if (range == 0.0 || ray.norm() < range) range = ray.norm();
+    const bool counts = (last - point.position).squaredNorm() >=
+                        kCompareSpacing * kCompareSpacing;
+    if (counts) last = point.position;
+    if (!counts && intruders == nullptr) continue;
+    const Eigen::Vector2d local =
+        (transform.Point(point.position) - origin_) / resolution;
+    bool hits = false;
+    bool intrudes = false;
+    if (local.x() >= 0.0 && local.y() >= 0.0 && local.x() < field_columns_ &&
+        local.y() < field_rows_) {
+      const std::size_t cell =
+          static_cast<std::size_t>(local.y()) * field_columns_ +
+          static_cast<std::size_t>(local.x());
+      hits = field_[cell] >= kHitLikelihood;
+      intrudes = field_[cell] == 0 && free_[cell] != 0;
+    }
+    if (intruders != nullptr) (*intruders)[&point - scan.data()] = intrudes;
+    if (counts) {
+      ++(hits       ? agreement.hits
+         : intrudes ? agreement.intruders
+                    : agreement.unknown);
+    }
+  }
+  // The other way round; beside a beam its neighbours must look through too.
+  const Pose2 inverse = Inverse(pose);
+  const PoseTransform back(inverse);
+  last = Eigen::Vector2d::Constant(1e9);
+  const Eigen::Vector2d eye = transform.Point(laser);
+  for (const Surface& surface : rays_) {
+    const Eigen::Vector2d& position = surface.position;
+    // Surfaces that look away have been seen from behind.
+    if (surface.normal.dot(eye - position) < 0.0) continue;
+    if ((last - position).squaredNorm() < kCompareSpacing * kCompareSpacing) {
+      continue;
+    }
+    last = position;
+    const Eigen::Vector2d ray = back.Point(position) - laser;
+    const double distance = ray.norm();
+    const int bearing = static_cast<int>((std::atan2(ray.y(), ray.x()) + kPi) *
+                                         (kBearings / (2.0 * kPi))) %
+                        kBearings;
+    double range = std::numeric_limits<double>::infinity();
+    for (int step = -1; step <= 1; ++step) {
+      range =
+          std::min(range, nearest[(bearing + step + kBearings) % kBearings]);
+    }
+    const double margin = kFreeMargin + kFreeShare * distance;
+    if (distance > kFreeReach || range == 0.0 || distance > range + margin) {
+      continue;
+    }
+    ++agreement.seen;
+    if (distance < range - margin) ++agreement.seen_through;
+  }
+  return agreement;
 }
 
 Pose2 ScanMatcher::Search(const std::vector<ScanPoint>& scan,

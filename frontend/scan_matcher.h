@@ -5,6 +5,7 @@
 #include <plumbline/frontend/scan_points.h>
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -56,6 +57,35 @@ struct MatchResult {
   double cost = 0.0;
 };
 
+/// A place that returns of a reference were seen from.
+struct Viewpoint {
+  /// Of the laser, in the reference's frame, m.
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();
+  /// Index of the first of its returns; they end where the next viewpoint's
+  /// begin.
+  std::size_t begin = 0;
+};
+
+/// How a scan and the reference agree at a pose about what is solid and what is
+/// free, counted in returns that lie at least some way apart.
+struct ScanAgreement {
+  /// Returns that lie on what the reference has seen.
+  int hits = 0;
+  /// Returns that stand where the reference has looked through.
+  int intruders = 0;
+  /// Returns that lie where the reference has not looked.
+  int unknown = 0;
+  /// Points of the reference that the scan looks at, and through.
+  int seen = 0;
+  int seen_through = 0;
+};
+
+/// A pose and how well it fits, at most 1.
+struct ScoredPose {
+  Pose2 pose = Pose2::Zero();
+  double score = 0.0;
+};
+
 /// Matches a scan to a set of reference points: a correlative search over
 /// rotation and translation for the neighbourhood of the right pose, then
 /// robust point to line least squares. Not thread safe.
@@ -68,6 +98,10 @@ class ScanMatcher {
   /// given. Points need no order. Cost: linear in the points and in the cells
   /// of their bounding box.
   void SetReference(std::vector<ScanPoint> points);
+  /// The same with the places that the points were seen from, ascending by
+  /// `begin`: between them and their points the reference is free.
+  void SetReference(std::vector<ScanPoint> points,
+                    std::vector<Viewpoint> viewpoints);
   bool empty() const { return reference_.empty(); }
 
   /// Point to line refinement of a pose near the truth.
@@ -78,6 +112,30 @@ class ScanMatcher {
   /// initial radius at this pose: what Refine would start from, at a fraction
   /// of its cost. 0 without such returns.
   double Overlap(const std::vector<ScanPoint>& scan, const Pose2& pose) const;
+
+  /// The poses at which points fit the reference best, each at least
+  /// `kPeakDistance` or `kPeakRotation` from the others, best first: all within
+  /// the windows (m and rad each way, pi for the full circle) around `center`
+  /// that score at least `minimum_score` and `share` of the best, and
+  /// `max_peaks` at most. The score is the mean over the points: 1 on a
+  /// surface, 0 where the reference has not looked, negative where it has
+  /// looked through. Branch and bound: exact on its lattice.
+  std::vector<ScoredPose> Peaks(const std::vector<Eigen::Vector2d>& points,
+                                const Pose2& center, double translation_window,
+                                double rotation_window, double minimum_score,
+                                double share, int max_peaks) const;
+
+  /// Least distance of two peaks, m, and rad.
+  static constexpr double kPeakDistance = 0.6;
+  static constexpr double kPeakRotation = DegToRad(12.0);
+
+  /// What the scan and the reference say of each other at this pose. `laser`:
+  /// position of the laser in the robot's frame, m. Without viewpoints nothing
+  /// of the reference is free. `intruders`, if not null, gets one entry a
+  /// return: whether it is an intruder.
+  ScanAgreement Compare(const std::vector<ScanPoint>& scan, const Pose2& pose,
+                        const Eigen::Vector2d& laser,
+                        std::vector<bool>* intruders = nullptr) const;
 
   /// Best pose on a lattice around `center`: translations up to
   /// `translation_window` (m) each way, rotations up to `rotation_window`
@@ -111,6 +169,19 @@ class ScanMatcher {
   mutable int field_rows_ = 0;
   mutable bool field_valid_ = false;
   void BuildField() const;
+  // Cells of the field's grid that the reference has looked through, made at
+  // its first use.
+  std::vector<Viewpoint> viewpoints_;
+  // The points and normals in the order in which they were given, when there
+  // are viewpoints.
+  std::vector<Surface> rays_;
+  mutable std::vector<std::uint8_t> free_;
+  mutable bool free_valid_ = false;
+  void BuildFree() const;
+  // Scores of Peaks by level: the best of 2^level cells each way from a cell
+  // on; kLevelPad cells are added before the first.
+  mutable std::vector<std::vector<std::int16_t>> levels_;
+  void BuildLevels() const;
 };
 
 }  // namespace plumbline

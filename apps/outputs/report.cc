@@ -308,6 +308,11 @@ Json DataToJson(const Report& report) {
   for (const SkipReport& skip : summary.skipped) {
     json["skipped"].push_back({{"reason", skip.reason}, {"count", skip.count}});
   }
+  json["loose"] = Json::array();
+  for (const Summary::Tracking::Loose& part : summary.tracking.loose) {
+    json["loose"].push_back(
+        {{"begin", part.begin}, {"end", part.end}, {"why", part.why}});
+  }
   // Colours are those of the map.
   const MapDrawing drawing = DrawingFromGraph(*report.graph, report.path);
   std::map<FeatureId, int> clusters;

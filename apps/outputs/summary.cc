@@ -250,6 +250,13 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
     frontend["scan_seconds_growth"] =
         early && late && *early > 0.0 ? Json(*late / *early) : Json(nullptr);
     json["frontend"] = std::move(frontend);
+    Json loose = Json::array();
+    for (const Summary::Tracking::Loose& part : summary.tracking.loose) {
+      loose.push_back(
+          {{"begin", part.begin}, {"end", part.end}, {"why", part.why}});
+    }
+    json["tracking"] = {{"pieces", summary.tracking.pieces},
+                        {"loose", std::move(loose)}};
   }
   // A path may hold bytes that are no UTF-8.
   output << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';

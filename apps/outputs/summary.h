@@ -122,6 +122,22 @@ struct Summary {
   };
   std::optional<Solver> solver;
 
+  /// Of a log only: how the track of the robot hangs together.
+  struct Tracking {
+    /// A part of the track that hangs on the rest by a guess or a single match:
+    /// time stamps of the last scan before it that is sure and of its own last
+    /// one (of the first one that was matched), s, and what happened.
+    struct Loose {
+      double begin = 0.0;
+      double end = 0.0;
+      std::string why;
+    };
+    std::vector<Loose> loose;
+    /// Parts of the map whose places to each other are not a guess.
+    std::int64_t pieces = 1;
+  };
+  Tracking tracking;
+
   /// Of a log only (scans > 0): what was passed over, and the time that each
   /// scan took, s, in the order of scans; may be empty.
   std::vector<SkipReport> skipped;
@@ -142,8 +158,9 @@ void CountGraph(const Graph& graph, Summary* summary);
 /// (cost.total), iterations, solves, converged, evaluation_s, linear_solver_s,
 /// setup_s, start {poses, landmarks, kept, seconds}}; for a log also frontend
 /// {skipped [{reason, count, first_lines}], scan_seconds_second_tenth,
-/// scan_seconds_last_tenth, scan_seconds_growth (their quotient)}. Numbers that
-/// are not finite become null.
+/// scan_seconds_last_tenth, scan_seconds_growth (their quotient)}, tracking
+/// {pieces, loose [{begin, end, why}]}. Numbers that are not finite become
+/// null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// The same into a file, whole or not at all. Throws Error when it cannot be

@@ -22,6 +22,10 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
   KeyScan key;
   key.index = index;
   key.motion = refined.since_key;
+  key.since = refined.since;
+  // Found again by a match far down the track: where it begins, what is near in
+  // the graph need not be in sight.
+  key.is_loose = refined.tie == TrackTie::kLoose || refined.since >= 0;
   key.start = refined.pose;
   key.returns = returns;
   key.laser = scan.laser_offset.head<2>();
@@ -85,27 +89,43 @@ void LogSolver::RequireUnfinished() const {
 Pose2 LogSolver::AddScan(Scan scan) {
   RequireUnfinished();
   scans_.push_back(std::move(scan));
-  TakeScan(scans_.back());
+  TakeScan(scans_);
   if (builder_->records().empty()) return refined_.back().pose;
   return refined_.back().is_key
              ? builder_->robot()
              : Compose(builder_->robot(), refined_.back().since_key.mean);
 }
 
-void LogSolver::TakeScan(const Scan& scan) {
-  const Stopwatch watch;
-  double em_seconds = 0.0;
-  refined_.push_back(refiner_.Process(scan));
-  ++scans_since_em_;
-  if (refined_.back().is_key) {
-    const int index = static_cast<int>(refined_.size()) - 1;
-    builder_->AddScan(
-        MakeKeyScan(index, scan, refined_.back(), refiner_.points()));
+void LogSolver::TakeSettled(const std::vector<Scan>& scans,
+                            double* em_seconds) {
+  SettledScan settled;
+  while (refiner_.TakeSettled(&settled)) {
+    const auto index = static_cast<std::size_t>(settled.index);
+    refined_[index] = settled.refined;
+    num_settled_ = index + 1;
+    if (!settled.refined.is_key) continue;
+    builder_->AddScan(MakeKeyScan(settled.index, scans[index], settled.refined,
+                                  settled.points));
     if (options_.em_every > 0 && scans_since_em_ >= options_.em_every) {
       scans_since_em_ = 0;
-      const ScopedTimer timer(&em_seconds);
+      const ScopedTimer timer(em_seconds);
       RunEmNearRobot();
     }
+  }
+}
+
+void LogSolver::TakeScan(const std::vector<Scan>& scans) {
+  const Stopwatch watch;
+  double em_seconds = 0.0;
+  refined_.push_back(refiner_.Process(scans[refined_.size()]));
+  ++scans_since_em_;
+  TakeSettled(scans, &em_seconds);
+  if (num_settled_ < refined_.size()) {
+    // The robot is lost: until it is found a guess from the last key scan.
+    RefinedScan& guess = refined_.back();
+    guess.is_key = false;
+    guess.since_key.mean =
+        Between(refined_[builder_->records().back().scan].pose, guess.pose);
   }
   const double seconds = watch.Seconds();
   scan_seconds_.push_back(static_cast<float>(seconds));
@@ -152,9 +172,9 @@ LogSolverResult LogSolver::Run(const Log& log, const RunControl& control) {
   }
   refined_.reserve(log.scans.size());
   scan_seconds_.reserve(log.scans.size());
-  for (const Scan& scan : log.scans) {
+  while (refined_.size() < log.scans.size()) {
     if (control.stop && control.stop()) break;
-    TakeScan(scan);
+    TakeScan(log.scans);
     if (control.progress) control.progress(refined_.size(), log.scans.size());
   }
   return FinishWith(log.scans, control);
@@ -170,6 +190,13 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
   is_finished_ = true;
   Context context{scans, control, {}, {}};
   context.result.interrupted = refined_.size() < scans.size();
+  {
+    const Stopwatch watch;
+    double em_seconds = 0.0;
+    refiner_.Finish();
+    TakeSettled(scans, &em_seconds);
+    frontend_seconds_ += watch.Seconds() - em_seconds;
+  }
   FindStructure(&context);
   CloseLoops(&context);
   FindScansAgain(&context);
@@ -186,6 +213,8 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
   result.key_scans = static_cast<std::int64_t>(builder_->records().size());
   result.wide_searches = refiner_.wide_searches();
   result.refused_matches = refiner_.refusals();
+  result.lost_tracks = refiner_.losses();
+  result.loose = refiner_.loose();
   result.feature_matches = builder_->num_matches();
   result.features_created = builder_->num_created();
   result.records = builder_->records();

@@ -104,6 +104,10 @@ struct LogSolverResult {
   std::int64_t key_scans = 0;
   std::int64_t wide_searches = 0;
   std::int64_t refused_matches = 0;
+  /// How often the robot was lost, and the parts of the track that hang loosely
+  /// on the rest of the map.
+  std::int64_t lost_tracks = 0;
+  std::vector<LooseTrack> loose;
   /// Observations recognized as a raw feature, and raw features made.
   std::int64_t feature_matches = 0;
   std::int64_t features_created = 0;
@@ -164,7 +168,10 @@ class LogSolver {
 
   void RequireUnfinished() const;
   // A scan by itself: key scans enter the map, now and then with an EM step.
-  void TakeScan(const Scan& scan);
+  // Takes the next of the scans.
+  void TakeScan(const std::vector<Scan>& scans);
+  // Those whose place is settled go on into the map.
+  void TakeSettled(const std::vector<Scan>& scans, double* em_seconds);
   void RunEmNearRobot();
 
   // The stages once all scans are in, in order.
@@ -197,6 +204,7 @@ class LogSolver {
   std::vector<Scan> scans_;
   // One per scan.
   std::vector<RefinedScan> refined_;
+  std::size_t num_settled_ = 0;
   std::vector<float> scan_seconds_;
   double frontend_seconds_ = 0.0;
   // Since the last EM step near the robot.

@@ -458,5 +458,127 @@ TEST(OdometryRefinerTest, SameResultTenKilometresAway) {
   }
 }
 
+// Takes out what is settled, which must come in the order of scans.
+std::vector<RefinedScan> TakeAll(OdometryRefiner* refiner,
+                                 std::vector<RefinedScan> before = {}) {
+  SettledScan settled;
+  while (refiner->TakeSettled(&settled)) {
+    EXPECT_EQ(settled.index, static_cast<int>(before.size()));
+    EXPECT_EQ(settled.refined.is_key, !settled.points.empty());
+    before.push_back(settled.refined);
+  }
+  return before;
+}
+
+// The hall with two niches, so that it looks like itself from one place alone.
+std::vector<Wall> PlainHall() {
+  std::vector<Wall> walls = Hall();
+  for (const Wall& side : testing::Moved(Room(1.0, 2.0), {-4.5, 3.0, 0.0})) {
+    walls.push_back(side);
+  }
+  for (const Wall& side : testing::Moved(Room(2.5, 0.6), {3.0, -3.7, 0.0})) {
+    walls.push_back(side);
+  }
+  return walls;
+}
+
+// While the robot turned by 70 degrees scans are missing for three seconds; the
+// first ones after that carry the odometry of before, which then catches up at
+// once. Such a scan anchors nothing: what follows is tied to what was before by
+// what it sees.
+TEST(OdometryRefinerTest, StaleOdometryAfterAGap) {
+  for (const int stale : {1, 2}) {
+    for (const double turn : {70.0, -60.0}) {
+      SCOPED_TRACE(turn);
+      Laser laser;
+      laser.sigma = 0.01;
+      Noise noise(5);
+      OdometryRefiner refiner(Options());
+      Pose2 truth(-2.5, -2.0, 0.3);
+      Pose2 before = truth;
+      double time = 100.0;
+      std::vector<Pose2> truths;
+      std::vector<RefinedScan> refined;
+      for (int i = 0; i < 30; ++i) {
+        time += 0.2;
+        if (i == 12) {
+          before = truth;
+          truth = Compose(truth, {0.5, 0.1, DegToRad(turn)});
+          time += 3.0;
+        } else if (i > 0) {
+          truth = Compose(truth, {0.1, 0.0, DegToRad(2.0)});
+        }
+        Scan scan = MakeScan(PlainHall(), truth, laser, &noise);
+        scan.timestamp = time;
+        scan.odometry = i >= 12 && i < 12 + stale ? before : truth;
+        truths.push_back(truth);
+        refiner.Process(scan);
+        refined = TakeAll(&refiner, std::move(refined));
+      }
+      refiner.Finish();
+      refined = TakeAll(&refiner, std::move(refined));
+      ASSERT_EQ(refined.size(), truths.size());
+      EXPECT_TRUE(refiner.loose().empty());
+      for (std::size_t i = 0; i < refined.size(); ++i) {
+        EXPECT_LT(PositionError(refined[i].pose, truths[i]), 0.1) << i;
+        EXPECT_LT(HeadingError(refined[i].pose, truths[i]), DegToRad(1.5)) << i;
+      }
+    }
+  }
+}
+
+// Carried into another building: nothing tells where it is, and that is said.
+TEST(OdometryRefinerTest, CarriedIntoTheUnknown) {
+  const std::vector<Wall> there = Room(3.0, 5.5);
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(6);
+  OdometryRefiner refiner(Options());
+  Pose2 truth(-2.5, -2.0, 0.3);
+  std::vector<RefinedScan> refined;
+  for (int i = 0; i < 40; ++i) {
+    if (i > 0) truth = Compose(truth, {0.1, 0.0, DegToRad(2.0)});
+    const Pose2 elsewhere(0.3, -2.0 + 0.1 * (i - 15), 1.6);
+    Scan scan = i < 15 ? MakeScan(PlainHall(), truth, laser, &noise)
+                       : MakeScan(there, elsewhere, laser, &noise);
+    scan.timestamp = 100.0 + 0.2 * i + (i < 15 ? 0.0 : 40.0);
+    scan.odometry = truth;
+    refiner.Process(scan);
+    refined = TakeAll(&refiner, std::move(refined));
+  }
+  // The open track waits.
+  EXPECT_EQ(refined.size(), 15u);
+  refiner.Finish();
+  refined = TakeAll(&refiner, std::move(refined));
+  ASSERT_EQ(refined.size(), 40u);
+  EXPECT_EQ(refiner.losses(), 1);
+  ASSERT_EQ(refiner.loose().size(), 1u);
+  EXPECT_EQ(refiner.loose()[0].begin, 14);
+  EXPECT_EQ(refiner.loose()[0].end, 39);
+  EXPECT_FALSE(refiner.loose()[0].found);
+  EXPECT_EQ(refined[15].tie, TrackTie::kLoose);
+  EXPECT_TRUE(refined[15].is_key);
+  EXPECT_GT(refined[15].since_key.covariance(0, 0), 1.0);
+}
+
+// A pause in the log is no reason to be lost.
+TEST(OdometryRefinerTest, AGapWithoutMotion) {
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(7);
+  OdometryRefiner refiner(Options());
+  Pose2 truth(-2.5, -2.0, 0.3);
+  for (int i = 0; i < 30; ++i) {
+    if (i > 0) truth = Compose(truth, {0.1, 0.0, DegToRad(2.0)});
+    Scan scan = MakeScan(PlainHall(), truth, laser, &noise);
+    scan.timestamp = 100.0 + 0.2 * i + (i < 15 ? 0.0 : 600.0);
+    scan.odometry = truth;
+    refiner.Process(scan);
+  }
+  refiner.Finish();
+  EXPECT_EQ(refiner.losses(), 0);
+  EXPECT_TRUE(refiner.loose().empty());
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -455,5 +455,90 @@ TEST(ScanMatcherTest, NewReferenceReplacesTheOld) {
   EXPECT_EQ(matcher.Refine(scan, Pose2::Zero(), MatchPrior()).inliers, 0);
 }
 
+// Positions of what a scan sees, its own frame.
+std::vector<Eigen::Vector2d> Positions(const std::vector<ScanPoint>& points) {
+  std::vector<Eigen::Vector2d> positions;
+  for (std::size_t i = 0; i < points.size(); i += 4) {
+    positions.push_back(points[i].position);
+  }
+  return positions;
+}
+
+TEST(ScanMatcherTest, PeaksFindThePoseFromAnywhere) {
+  ScanMatcher matcher(Options());
+  const Pose2 from(-0.5, 0.2, 0.1);
+  matcher.SetReference(Seen(RoomWithPillar(), from), {{from.head<2>(), 0}});
+  const Pose2 truth(0.6, -0.8, 2.8);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
+  const std::vector<ScoredPose> peaks =
+      matcher.Peaks(Positions(scan), Pose2::Zero(), 3.0, kPi, 0.2, 0.3, 5);
+  ASSERT_FALSE(peaks.empty());
+  EXPECT_LT(PositionError(peaks[0].pose, truth), 0.15);
+  EXPECT_LT(HeadingError(peaks[0].pose, truth), DegToRad(2.0));
+  for (std::size_t i = 1; i < peaks.size(); ++i) {
+    EXPECT_LE(peaks[i].score, peaks[i - 1].score);
+    EXPECT_GE(peaks[i].score, 0.3 * peaks[0].score);
+    for (std::size_t j = 0; j < i; ++j) {
+      EXPECT_TRUE(PositionError(peaks[i].pose, peaks[j].pose) >=
+                      ScanMatcher::kPeakDistance - 1e-9 ||
+                  HeadingError(peaks[i].pose, peaks[j].pose) >=
+                      ScanMatcher::kPeakRotation - 1e-9);
+    }
+  }
+  // Nothing in the windows.
+  EXPECT_TRUE(
+      matcher
+          .Peaks(Positions(scan), Pose2(50.0, 0.0, 0.0), 3.0, kPi, 0.2, 0.3, 5)
+          .empty());
+}
+
+TEST(ScanMatcherTest, PeaksOfARoomThatLooksTheSameTurnedRound) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(Room(7.0, 5.0), Pose2::Zero()),
+                       {{Eigen::Vector2d::Zero(), 0}});
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(Room(7.0, 5.0), Pose2(0.8, 0.4, 0.3), FullCircle()));
+  const std::vector<ScoredPose> peaks =
+      matcher.Peaks(Positions(scan), Pose2::Zero(), 3.0, kPi, 0.5, 0.8, 5);
+  ASSERT_EQ(peaks.size(), 2u);
+  EXPECT_GT(peaks[1].score, 0.95 * peaks[0].score);
+  EXPECT_LT(
+      PositionError(peaks[0].pose, Pose2(-peaks[1].pose.head<2>()[0],
+                                         -peaks[1].pose.head<2>()[1], 0.0)),
+      0.3);
+}
+
+TEST(ScanMatcherTest, CompareTellsSolidFromFree) {
+  ScanMatcher matcher(Options());
+  matcher.SetReference(Seen(Room(7.0, 5.0), Pose2::Zero()),
+                       {{Eigen::Vector2d::Zero(), 0}});
+  const Eigen::Vector2d laser = Eigen::Vector2d::Zero();
+  const Pose2 pose(0.5, 0.5, 0.2);
+  const auto compare = [&](const std::vector<Wall>& walls, const Pose2& seen) {
+    return matcher.Compare(PointsOf(MakeScan(walls, seen, FullCircle())), pose,
+                           laser);
+  };
+  const ScanAgreement same = compare(Room(7.0, 5.0), pose);
+  EXPECT_GT(same.hits, 100);
+  EXPECT_EQ(same.intruders, 0);
+  EXPECT_GT(same.seen, 100);
+  EXPECT_EQ(same.seen_through, 0);
+  // A pillar that was not there.
+  std::vector<Wall> walls = Room(7.0, 5.0);
+  for (const Wall& side : testing::Moved(Room(0.8, 0.8), {-1.5, 0.0, 0.0})) {
+    walls.push_back(side);
+  }
+  const ScanAgreement pillar = compare(walls, pose);
+  EXPECT_GT(pillar.intruders, 4);
+  EXPECT_EQ(pillar.seen_through, 0);
+  EXPECT_LT(pillar.seen, same.seen);
+  // A wall that is gone.
+  const ScanAgreement gone = compare(Room(12.0, 5.0), pose);
+  EXPECT_GT(gone.unknown, 10);
+  EXPECT_GT(gone.seen_through, 20);
+  EXPECT_EQ(gone.intruders, 0);
+}
+
 }  // namespace
 }  // namespace plumbline

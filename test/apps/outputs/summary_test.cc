@@ -176,6 +176,8 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   summary.parse_seconds = std::nan("");
   summary.peak_memory_bytes = 123;
   summary.skipped = {{"too short", 2, {7, 9}}};
+  summary.tracking.loose = {{2.5, 7.25, "a gap"}};
+  summary.tracking.pieces = 2;
   for (int i = 0; i < 20; ++i) summary.scan_seconds.push_back(i);
   std::ostringstream output;
   WriteSummary(summary, output);
@@ -187,7 +189,9 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
             (std::vector<std::string>{
                 "input", "seed", "flags", "counts", "cost", "em", "time_s",
                 "peak_memory_bytes", "orthogonality_deg", "closures", "version",
-                "files", "sha256", "partial", "frontend"}));
+                "files", "sha256", "partial", "frontend", "tracking"}));
+  EXPECT_EQ(json["tracking"].dump(),
+            R"({"pieces":2,"loose":[{"begin":2.5,"end":7.25,"why":"a gap"}]})");
   EXPECT_EQ(json["input"], "a\xEF\xBF\xBD.clf");
   EXPECT_EQ(json["seed"], 18446744073709551615u);
   EXPECT_EQ(json["flags"].dump(),

@@ -7,6 +7,7 @@
 #include <plumbline/apps/cli/progress.h>
 #include <plumbline/apps/simulation/bent_world.h>
 #include <plumbline/apps/simulation/simulator.h>
+#include <plumbline/apps/simulation/stress.h>
 #include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/atomic_file.h>
@@ -120,6 +121,16 @@ PLUMBLINE_FLAG_RANGE(sway, 0, 0.5);
 DEFINE_double(scan_rate, kDrive.scan_rate, "Scans a second.");
 PLUMBLINE_FLAG_RANGE(scan_rate, 1, 50);
 
+DEFINE_string(stress, "none",
+              "What happens to the log: turns or stale (scans of turns are "
+              "missing; odometry goes on, or catches up late), dead, scale or "
+              "jump (odometry), blind or people (scans), carried (150 scans "
+              "are missing and odometry does not know).");
+PLUMBLINE_FLAG_CHOICES(stress, "none", "turns", "stale", "dead", "scale",
+                       "jump", "blind", "people", "carried");
+DEFINE_int32(stress_count, 5, "How often, where there is room.");
+PLUMBLINE_FLAG_RANGE(stress_count, 1, 1000);
+
 namespace plumbline {
 namespace {
 
@@ -185,8 +196,8 @@ std::string Provenance() {
                      FLAGS_world.substr(FLAGS_world.rfind('/') + 1) +
                      " --seed=" + std::to_string(FLAGS_seed);
   for (const FlagValue& flag : ChangedFlags()) {
-    if (flag.type != "string" && flag.name != "seed" && flag.name != "quiet" &&
-        flag.name != "verbose") {
+    if ((flag.type != "string" || flag.name == "stress") &&
+        flag.name != "seed" && flag.name != "quiet" && flag.name != "verbose") {
       text += " --" + flag.name + "=" + flag.value;
     }
   }
@@ -253,8 +264,12 @@ int Run() {
     progress.Update(static_cast<std::int64_t>(1000 * share));
     return !InterruptRequested();
   };
-  const Simulation simulation = Simulate(world, options, FLAGS_seed);
+  Simulation simulation = Simulate(world, options, FLAGS_seed);
   progress.Finish();
+  if (FLAGS_stress != "none") {
+    Stress(FLAGS_stress, FLAGS_stress_count, FLAGS_seed,
+           options.laser.maximum_range, &simulation);
+  }
   Detail("%zu steps driven, writing %s", simulation.states.size(),
          FLAGS_output.c_str());
 
@@ -320,7 +335,8 @@ int main(int argc, char** argv) {
       {"Odometry",
        {"odometry_scale", "odometry_turn_scale", "odometry_heading_bias",
         "odometry_noise", "odometry_heading_noise", "odometry_turn_noise"}},
-      {"Drive", {"speed", "turn_rate", "sway", "scan_rate"}}};
+      {"Drive", {"speed", "turn_rate", "sway", "scan_rate"}},
+      {"Stress", {"stress", "stress_count"}}};
   plumbline::ParseFlags(info, argc, argv);
   return plumbline::RunMain(plumbline::Run);
 }

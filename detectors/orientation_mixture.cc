@@ -1,9 +1,12 @@
 #include <plumbline/core/error.h>
+#include <plumbline/detectors/direction_assignment.h>
+#include <plumbline/detectors/map_directions.h>
 #include <plumbline/detectors/orientation_mixture.h>
 #include <plumbline/detectors/parameters.h>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <set>
 #include <utility>
@@ -91,9 +94,8 @@ class CandidateList {
 
  private:
   void AddSample(double angle, double length) {
-    samples_.push_back({angle,
-                        options_.direction_noise / (length * std::sqrt(length)),
-                        length});
+    samples_.push_back(
+        {angle, OwnDirectionSigma(length, options_.direction_noise), length});
   }
 
   // Both directions; its walls are the evidence.
@@ -151,6 +153,133 @@ const std::string& OrientationMixture::name() const {
   return name;
 }
 
+namespace {
+
+// A live tie of a wall to an orientation.
+struct WallTie {
+  ConstraintId constraint = kNoId;
+  FeatureId orientation = kNoId;
+};
+
+WallTie TieOf(const Graph& graph, FeatureId wall) {
+  for (const ConstraintId id : graph.ConstraintsOf(wall)) {
+    const Constraint& constraint = graph.GetConstraint(id);
+    if (!IsLiveStructure(constraint)) continue;
+    for (const FeatureId other : constraint.features) {
+      if (graph.GetFeature(other).type->name == "orientation") {
+        return {id, other};
+      }
+    }
+  }
+  return {};
+}
+
+// Walls whose directions the measurements tie to each other, judged by their
+// innovation.
+class InnovationJudge {
+ public:
+  InnovationJudge(const Graph& graph, const DetectionScope& scope,
+                  const OrientationMixtureOptions& options)
+      : graph_(graph), scope_(scope), options_(options) {
+    const std::vector<FeatureId>* ids =
+        scope.level == 0 ? scope.features : scope.lower_features;
+    if (scope.features != nullptr && ids == nullptr) return;
+    MapDirections map = CollectDirections(graph, ids, options.links);
+    // Relations between walls that a front-end left neglect what their errors
+    // have in common, so that little innovations mean nothing.
+    if (!map.has_sightings) return;
+    network_ = std::move(map.network);
+    for (const auto& [id, node] : map.nodes) {
+      const Feature& feature = graph.GetFeature(id);
+      if (DirectionParameter(feature) < 0 || feature.level > scope.level ||
+          LengthOf(feature) < options.min_length) {
+        continue;
+      }
+      wall_of_[id] = walls_.size();
+      ids_.push_back(id);
+      walls_.push_back(
+          {node, LengthOf(feature),
+           OwnDirectionSigma(LengthOf(feature), options.direction_noise)});
+    }
+    has_links_.assign(walls_.size(), false);
+    for (std::size_t i = 0; i < walls_.size(); ++i) {
+      has_links_[i] = network_.HasLinks(walls_[i].node);
+    }
+  }
+
+  // True for a wall about which the measurements say something.
+  bool Judges(const Feature& feature) const {
+    const auto found = wall_of_.find(feature.id);
+    return found != wall_of_.end() && has_links_[found->second];
+  }
+
+  // Decides on all walls. `orientations` are those of the graph and then, with
+  // kNoId, new ones at `directions`.
+  DirectionAssignment Assign(const std::vector<FeatureId>& orientations,
+                             const std::vector<double>& directions) {
+    if (walls_.empty()) return {};
+    std::map<FeatureId, std::size_t> index;
+    std::vector<SharedDirection> given(orientations.size());
+    for (std::size_t k = 0; k < orientations.size(); ++k) {
+      given[k].angle = directions[k];
+      if (orientations[k] != kNoId) index[orientations[k]] = k;
+    }
+    ties_.resize(walls_.size());
+    for (std::size_t i = 0; i < walls_.size(); ++i) {
+      ties_[i] = TieOf(graph_, ids_[i]);
+      const auto known = index.find(ties_[i].orientation);
+      if (known == index.end()) continue;
+      std::vector<std::size_t>& tied = given[known->second].walls;
+      // With all of the map at hand everything is decided anew.
+      if (scope_.features != nullptr || tied.empty()) {
+        tied.push_back(i);
+      } else if (walls_[i].length > walls_[tied[0]].length) {
+        tied[0] = i;
+      }
+    }
+    for (std::size_t k = 0; k < orientations.size(); ++k) {
+      if (orientations[k] != kNoId) continue;
+      // A new one is founded on the longest wall that has it.
+      for (std::size_t i = 0; i < walls_.size(); ++i) {
+        if (ties_[i].orientation != kNoId || !has_links_[i]) continue;
+        const double angle =
+            graph_.GetFeature(ids_[i])
+                .parameters[DirectionParameter(graph_.GetFeature(ids_[i]))];
+        if (NearestAxial(directions, angle, 0.25 * options_.mixture.gate) !=
+            static_cast<int>(k)) {
+          continue;
+        }
+        std::vector<std::size_t>& tied = given[k].walls;
+        if (tied.empty()) {
+          tied.push_back(i);
+        } else if (walls_[i].length > walls_[tied[0]].length) {
+          tied[0] = i;
+        }
+      }
+    }
+    DirectionAssignmentOptions options = options_.assignment;
+    options.sigma = options_.sigma;
+    return AssignDirections(std::move(network_), walls_, std::move(given),
+                            options);
+  }
+
+  const std::vector<FeatureId>& ids() const { return ids_; }
+  const std::vector<WallTie>& ties() const { return ties_; }
+
+ private:
+  const Graph& graph_;
+  const DetectionScope& scope_;
+  const OrientationMixtureOptions& options_;
+  DirectionNetwork network_;
+  std::map<FeatureId, std::size_t> wall_of_;
+  std::vector<FeatureId> ids_;
+  std::vector<DirectionWall> walls_;
+  std::vector<bool> has_links_;
+  std::vector<WallTie> ties_;
+};
+
+}  // namespace
+
 Transaction OrientationMixture::Detect(const Graph& graph,
                                        const Registry& registry,
                                        const DetectionScope& scope) const {
@@ -182,37 +311,84 @@ Transaction OrientationMixture::Detect(const Graph& graph,
 
   const std::vector<AxialComponent> components =
       FindAxialComponents(list.samples(), directions, options_.mixture);
-  for (const AxialComponent& component : components) {
+  const auto tie = [&](const Feature& wall, FeatureId orientation,
+                       double expected) {
+    Constraint constraint;
+    constraint.type = &registry.GetRelation(wall.type->name + "_orientation");
+    constraint.features = {wall.id, orientation};
+    constraint.expected = Eigen::VectorXd::Constant(1, expected);
+    constraint.information = Eigen::MatrixXd::Constant(
+        1, 1, 1.0 / (options_.sigma * options_.sigma));
+    constraint.kind = ConstraintClass::kStructure;
+    constraint.source = kName;
+    transaction.AddConstraint(std::move(constraint));
+  };
+  const auto add_orientation = [&](double angle) {
     Feature orientation;
     orientation.type = &registry.GetFeature("orientation");
     orientation.level = scope.level + 1;
     orientation.is_virtual = true;
-    orientation.parameters[0] = component.mean;
+    orientation.parameters[0] = angle;
     orientation.source = kName;
-    orientations.push_back(transaction.AddFeature(std::move(orientation)));
+    return transaction.AddFeature(std::move(orientation));
+  };
+
+  InnovationJudge judge(graph, scope, options_);
+  std::vector<FeatureId> all = orientations;
+  for (const AxialComponent& component : components) {
+    all.push_back(kNoId);
     directions.push_back(component.mean);
+  }
+  DirectionAssignment assignment = judge.Assign(all, directions);
+  // A new direction of two views of one wall is none.
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (all[k] == kNoId) all[k] = add_orientation(directions[k]);
+  }
+  for (std::size_t k = all.size(); k < assignment.directions.size(); ++k) {
+    const SharedDirection& direction = assignment.directions[k];
+    all.push_back(static_cast<int>(direction.walls.size()) <
+                          std::max(2, options_.minimum_support)
+                      ? kNoId
+                      : add_orientation(direction.angle));
+  }
+  std::int64_t refused = 0;
+  std::int64_t moved = 0;
+  for (std::size_t i = 0; i < judge.ids().size(); ++i) {
+    const Feature& wall = graph.GetFeature(judge.ids()[i]);
+    if (!judge.Judges(wall)) continue;
+    const WallTie& old = judge.ties()[i];
+    const int k = assignment.direction_of[i];
+    const FeatureId orientation = k < 0 ? kNoId : all[k];
+    refused += orientation == kNoId;
+    if (old.orientation == kNoId) {
+      if (orientation != kNoId && !IsTied(graph, wall, scope.level)) {
+        tie(wall, orientation, 0.0);
+      }
+    } else if (orientation != old.orientation &&
+               (orientation != kNoId ||
+                assignment.innovations[i].chi_square >
+                    options_.assignment.breaking_gate)) {
+      transaction.BreakConstraint(old.constraint);
+      ++moved;
+      if (orientation != kNoId) tie(wall, orientation, 0.0);
+    }
   }
 
   std::int64_t far = 0;
   for (const Candidate& candidate : candidates) {
+    if (judge.Judges(*candidate.feature)) continue;
     const int nearest =
         NearestAxial(directions, candidate.angle, options_.mixture.gate);
     if (nearest < 0) {
       ++far;
       continue;
     }
-    Constraint constraint;
-    constraint.type =
-        &registry.GetRelation(candidate.feature->type->name + "_orientation");
-    constraint.features = {candidate.feature->id, orientations[nearest]};
-    constraint.expected = Eigen::VectorXd::Constant(1, candidate.expected);
-    constraint.information = Eigen::MatrixXd::Constant(
-        1, 1, 1.0 / (options_.sigma * options_.sigma));
-    constraint.kind = ConstraintClass::kStructure;
-    constraint.source = kName;
-    transaction.AddConstraint(std::move(constraint));
+    tie(*candidate.feature, all[nearest], candidate.expected);
   }
-  scope.Count("directions found", static_cast<std::int64_t>(components.size()));
+  scope.Count("directions found",
+              static_cast<std::int64_t>(transaction.added_features().size()));
+  scope.Count("walls refused: by their innovation", refused);
+  scope.Count("walls moved to another direction", moved);
   scope.Count("walls refused: no direction within the gate", far);
   return transaction;
 }
@@ -238,6 +414,11 @@ DetectorType OrientationMixtureType() {
       {"significance", defaults.mixture.significance},
       {"min_contrast", defaults.mixture.min_contrast},
       {"normality_significance", defaults.mixture.normality_significance},
+      {"innovation_gate", defaults.assignment.gate},
+      {"breaking_gate", defaults.assignment.breaking_gate},
+      {"split_gate", defaults.assignment.split_gate},
+      {"link_sigma_scale", defaults.links.sigma_scale},
+      {"link_sigma_floor_deg", RadToDeg(defaults.links.sigma_floor)},
   };
   type.make = [known = type.defaults](const DetectorParameters& given) {
     const ParameterReader reader(kName, known, given);
@@ -257,6 +438,12 @@ DetectorType OrientationMixtureType() {
     options.mixture.min_contrast = reader.Get("min_contrast", 1.0);
     options.mixture.normality_significance =
         reader.Get("normality_significance", 0.0, 1.0);
+    options.assignment.gate = reader.Get("innovation_gate", 0.0);
+    options.assignment.breaking_gate = reader.Get("breaking_gate", 0.0);
+    options.assignment.split_gate = reader.Get("split_gate", 0.0);
+    options.links.sigma_scale = reader.Get("link_sigma_scale", 1e-3);
+    options.links.sigma_floor =
+        DegToRad(reader.Get("link_sigma_floor_deg", 0.0, 90.0));
     return std::make_unique<OrientationMixture>(options);
   };
   return type;

@@ -4,6 +4,8 @@
 #include <plumbline/core/detector.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/detectors/axial.h>
+#include <plumbline/detectors/direction_assignment.h>
+#include <plumbline/detectors/map_directions.h>
 
 #include <string>
 
@@ -24,6 +26,10 @@ struct OrientationMixtureOptions {
   /// How directions are told from clutter. `gate` also decides which features
   /// join an orientation.
   AxialMixtureOptions mixture;
+  /// How walls whose directions the measurements tie to each other are
+  /// assigned (its sigma is the one above), and how far these are trusted.
+  DirectionAssignmentOptions assignment;
+  MapDirectionsOptions links;
 };
 
 /// Orientations of segments and lines (core/method.md, section 6): reads

@@ -1,10 +1,12 @@
 #include <plumbline/core/error.h>
 #include <plumbline/detectors/axial.h>
+#include <plumbline/detectors/map_directions.h>
 #include <plumbline/detectors/orientation_relation.h>
 #include <plumbline/detectors/parameters.h>
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <set>
 #include <utility>
@@ -68,6 +70,34 @@ Transaction OrientationRelation::Detect(const Graph& graph,
   std::int64_t pairs = 0;
   std::int64_t no_angle = 0;
   std::int64_t there = 0;
+  std::int64_t contradicted = 0;
+  // Where poses that saw the walls are in the graph, a relation is judged by
+  // its innovation: a small difference that is known well is one all the same.
+  MapDirections map;
+  if (scope.features == nullptr) {
+    map = CollectDirections(graph, nullptr, options_.links);
+    if (map.has_sightings) {
+      AddOrientations(graph, options_.direction_noise, &map);
+      map.network.Solve();
+    }
+  }
+  std::map<std::size_t, Eigen::VectorXd> columns;
+  const auto contradicts = [&](const Feature& first, const Feature& second,
+                               double angle, double sigma) {
+    if (!map.has_sightings) return false;
+    const auto a = map.nodes.find(first.id);
+    const auto b = map.nodes.find(second.id);
+    if (a == map.nodes.end() || b == map.nodes.end()) return false;
+    const double difference = NormalizeAxial(
+        map.network.Angle(b->second) - map.network.Angle(a->second) - angle);
+    Eigen::VectorXd& column = columns[b->second];
+    if (column.size() == 0) column = map.network.CovarianceColumn(b->second);
+    const double variance =
+        map.network.Variance(a->second) + map.network.Variance(b->second) -
+        2.0 * column[static_cast<Eigen::Index>(a->second)] + sigma * sigma;
+    return difference * difference > options_.innovation_gate * variance;
+  };
+
   Transaction transaction;
   for (std::size_t j = 1; j < orientations.size(); ++j) {
     const Feature& second = *orientations[j];
@@ -98,6 +128,11 @@ Transaction OrientationRelation::Detect(const Graph& graph,
         ++there;
         continue;
       }
+      if (contradicts(first, second, options_.angles[nearest],
+                      options_.angle_sigmas[nearest])) {
+        ++contradicted;
+        continue;
+      }
       Constraint constraint;
       constraint.type = &registry.GetRelation("orientation_orientation");
       constraint.features = {first.id, second.id};
@@ -116,6 +151,7 @@ Transaction OrientationRelation::Detect(const Graph& graph,
   scope.Count("orientation pairs", pairs);
   scope.Count("orientation pairs refused: at no allowed angle", no_angle);
   scope.Count("orientation pairs refused: related already", there);
+  scope.Count("orientation pairs refused: by their innovation", contradicted);
   return transaction;
 }
 
@@ -132,6 +168,8 @@ DetectorType OrientationRelationType() {
       {"sigma_deg", RadToDeg(defaults.sigma)},
       {"resolution_deg", 0.0},
       {"max_relations", static_cast<double>(defaults.max_relations)},
+      {"innovation_gate", defaults.innovation_gate},
+      {"link_sigma_scale", defaults.links.sigma_scale},
   };
   type.make = [known = type.defaults](const DetectorParameters& given) {
     const ParameterReader reader(kName, known, given,
@@ -140,6 +178,8 @@ DetectorType OrientationRelationType() {
     options.gate = DegToRad(reader.Get("gate_deg", 0.0, 45.0));
     options.sigma = DegToRad(reader.Get("sigma_deg", 1e-6, 90.0));
     options.max_relations = reader.GetInt("max_relations", 1);
+    options.innovation_gate = reader.Get("innovation_gate", 0.0);
+    options.links.sigma_scale = reader.Get("link_sigma_scale", 1e-3);
     std::vector<double> angles;
     std::vector<double> sigmas;
     for (const auto& [name, value] : reader.values()) {

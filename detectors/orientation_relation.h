@@ -3,6 +3,7 @@
 
 #include <plumbline/core/detector.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/detectors/map_directions.h>
 #include <plumbline/factors/angle.h>
 
 #include <string>
@@ -29,6 +30,13 @@ struct OrientationRelationOptions {
   /// An orientation is related to at most so many that stood before it. All
   /// pairs of few orientations are related; many get enough for redundancy.
   int max_relations = 4;
+  /// Largest chi-square (1 degree of freedom) of the innovation of a relation,
+  /// in a graph that has the poses that saw the walls; how far the links there
+  /// are trusted, and the direction of a wall of 1 m (rad), are as in
+  /// OrientationMixtureOptions.
+  double innovation_gate = 9.0;
+  MapDirectionsOptions links;
+  double direction_noise = DegToRad(0.7);
 };
 
 /// Relations between the "orientation" features of a level (core/method.md,

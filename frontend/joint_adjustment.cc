@@ -118,9 +118,12 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
   std::vector<FeatureId> provisional;
   const FeatureType& pose_type = registry_.GetFeature("pose");
   const RelationType& pose_pose = registry_.GetRelation("pose_pose");
+  const bool has_map = graph_->num_features() > 0;
   for (const Pose2& pose : poses) {
     Feature feature;
     feature.type = &pose_type;
+    // Without a map the frame is that of the first pose.
+    feature.fixed = !has_map && provisional.empty();
     feature.parameters = {pose[0], pose[1], pose[2]};
     feature.observations = 1;
     feature.source = kSource;
@@ -148,12 +151,33 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
     constraint.features =
         std::vector<FeatureId>{provisional[before], provisional[p]};
     constraint.expected = motion.mean;
+    places_[p].since_previous = motion.mean;
     const Eigen::Matrix3d information = motion.covariance.inverse();
     constraint.information = 0.5 * (information + information.transpose());
     constraint.source = kSource;
     transaction.AddConstraint(std::move(constraint));
   }
+  const TransactionResult places = graph_->Apply(std::move(transaction));
+  poses_ = places.features;
   // What stood for the poses goes, where the returns speak themselves.
+  Transaction change;
+  const std::map<FeatureId, std::size_t> places_of = HoldAlong(poses, &change);
+  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
+    if (constraint->kind != ConstraintClass::kMeasurement) continue;
+    bool goes = true;
+    for (const FeatureId id : constraint->features) {
+      goes = goes && (id == robot || places_of.count(id) > 0);
+    }
+    for (const FeatureId id : constraint->features) goes = goes || id == robot;
+    if (goes) change.RemoveConstraint(constraint->id);
+  }
+  if (robot != kNoId) change.RemoveFeature(robot);
+  graph_->Apply(std::move(change));
+  Match();
+}
+
+std::map<FeatureId, std::size_t> JointAdjustment::HoldAlong(
+    const std::vector<Pose2>& poses, Transaction* change) const {
   std::map<FeatureId, std::pair<int, std::size_t>> most_votes;
   const std::vector<std::vector<WallVote>> votes =
       CollectWallVotes(*graph_, places_, poses, options_.votes);
@@ -166,33 +190,39 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
       }
     }
   }
-  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
-    if (constraint->kind != ConstraintClass::kMeasurement) continue;
-    bool goes = true;
-    for (const FeatureId id : constraint->features) {
-      goes = goes && (id == robot || most_votes.count(id) > 0);
-    }
-    for (const FeatureId id : constraint->features) goes = goes || id == robot;
-    if (goes) transaction.RemoveConstraint(constraint->id);
-  }
-  if (robot != kNoId) transaction.RemoveFeature(robot);
   // Votes say nothing about a wall's place along itself, which is arbitrary:
   // one pose each holds it where it is.
-  for (const auto& entry : most_votes) {
-    const std::size_t k = entry.second.second;
+  std::map<FeatureId, std::size_t> places_of;
+  for (const auto& [wall, most] : most_votes) {
+    const std::size_t k = most.second;
+    places_of.emplace(wall, k);
     Constraint constraint;
-    constraint.type = &pose_pose;
-    constraint.features = std::vector<FeatureId>{entry.first, provisional[k]};
-    constraint.expected =
-        Between(PoseOf(graph_->GetFeature(entry.first)), poses[k]);
+    constraint.type = &registry_.GetRelation("pose_pose");
+    constraint.features = std::vector<FeatureId>{wall, poses_[k]};
+    constraint.expected = Between(PoseOf(graph_->GetFeature(wall)), poses[k]);
     constraint.information =
         Eigen::Vector3d(1.0 / (kAlongSigma * kAlongSigma), 0.0, 0.0)
             .asDiagonal();
     constraint.source = kSource;
-    transaction.AddConstraint(std::move(constraint));
+    change->AddConstraint(std::move(constraint));
   }
-  const TransactionResult result = graph_->Apply(std::move(transaction));
-  poses_ = result.features;
+  return places_of;
+}
+
+void JointAdjustment::AddWalls(Transaction walls) {
+  const std::vector<FeatureId> added = graph_->Apply(std::move(walls)).features;
+  Transaction change;
+  const std::map<FeatureId, std::size_t> places_of =
+      HoldAlong(PlacePoses(), &change);
+  // A wall that no return votes for is held by nothing.
+  for (const FeatureId id : added) {
+    if (places_of.count(id) == 0) change.RemoveFeature(id);
+  }
+  graph_->Apply(std::move(change));
+}
+
+void JointAdjustment::MatchAnew() {
+  finder_->TrustPoses();
   Match();
 }
 

@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -51,6 +52,9 @@ struct JointAdjustmentOptions {
 /// so the relations between walls that stood for the marginalized poses go;
 /// walls that no return votes for keep theirs. Structure stays as it is, live
 /// or broken, and can go on being found and broken on the graph.
+///
+/// On an empty graph only the poses are adjusted, free of what the front-end
+/// took for walls; AddWalls then brings those that the returns show from there.
 class JointAdjustment {
  public:
   /// Puts places into the graph, where `key_poses` say (map frame, one per
@@ -63,6 +67,16 @@ class JointAdjustment {
                   const std::vector<KeyScanRecord>& records,
                   const std::vector<Pose2>& key_poses, FeatureId robot,
                   const JointAdjustmentOptions& options);
+
+  /// Matches all scans anew at the poses as they are now: once they are
+  /// adjusted they are better than the odometry that placed the scans of one
+  /// submap until then.
+  void MatchAnew();
+
+  /// Adds walls (segments of level 0 without constraints, as they lie among the
+  /// poses at present), each bound to the poses by the votes of its returns;
+  /// walls that get none are left out. The graph must not have had walls.
+  void AddWalls(Transaction walls);
 
   /// Takes votes and weights anew at the present state and solves, `rounds`
   /// times, then matches what has come near and starts again, until the poses
@@ -84,6 +98,10 @@ class JointAdjustment {
 
  private:
   std::vector<Pose2> PlacePoses() const;
+  // Binds every wall that gets votes to the place that gave it most; returns
+  // these places by wall.
+  std::map<FeatureId, std::size_t> HoldAlong(const std::vector<Pose2>& poses,
+                                             Transaction* change) const;
   void Match();
   void Vote();
   void Reweigh();

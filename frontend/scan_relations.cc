@@ -17,13 +17,37 @@ struct Submap {
   int middle() const { return (begin + end) / 2; }
 };
 
+// Poses of a submap's places in the frame of its middle, by refined odometry.
+std::vector<Pose2> ByOdometry(const Submap& submap,
+                              const std::vector<Place>& places) {
+  std::vector<Pose2> poses(submap.end - submap.begin, Pose2::Zero());
+  for (int k = submap.middle() + 1; k < submap.end; ++k) {
+    poses[k - submap.begin] =
+        Compose(poses[k - 1 - submap.begin], places[k].since_previous);
+  }
+  for (int k = submap.middle() - 1; k >= submap.begin; --k) {
+    poses[k - submap.begin] = Compose(poses[k + 1 - submap.begin],
+                                      Inverse(places[k + 1].since_previous));
+  }
+  return poses;
+}
+
+// The same by poses of the map.
+std::vector<Pose2> ByMap(const Submap& submap,
+                         const std::vector<Pose2>& map_poses) {
+  std::vector<Pose2> poses;
+  for (int k = submap.begin; k < submap.end; ++k) {
+    poses.push_back(Between(map_poses[submap.middle()], map_poses[k]));
+  }
+  return poses;
+}
+
 std::vector<ScanPoint> Reference(const Submap& submap,
                                  const std::vector<Place>& places,
                                  const std::vector<Pose2>& poses) {
   std::vector<ScanPoint> reference;
   for (int k = submap.begin; k < submap.end; ++k) {
-    const Pose2 pose = Between(poses[submap.middle()], poses[k]);
-    const PoseTransform transform(pose);
+    const PoseTransform transform(poses[k - submap.begin]);
     for (const ScanPoint& point : places[k].reference) {
       reference.push_back(Moved(point, transform));
     }
@@ -84,6 +108,11 @@ ScanMatchFinder::ScanMatchFinder(const std::vector<Place>& places,
                    options.submap_size);
 }
 
+void ScanMatchFinder::TrustPoses() {
+  trusts_poses_ = true;
+  for (std::map<int, Attempt>& attempts : attempts_) attempts.clear();
+}
+
 std::vector<ScanRelation> ScanMatchFinder::Find(
     const std::vector<Pose2>& poses) {
   if (places_.size() != poses.size()) {
@@ -124,7 +153,10 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
         }
       }
       if (!has_reference) {
-        matcher.SetReference(Reference(submaps[i], places_, poses));
+        matcher.SetReference(Reference(submaps[i], places_,
+                                       trusts_poses_
+                                           ? ByMap(submaps[i], poses)
+                                           : ByOdometry(submaps[i], places_)));
         has_reference = true;
       }
       ++tried[i];

@@ -48,6 +48,9 @@ struct Place {
   /// the frame of the place, and how many scans they are from.
   std::vector<ScanPoint> returns;
   int num_scans = 1;
+  /// Pose in the frame of the place before, by refined odometry; not used for
+  /// the first place.
+  Pose2 since_previous = Pose2::Zero();
 };
 
 /// What the scans of two places that need not follow each other say about their
@@ -78,6 +81,13 @@ class ScanMatchFinder {
   /// of submaps, then of places. Cost: linear in the places.
   std::vector<ScanRelation> Find(const std::vector<Pose2>& poses);
 
+  /// Forgets what was matched, and takes the places of a submap from now on
+  /// where the poses given to Find have them: for poses that are adjusted.
+  /// Until then they lie as refined odometry has them: over these few metres it
+  /// is better than a map that is still to be adjusted, and what is matched
+  /// with a bent submap keeps it bent.
+  void TrustPoses();
+
   /// Pairs that the last call matched or tried to.
   std::int64_t num_tried() const { return num_tried_; }
 
@@ -92,6 +102,7 @@ class ScanMatchFinder {
 
   const std::vector<Place>& places_;
   ScanRelationOptions options_;
+  bool trusts_poses_ = false;
   // By submap and place.
   std::vector<std::map<int, Attempt>> attempts_;
   std::int64_t num_tried_ = 0;

@@ -141,6 +141,30 @@ struct Fit {
   }
 };
 
+// Sums of a least squares line through samples along and across a wall, m.
+struct LineSums {
+  double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
+
+  void Add(double along, double across) {
+    n += 1.0;
+    x += along;
+    y += across;
+    xx += along * along;
+    xy += along * across;
+    yy += across * across;
+  }
+  LineSums operator-(const LineSums& o) const {
+    return {n - o.n, x - o.x, y - o.y, xx - o.xx, xy - o.xy, yy - o.yy};
+  }
+  // Sum of squares of the way along around its mean, m^2.
+  double Spread() const { return std::max(xx - x * x / n, 1e-12); }
+  double Slope() const { return (xy - x * y / n) / Spread(); }
+  double SquaredError() const {
+    const double cross = xy - x * y / n;
+    return std::max(yy - y * y / n - cross * cross / Spread(), 0.0);
+  }
+};
+
 class Completion {
  public:
   Completion(const Graph& graph, const Registry& registry,
@@ -331,21 +355,27 @@ class Completion {
     if (members.size() < 6) return;
 
     // Once more with what lies on the line that was found.
-    Fit final_fit;
     int returns = 0;
     std::vector<int> on;
     for (int index : members) {
       const Eigen::Vector2d d = cells_[index].mean - origin - mean;
-      if (std::abs(direction.x() * d.y() - direction.y() * d.x()) >
+      if (std::abs(direction.x() * d.y() - direction.y() * d.x()) <=
           reach_across) {
-        continue;
+        on.push_back(index);
       }
-      final_fit.Add(cells_[index].mean - origin, cells_[index].returns);
-      returns += cells_[index].returns;
-      on.push_back(index);
     }
-    if (on.size() < 6 || returns < options_.min_returns) return;
-    final_fit.Solve(&mean, &direction, &across, &along);
+    for (;;) {
+      if (on.size() < 6) return;
+      Fit final_fit;
+      returns = 0;
+      for (int index : on) {
+        final_fit.Add(cells_[index].mean - origin, cells_[index].returns);
+        returns += cells_[index].returns;
+      }
+      if (returns < options_.min_returns) return;
+      final_fit.Solve(&mean, &direction, &across, &along);
+      if (!CutAtKink(origin + mean, direction, &on)) break;
+    }
     if (across > scatter_ * scatter_) return;
     std::vector<double> places;
     Eigen::Vector2d view = Eigen::Vector2d::Zero();
@@ -394,6 +424,65 @@ class Completion {
         length, static_cast<int>(num_scans));
   }
 
+  // Leaves the longer one of two pieces when two lines explain the cells far
+  // better than one does; false when one will do.
+  bool CutAtKink(const Eigen::Vector2d& point, const Eigen::Vector2d& direction,
+                 std::vector<int>* on) const {
+    struct Sample {
+      double along, across;
+      int index;
+    };
+    std::vector<Sample> samples;
+    samples.reserve(on->size());
+    for (const int index : *on) {
+      const Eigen::Vector2d d = cells_[index].mean - point;
+      samples.push_back({direction.dot(d),
+                         direction.x() * d.y() - direction.y() * d.x(), index});
+    }
+    std::sort(
+        samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
+          return a.along != b.along ? a.along < b.along : a.index < b.index;
+        });
+    LineSums all;
+    for (const Sample& sample : samples) all.Add(sample.along, sample.across);
+    const std::size_t n = samples.size();
+    LineSums left;
+    double best = all.SquaredError();
+    std::size_t cut = 0;
+    LineSums best_left, best_right;
+    for (std::size_t k = 1; k < n; ++k) {
+      left.Add(samples[k - 1].along, samples[k - 1].across);
+      if (samples[k - 1].along - samples[0].along < options_.min_length ||
+          samples[n - 1].along - samples[k].along < options_.min_length) {
+        continue;
+      }
+      const LineSums right = all - left;
+      const double error = left.SquaredError() + right.SquaredError();
+      if (error < best) {
+        best = error;
+        cut = k;
+        best_left = left;
+        best_right = right;
+      }
+    }
+    if (cut == 0 || n < 12) return false;
+    const double turn = std::abs(best_left.Slope() - best_right.Slope());
+    const double sigma =
+        std::sqrt(best / static_cast<double>(n - 4) *
+                  (1.0 / best_left.Spread() + 1.0 / best_right.Spread()));
+    if (turn < options_.min_kink || turn < options_.kink_sigmas * sigma) {
+      return false;
+    }
+    const bool keeps_left = samples[cut - 1].along - samples[0].along >=
+                            samples[n - 1].along - samples[cut].along;
+    on->clear();
+    for (std::size_t k = keeps_left ? 0 : cut; k < (keeps_left ? cut : n);
+         ++k) {
+      on->push_back(samples[k].index);
+    }
+    return true;
+  }
+
   // What the new wall explains is no other wall.
   void UseUp(const Eigen::Vector2d& point, const Eigen::Vector2d& direction,
              double begin, double end) {
@@ -421,7 +510,6 @@ class Completion {
       const IndexedWall& wall = index_.walls()[k];
       nearest.emplace_back((wall.Middle() - pose.head<2>()).norm(), &wall);
     }
-    if (nearest.empty()) return;
     const std::size_t links =
         std::min<std::size_t>(nearest.size(), options_.links);
     std::partial_sort(nearest.begin(), nearest.begin() + links, nearest.end(),

@@ -30,6 +30,11 @@ struct WallCompletionOptions {
   /// direction off the wall's, rad.
   double max_scatter = 0.015;
   double max_turn = DegToRad(15.0);
+  /// Where a wall turns by at least so much (rad) at one place, and by so many
+  /// standard deviations of that turn, it is two walls: corridors that meet at
+  /// a small angle.
+  double min_kink = DegToRad(0.5);
+  double kink_sigmas = 6.0;
   /// Its ends swing by no more across it, as its direction is that uncertain
   /// (standard deviation over the whole length, m).
   double max_end_sigma = 0.0065;

@@ -15,6 +15,12 @@ constexpr char kSameWallDetector[] = "same_wall";
 // more than this.
 constexpr std::size_t kSmallMapGrowth = 10;
 
+void AddSameWall(HierarchySpec* hierarchy) {
+  if (!hierarchy->Contains(kSameWallDetector)) {
+    hierarchy->Add(0, kSameWallDetector);
+  }
+}
+
 }  // namespace
 
 KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
@@ -205,9 +211,8 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
 
   LogSolverResult& result = context.result;
   result.detect_seconds =
-      before_closing_.detect_seconds + em_->totals().detect_seconds;
-  result.solve_seconds =
-      before_closing_.solve_seconds + em_->totals().solve_seconds;
+      em_before_.detect_seconds + em_->totals().detect_seconds;
+  result.solve_seconds = em_before_.solve_seconds + em_->totals().solve_seconds;
   result.frontend_seconds = frontend_seconds_;
   result.scan_seconds = std::move(scan_seconds_);
   result.key_scans = static_cast<std::int64_t>(builder_->records().size());
@@ -258,7 +263,7 @@ void LogSolver::FindScansAgain(Context* context) {
 }
 
 void LogSolver::CompleteWalls(Context* context) {
-  if (!options_.complete_walls || options_.refine == Refinement::kNone ||
+  if (!options_.complete_walls || options_.refine != Refinement::kMap ||
       context->IsStopped()) {
     return;
   }
@@ -280,20 +285,53 @@ void LogSolver::CompleteWalls(Context* context) {
 
 void LogSolver::AdjustJointly(Context* context) {
   if (options_.refine != Refinement::kFull || context->IsStopped()) return;
-  context->Begin("joint adjustment of poses and walls");
   LogSolverResult& result = context->result;
   const ScopedTimer timer(&result.adjustment_seconds);
+  context->Begin("adjustment of poses");
+  ClearGraph();
   JointAdjustment adjustment(&graph_, session_.get(), registry_, context->scans,
                              refined_, builder_->records(), context->keys,
-                             builder_->robot_id(), options_.adjustment);
+                             kNoId, options_.adjustment);
   adjustment.Adjust(context->control.stop);
+  adjustment.MatchAnew();
+  adjustment.Adjust(context->control.stop);
+  const auto take_trajectory = [&] {
+    result.trajectory =
+        InterpolateScans(refined_, builder_->records(), adjustment.KeyPoses());
+  };
+  take_trajectory();
+  context->Begin("walls from adjusted poses");
+  {
+    const ScopedTimer completion(&result.completion_seconds);
+    adjustment.AddWalls(FindGlimpsedWalls(graph_, registry_, context->scans,
+                                          result.trajectory,
+                                          options_.completion));
+  }
+  context->Begin("joint adjustment of poses and walls");
+  adjustment.Adjust(context->control.stop);
+  HierarchySpec hierarchy = HierarchyOfOptions();
+  if (options_.global_association) AddSameWall(&hierarchy);
+  EmOptions options = options_.em;
+  options.break_share = options_.closing_break_share;
+  ReplaceEm(options_.structure ? MakeDetectors(hierarchy) : Hierarchy(),
+            options);
   RunEm(context);
   context->IsStopped();
   result.final_cost = session_->Cost();
-  result.trajectory =
-      InterpolateScans(refined_, builder_->records(), adjustment.KeyPoses());
+  take_trajectory();
   result.scan_relations = adjustment.num_relations();
   result.wall_votes = adjustment.num_votes();
+}
+
+void LogSolver::ClearGraph() {
+  Transaction clear;
+  for (const Constraint* constraint : std::as_const(graph_).Constraints()) {
+    clear.RemoveConstraint(constraint->id);
+  }
+  for (const Feature* feature : std::as_const(graph_).Features()) {
+    clear.RemoveFeature(feature->id);
+  }
+  graph_.Apply(std::move(clear));
 }
 
 void LogSolver::BeginClosing() {
@@ -311,19 +349,24 @@ void LogSolver::BeginClosing() {
   }
   EmOptions options = options_.em;
   options.break_share = options_.closing_break_share;
-  before_closing_ = em_->totals();
   HierarchySpec hierarchy = HierarchyOfOptions();
-  if (!hierarchy.Contains(kSameWallDetector)) {
-    hierarchy.Add(0, kSameWallDetector);
-  }
+  AddSameWall(&hierarchy);
+  ReplaceEm(MakeDetectors(hierarchy), options);
+}
+
+void LogSolver::ReplaceEm(Hierarchy detectors, const EmOptions& options) {
+  const EmReport& totals = em_->totals();
+  em_before_.iterations += totals.iterations;
+  em_before_.detect_seconds += totals.detect_seconds;
+  em_before_.solve_seconds += totals.solve_seconds;
   em_ = std::make_unique<EmOrchestrator>(&graph_, session_.get(), registry_,
-                                         MakeDetectors(hierarchy), options);
+                                         std::move(detectors), options);
   TraceEm();
 }
 
 void LogSolver::TraceEm() {
   em_->SetTrace([this](EmPhase phase) {
-    phase.iteration += before_closing_.iterations;
+    phase.iteration += em_before_.iterations;
     trace_.push_back(std::move(phase));
   });
 }

@@ -186,7 +186,11 @@ class LogSolver {
   void RunEm(Context* context);
   // Loosens the relations between features and lets closures be proposed.
   void BeginClosing();
-  // Rows of the trace, counted on over both orchestrators.
+  void ReplaceEm(Hierarchy detectors, const EmOptions& options);
+  // Takes everything out of the graph: what the front-end made of the scans has
+  // served to place the poses.
+  void ClearGraph();
+  // Rows of the trace, counted on over all orchestrators.
   void TraceEm();
   HierarchySpec HierarchyOfOptions() const;
   Hierarchy MakeDetectors(const HierarchySpec& spec) const;
@@ -211,8 +215,8 @@ class LogSolver {
   int scans_since_em_ = 0;
   std::size_t features_at_last_global_ = 0;
   bool is_finished_ = false;
-  // Of the orchestrator that was there before closing began.
-  EmReport before_closing_;
+  // Sums over the orchestrators that were there before.
+  EmReport em_before_;
   std::vector<EmPhase> trace_;
 };
 

@@ -1,0 +1,109 @@
+#ifndef PLUMBLINE_DETECTORS_DIRECTION_ASSIGNMENT_H_
+#define PLUMBLINE_DETECTORS_DIRECTION_ASSIGNMENT_H_
+
+#include <plumbline/detectors/direction_network.h>
+#include <plumbline/factors/angle.h>
+
+#include <cstddef>
+#include <vector>
+
+namespace plumbline {
+
+/// How sure an assignment of walls to directions has to be. Angles in rad.
+struct DirectionAssignmentOptions {
+  /// Tolerance of a wall against its direction, and of two directions that are
+  /// parallel or at a right angle against each other.
+  double sigma = DegToRad(0.1);
+  double relation_sigma = DegToRad(0.1);
+  /// Largest chi-square (1 degree of freedom) of an innovation that is
+  /// accepted.
+  double gate = 9.0;
+  /// A direction is left when its innovation is beyond this.
+  double breaking_gate = 16.0;
+  /// Two directions are two only when the chi-square of their difference (1
+  /// degree of freedom) is at least this: the price of a further direction.
+  double split_gate = 16.0;
+  /// Log-likelihood by which the best direction has to beat the next one; walls
+  /// between them wait.
+  double margin = 2.3;
+  /// Nor are directions two when they differ by less than this.
+  double min_separation = DegToRad(0.4);
+  /// Walls that are less well known relative to a direction wait.
+  double max_uncertainty = DegToRad(12.0);
+  /// Fewest walls, and sum of their lengths (m), that make a new direction.
+  int min_support = 3;
+  double min_support_length = 5.0;
+  /// Shortest wall that a new direction may be founded on, m.
+  double min_founder_length = 1.0;
+};
+
+/// A wall that may be tied to a direction.
+struct DirectionWall {
+  /// In the network.
+  std::size_t node = 0;
+  /// Of the visible part, m.
+  double length = 0.0;
+  /// How far the visible part's direction may be off the wall's, rad: panels,
+  /// frames, and what else is wrong in every look.
+  double own_sigma = 0.0;
+};
+
+/// A direction that walls share.
+struct SharedDirection {
+  /// In: the walls that are tied to it whatever the rest says, at least one
+  /// unless `angle` is all that is known of it. Out: all its walls. Indices of
+  /// walls.
+  std::vector<std::size_t> walls;
+  /// rad; in: initial value, out: estimate.
+  double angle = 0.0;
+};
+
+/// Innovation of a wall against a direction.
+struct DirectionInnovation {
+  /// Estimated difference (rad, axial) without the tie, its predicted variance
+  /// with the tolerance in it (rad^2), and chi-square.
+  double difference = 0.0;
+  double variance = 0.0;
+  double chi_square = 0.0;
+};
+
+/// What became of the walls.
+struct DirectionAssignment {
+  /// The given directions in their order, then new ones.
+  std::vector<SharedDirection> directions;
+  /// For each wall the direction that it is tied to, -1 for none.
+  std::vector<int> direction_of;
+  /// For each wall the innovation against the direction that it was compared
+  /// with last: the one that it is tied to, or else the nearest.
+  std::vector<DirectionInnovation> innovations;
+};
+
+/// Assigns walls to directions in the order of certainty (method.md, section
+/// 9). A tie "this wall has that direction" is judged by its innovation, the
+/// difference that the network without the tie predicts, against the predicted
+/// variance: the chi-square is what the tie would add to the cost of the whole
+/// network, while the residual that a tight tolerance leaves after a solve says
+/// nothing.
+///
+/// Of all ties whose innovation is within the gate and whose direction wins
+/// clearly over the others (a quarter turn off the others included), those with
+/// the smallest variance enter the network first; then everything is estimated
+/// again with them. Directions that are parallel or at a right angle to each
+/// other within the gate are tied in the same way. When nothing more fits, a
+/// new direction is founded on walls that contradict all there are and agree
+/// with each other; it stands when, with all that was tied, it differs from
+/// every other one by split_gate. In the end a direction is split where two
+/// explain its walls better: walls that each lie within their own gate can
+/// contradict it together (score test of a further parameter, the turn of one
+/// part of the walls against the other). Walls that could be of several, or of
+/// which too little is known, are left.
+///
+/// `network` holds the measurements; directions and ties are added to a copy.
+DirectionAssignment AssignDirections(DirectionNetwork network,
+                                     const std::vector<DirectionWall>& walls,
+                                     std::vector<SharedDirection> directions,
+                                     const DirectionAssignmentOptions& options);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_DETECTORS_DIRECTION_ASSIGNMENT_H_

@@ -1,0 +1,201 @@
+#include <plumbline/core/registry.h>
+#include <plumbline/core/session.h>
+#include <plumbline/detectors/map_directions.h>
+#include <plumbline/factors/information.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+
+namespace plumbline {
+namespace {
+
+// Index of the direction among the parameters of a planar pose (x, y, theta).
+constexpr int kDirection = 2;
+// Eigenvalues of the information of the position below this share of the
+// largest one are rounding.
+constexpr double kRounding = 1e-9;
+
+// Groups of links: relative poses, and what a pose sees of a wall.
+constexpr int kRelative = 0;
+constexpr int kSighted = 1;
+constexpr int kPasses = 3;
+
+bool HasDirection(const Feature& feature) {
+  return feature.type->name == "segment" || feature.type->name == "pose";
+}
+
+// Information of the direction (third row) when the first two are open.
+double WithoutPosition(const Eigen::Matrix3d& information) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> position(
+      Eigen::Matrix2d(information.topLeftCorner<2, 2>()));
+  const Eigen::Vector2d cross = information.block<2, 1>(0, kDirection);
+  double schur = information(kDirection, kDirection);
+  for (int i = 0; i < 2; ++i) {
+    const double value = position.eigenvalues()[i];
+    if (value <= kRounding * position.eigenvalues()[1]) continue;
+    const double along = position.eigenvectors().col(i).dot(cross);
+    schur -= along * along / value;
+  }
+  return schur <= kRounding * information(kDirection, kDirection) ? 0.0 : schur;
+}
+
+struct Difference {
+  // rad: what the constraint wants of second minus first, and how much.
+  double angle = 0.0;
+  double information = 0.0;
+};
+
+Difference DirectionOf(const Constraint& constraint, const Feature& first,
+                       const Feature& second) {
+  using RowMajor =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Difference difference;
+  if (constraint.type->sighting == Sighting::kPose) {
+    // The expected value is the relative pose.
+    difference.angle = constraint.expected[kDirection];
+    difference.information = WithoutPosition(constraint.information);
+    return difference;
+  }
+  RelationArguments arguments;
+  arguments.expected = constraint.expected;
+  arguments.sqrt_information = SqrtInformation(constraint.information);
+  arguments.features = {&first, &second};
+  const auto cost = constraint.type->make_cost(arguments);
+  const double* parameters[] = {first.data(), second.data()};
+  Eigen::VectorXd residual(constraint.type->residual_size);
+  RowMajor jacobian(constraint.type->residual_size, second.type->size);
+  double* jacobians[] = {nullptr, jacobian.data()};
+  if (!cost->Evaluate(parameters, residual.data(), jacobians) ||
+      !residual.allFinite() || !jacobian.allFinite()) {
+    return difference;
+  }
+  const Eigen::Matrix3d information = jacobian.transpose() * jacobian;
+  const Eigen::Vector3d gradient = jacobian.transpose() * residual;
+  // Out of the two rows of the position only what is known is eliminated.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> position(
+      Eigen::Matrix2d(information.topLeftCorner<2, 2>()));
+  const Eigen::Vector2d cross = information.block<2, 1>(0, kDirection);
+  double schur = information(kDirection, kDirection);
+  double pull = gradient[kDirection];
+  for (int i = 0; i < 2; ++i) {
+    const double value = position.eigenvalues()[i];
+    if (value <= kRounding * position.eigenvalues()[1]) continue;
+    const Eigen::Vector2d axis = position.eigenvectors().col(i);
+    const double share = axis.dot(cross) / value;
+    schur -= share * axis.dot(cross);
+    pull -= share * axis.dot(gradient.head<2>());
+  }
+  if (schur <= kRounding * information(kDirection, kDirection)) {
+    return difference;
+  }
+  difference.angle = second.parameters[kDirection] -
+                     first.parameters[kDirection] - pull / schur;
+  difference.information = schur;
+  return difference;
+}
+
+}  // namespace
+
+MapDirections CollectDirections(const Graph& graph,
+                                const std::vector<FeatureId>* scope,
+                                const MapDirectionsOptions& options) {
+  MapDirections result;
+  std::vector<const Feature*> features;
+  if (scope == nullptr) {
+    features = graph.Features();
+  } else {
+    for (const FeatureId id : *scope) {
+      const Feature* feature = graph.FindFeature(id);
+      if (feature != nullptr) features.push_back(feature);
+    }
+  }
+  for (const Feature* feature : features) {
+    if (HasDirection(*feature)) {
+      result.nodes.emplace(
+          feature->id, result.network.AddNode(feature->parameters[kDirection]));
+    }
+  }
+  for (const auto& [id, node] : result.nodes) {
+    for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
+      const Constraint& constraint = graph.GetConstraint(constraint_id);
+      if (constraint.state != ConstraintState::kLive ||
+          constraint.features.size() != 2 || constraint.features[0] != id) {
+        continue;
+      }
+      const auto second = result.nodes.find(constraint.features[1]);
+      if (second == result.nodes.end() || second->second == node) continue;
+      Difference difference = DirectionOf(constraint, graph.GetFeature(id),
+                                          graph.GetFeature(second->first));
+      if (constraint.kind == ConstraintClass::kStructure) {
+        difference.information *= std::max(constraint.delta, kDeltaFloor);
+      }
+      if (difference.information <= 0.0) continue;
+      const double variance = 1.0 / difference.information;
+      if (!(variance < DirectionNetwork::kUnknownVariance)) continue;
+      const bool is_sighting = constraint.type->sighting != Sighting::kPose &&
+                               constraint.kind == ConstraintClass::kMeasurement;
+      result.has_sightings = result.has_sightings || is_sighting;
+      result.network.AddLink(node, second->second, difference.angle, variance,
+                             false, is_sighting ? kSighted : kRelative);
+    }
+  }
+  if (!result.has_sightings) return result;
+  // Variances as the residuals show them to be. Relations between features were
+  // made of common observations, so that they agree better than they are right.
+  double factors[2] = {1.0, 1.0};
+  for (int pass = 0; pass < kPasses; ++pass) {
+    result.network.Solve();
+    for (const int group : {kRelative, kSighted}) {
+      double factor = result.network.VarianceFactor(group);
+      if (group == kRelative) factor = std::max(factor, 1.0 / factors[group]);
+      factors[group] *= factor;
+      result.network.ScaleVariances(group, factor, 0.0);
+    }
+  }
+  for (const int group : {kRelative, kSighted}) {
+    const double scale = options.sigma_scale * options.sigma_scale;
+    result.network.ScaleVariances(
+        group, scale, scale * options.sigma_floor * options.sigma_floor);
+  }
+  return result;
+}
+
+double OwnDirectionSigma(double length, double sigma_of_one_metre) {
+  return sigma_of_one_metre / (length * std::sqrt(length));
+}
+
+void AddOrientations(const Graph& graph, double sigma_of_one_metre,
+                     MapDirections* map) {
+  const std::map<FeatureId, std::size_t> walls = map->nodes;
+  for (const auto& [id, node] : walls) {
+    const Feature& wall = graph.GetFeature(id);
+    for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
+      const Constraint& constraint = graph.GetConstraint(constraint_id);
+      if (constraint.state != ConstraintState::kLive ||
+          constraint.type->name != "segment_orientation") {
+        continue;
+      }
+      const FeatureId orientation = constraint.features[1];
+      auto found = map->nodes.find(orientation);
+      if (found == map->nodes.end()) {
+        found = map->nodes
+                    .emplace(orientation,
+                             map->network.AddNode(
+                                 graph.GetFeature(orientation).parameters[0]))
+                    .first;
+      }
+      const double own =
+          OwnDirectionSigma(std::max(wall.extent_end - wall.extent_begin, 0.1),
+                            sigma_of_one_metre);
+      map->network.AddLink(node, found->second, constraint.expected[0],
+                           1.0 / constraint.information(0, 0) + own * own,
+                           true);
+    }
+  }
+}
+
+}  // namespace plumbline

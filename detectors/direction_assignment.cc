@@ -19,6 +19,18 @@ constexpr int kMaxRounds = 200;
 // Places at which the walls of a direction are cut in two for a trial.
 constexpr std::size_t kMaxCuts = 60;
 
+// P(X >= count) of a Poisson variable.
+double PoissonTail(int count, double mean) {
+  double term = std::exp(-mean);
+  double below = 0.0;
+  for (int k = 0; k < count; ++k) {
+    below += term;
+    term *= mean / (k + 1);
+  }
+  // The sum below loses all digits of a small tail: its first term bounds it.
+  return std::max(1.0 - below, term);
+}
+
 class Assigner {
  public:
   Assigner(DirectionNetwork network, const std::vector<DirectionWall>& walls,
@@ -147,7 +159,12 @@ class Assigner {
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
       if (IsUsed(k)) columns[k] = network_.CovarianceColumn(nodes_[k]);
     }
-    is_rejected_.assign(walls_.size(), false);
+    bool has_direction = false;
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+      has_direction = has_direction || IsUsed(k);
+    }
+    is_rejected_.assign(walls_.size(), !has_direction);
+    if (!has_direction) return;
     for (std::size_t i = 0; i < walls_.size(); ++i) {
       Candidate best;
       double best_likelihood = -std::numeric_limits<double>::infinity();
@@ -340,8 +357,20 @@ class Assigner {
       const Eigen::VectorXd column = network_.CovarianceColumn(node);
       double length = 0.0;
       int support = 0;
+      // Of walls in random directions.
+      double expected_support = 0.0;
+      std::size_t tried = 0;
       for (std::size_t i = 0; i < walls_.size(); ++i) {
         if (!is_rejected_[i]) continue;
+        ++tried;
+        if (i != founder) {
+          const DirectionInnovation innovation =
+              Innovation(walls_[i].node, node, column, 0.0,
+                         std::hypot(Tolerance(i), Tolerance(founder)));
+          expected_support += std::min(
+              1.0, 2.0 * std::sqrt(0.5 * options_.gate * innovation.variance) /
+                       (0.5 * kPi));
+        }
         for (const double offset : {0.0, 0.5 * kPi}) {
           const DirectionInnovation innovation =
               Innovation(walls_[i].node, node, column, offset,
@@ -357,7 +386,10 @@ class Assigner {
         }
       }
       if (support >= options_.min_support &&
-          length >= options_.min_support_length && length > best_length) {
+          length >= options_.min_support_length && length > best_length &&
+          static_cast<double>(tried) *
+                  PoissonTail(support - 1, expected_support) <
+              options_.significance) {
         best_length = length;
         best = founder;
       }

@@ -33,6 +33,8 @@ struct DirectionAssignmentOptions {
   /// Fewest walls, and sum of their lengths (m), that make a new direction.
   int min_support = 3;
   double min_support_length = 5.0;
+  /// Probability that walls in uniformly random directions found one, anywhere.
+  double significance = 0.01;
   /// Shortest wall that a new direction may be founded on, m.
   double min_founder_length = 1.0;
 };
@@ -98,7 +100,9 @@ struct DirectionAssignment {
 /// part of the walls against the other). Walls that could be of several, or of
 /// which too little is known, are left.
 ///
-/// `network` holds the measurements; directions and ties are added to a copy.
+/// Without a given direction all walls are such as may found one.
+///
+/// `network` holds the measurements.
 DirectionAssignment AssignDirections(DirectionNetwork network,
                                      const std::vector<DirectionWall>& walls,
                                      std::vector<SharedDirection> directions,

@@ -56,6 +56,7 @@ double DirectionNetwork::Residual(const Link& link) const {
 }
 
 void DirectionNetwork::Solve() {
+  if (size() == 0) return;
   const auto n = static_cast<Eigen::Index>(size());
   std::vector<Eigen::Triplet<double>> triplets;
   triplets.reserve(3 * links_.size() + size());

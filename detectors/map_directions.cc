@@ -1,5 +1,4 @@
 #include <plumbline/core/registry.h>
-#include <plumbline/core/session.h>
 #include <plumbline/detectors/map_directions.h>
 #include <plumbline/factors/information.h>
 
@@ -123,21 +122,19 @@ MapDirections CollectDirections(const Graph& graph,
     for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
       const Constraint& constraint = graph.GetConstraint(constraint_id);
       if (constraint.state != ConstraintState::kLive ||
+          constraint.kind != ConstraintClass::kMeasurement ||
           constraint.features.size() != 2 || constraint.features[0] != id) {
         continue;
       }
       const auto second = result.nodes.find(constraint.features[1]);
       if (second == result.nodes.end() || second->second == node) continue;
-      Difference difference = DirectionOf(constraint, graph.GetFeature(id),
-                                          graph.GetFeature(second->first));
-      if (constraint.kind == ConstraintClass::kStructure) {
-        difference.information *= std::max(constraint.delta, kDeltaFloor);
-      }
+      const Difference difference = DirectionOf(
+          constraint, graph.GetFeature(id), graph.GetFeature(second->first));
       if (difference.information <= 0.0) continue;
       const double variance = 1.0 / difference.information;
       if (!(variance < DirectionNetwork::kUnknownVariance)) continue;
-      const bool is_sighting = constraint.type->sighting != Sighting::kPose &&
-                               constraint.kind == ConstraintClass::kMeasurement;
+      const bool is_sighting = constraint.type->sighting != Sighting::kPose;
+      result.constraints.push_back(constraint_id);
       result.has_sightings = result.has_sightings || is_sighting;
       result.network.AddLink(node, second->second, difference.angle, variance,
                              false, is_sighting ? kSighted : kRelative);

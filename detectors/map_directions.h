@@ -26,17 +26,18 @@ struct MapDirections {
   DirectionNetwork network;
   /// Node of each feature with a direction.
   std::map<FeatureId, std::size_t> nodes;
+  /// The constraints that the links are of.
+  std::vector<ConstraintId> constraints;
   /// Whether poses that saw the walls are part of the map.
   bool has_sightings = false;
 };
 
-/// What the live constraints between pairs of poses and segments say about the
+/// What the live measurements between pairs of poses and segments say about the
 /// difference of their directions, all positions left open: the constraint is
 /// linearized at the present state, and the relative position is marginalized
 /// out of its information (Schur complement). Constraints that say nothing
-/// about directions, and those on features without one, are left out;
-/// structure counts by its delta. With `scope` (ascending ids) only those among
-/// the features listed.
+/// about directions, and those on features without one, are left out. With
+/// `scope` (ascending ids) only those among the features listed.
 MapDirections CollectDirections(const Graph& graph,
                                 const std::vector<FeatureId>* scope,
                                 const MapDirectionsOptions& options);

@@ -174,109 +174,70 @@ WallTie TieOf(const Graph& graph, FeatureId wall) {
   return {};
 }
 
-// Walls whose directions the measurements tie to each other, judged by their
-// innovation.
-class InnovationJudge {
- public:
-  InnovationJudge(const Graph& graph, const DetectionScope& scope,
-                  const OrientationMixtureOptions& options)
-      : graph_(graph), scope_(scope), options_(options) {
-    const std::vector<FeatureId>* ids =
-        scope.level == 0 ? scope.features : scope.lower_features;
-    if (scope.features != nullptr && ids == nullptr) return;
-    MapDirections map = CollectDirections(graph, ids, options.links);
-    // Relations between walls that a front-end left neglect what their errors
-    // have in common, so that little innovations mean nothing.
-    if (!map.has_sightings) return;
-    network_ = std::move(map.network);
-    for (const auto& [id, node] : map.nodes) {
-      const Feature& feature = graph.GetFeature(id);
-      if (DirectionParameter(feature) < 0 || feature.level > scope.level ||
-          LengthOf(feature) < options.min_length) {
-        continue;
-      }
-      wall_of_[id] = walls_.size();
-      ids_.push_back(id);
-      walls_.push_back(
-          {node, LengthOf(feature),
-           OwnDirectionSigma(LengthOf(feature), options.direction_noise)});
-    }
-    has_links_.assign(walls_.size(), false);
-    for (std::size_t i = 0; i < walls_.size(); ++i) {
-      has_links_[i] = network_.HasLinks(walls_[i].node);
-    }
-  }
-
-  // True for a wall about which the measurements say something.
-  bool Judges(const Feature& feature) const {
-    const auto found = wall_of_.find(feature.id);
-    return found != wall_of_.end() && has_links_[found->second];
-  }
-
-  // Decides on all walls. `orientations` are those of the graph and then, with
-  // kNoId, new ones at `directions`.
-  DirectionAssignment Assign(const std::vector<FeatureId>& orientations,
-                             const std::vector<double>& directions) {
-    if (walls_.empty()) return {};
-    std::map<FeatureId, std::size_t> index;
-    std::vector<SharedDirection> given(orientations.size());
-    for (std::size_t k = 0; k < orientations.size(); ++k) {
-      given[k].angle = directions[k];
-      if (orientations[k] != kNoId) index[orientations[k]] = k;
-    }
-    ties_.resize(walls_.size());
-    for (std::size_t i = 0; i < walls_.size(); ++i) {
-      ties_[i] = TieOf(graph_, ids_[i]);
-      const auto known = index.find(ties_[i].orientation);
-      if (known == index.end()) continue;
-      std::vector<std::size_t>& tied = given[known->second].walls;
-      // With all of the map at hand everything is decided anew.
-      if (scope_.features != nullptr || tied.empty()) {
-        tied.push_back(i);
-      } else if (walls_[i].length > walls_[tied[0]].length) {
-        tied[0] = i;
-      }
-    }
-    for (std::size_t k = 0; k < orientations.size(); ++k) {
-      if (orientations[k] != kNoId) continue;
-      // A new one is founded on the longest wall that has it.
-      for (std::size_t i = 0; i < walls_.size(); ++i) {
-        if (ties_[i].orientation != kNoId || !has_links_[i]) continue;
-        const double angle =
-            graph_.GetFeature(ids_[i])
-                .parameters[DirectionParameter(graph_.GetFeature(ids_[i]))];
-        if (NearestAxial(directions, angle, 0.25 * options_.mixture.gate) !=
-            static_cast<int>(k)) {
-          continue;
-        }
-        std::vector<std::size_t>& tied = given[k].walls;
-        if (tied.empty()) {
-          tied.push_back(i);
-        } else if (walls_[i].length > walls_[tied[0]].length) {
-          tied[0] = i;
-        }
-      }
-    }
-    DirectionAssignmentOptions options = options_.assignment;
-    options.sigma = options_.sigma;
-    return AssignDirections(std::move(network_), walls_, std::move(given),
-                            options);
-  }
-
-  const std::vector<FeatureId>& ids() const { return ids_; }
-  const std::vector<WallTie>& ties() const { return ties_; }
-
- private:
-  const Graph& graph_;
-  const DetectionScope& scope_;
-  const OrientationMixtureOptions& options_;
-  DirectionNetwork network_;
-  std::map<FeatureId, std::size_t> wall_of_;
-  std::vector<FeatureId> ids_;
-  std::vector<DirectionWall> walls_;
-  std::vector<bool> has_links_;
-  std::vector<WallTie> ties_;
+// Walls whose directions the measurements tie to each other.
+struct JudgedWalls {
+  DirectionNetwork network;
+  std::vector<FeatureId> ids;
+  std::vector<DirectionWall> walls;
+  // What the result depends on.
+  std::vector<ConstraintId> constraints;
 };
+
+// Empty where there is nothing to judge by: parts of a map are not looked at
+// so, and relations between walls that a front-end left neglect what their
+// errors have in common, so that small innovations mean nothing.
+JudgedWalls CollectJudgedWalls(const Graph& graph, const DetectionScope& scope,
+                               const OrientationMixtureOptions& options) {
+  JudgedWalls judged;
+  if (scope.features != nullptr) return judged;
+  MapDirections map = CollectDirections(graph, nullptr, options.links);
+  if (!map.has_sightings) return judged;
+  for (const auto& [id, node] : map.nodes) {
+    const Feature& feature = graph.GetFeature(id);
+    if (DirectionParameter(feature) < 0 || feature.level > scope.level ||
+        LengthOf(feature) < options.min_length || !map.network.HasLinks(node)) {
+      continue;
+    }
+    const double length = LengthOf(feature);
+    judged.ids.push_back(id);
+    judged.walls.push_back(
+        {node, length, OwnDirectionSigma(length, options.direction_noise)});
+  }
+  judged.network = std::move(map.network);
+  judged.constraints = std::move(map.constraints);
+  return judged;
+}
+
+// For each direction the orientation of the graph that shares the greatest
+// length of walls with it, none of them twice; kNoId for a new one.
+std::vector<FeatureId> MatchOrientations(
+    const DirectionAssignment& assignment,
+    const std::vector<DirectionWall>& walls, const std::vector<WallTie>& ties) {
+  std::map<std::pair<std::size_t, FeatureId>, double> shared;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    if (assignment.direction_of[i] < 0 || ties[i].orientation == kNoId) {
+      continue;
+    }
+    shared[{static_cast<std::size_t>(assignment.direction_of[i]),
+            ties[i].orientation}] += walls[i].length;
+  }
+  std::vector<std::pair<double, std::pair<std::size_t, FeatureId>>> by_length;
+  for (const auto& [pair, length] : shared) by_length.push_back({length, pair});
+  std::sort(
+      by_length.begin(), by_length.end(), [](const auto& a, const auto& b) {
+        return a.first != b.first ? a.first > b.first : a.second < b.second;
+      });
+  std::vector<FeatureId> orientations(assignment.directions.size(), kNoId);
+  std::set<FeatureId> taken;
+  for (const auto& [length, pair] : by_length) {
+    if (orientations[pair.first] != kNoId || taken.count(pair.second) > 0) {
+      continue;
+    }
+    orientations[pair.first] = pair.second;
+    taken.insert(pair.second);
+  }
+  return orientations;
+}
 
 }  // namespace
 
@@ -309,8 +270,6 @@ Transaction OrientationMixture::Detect(const Graph& graph,
     directions.push_back(feature.parameters[0]);
   }
 
-  const std::vector<AxialComponent> components =
-      FindAxialComponents(list.samples(), directions, options_.mixture);
   const auto tie = [&](const Feature& wall, FeatureId orientation,
                        double expected) {
     Constraint constraint;
@@ -333,57 +292,70 @@ Transaction OrientationMixture::Detect(const Graph& graph,
     return transaction.AddFeature(std::move(orientation));
   };
 
-  InnovationJudge judge(graph, scope, options_);
-  std::vector<FeatureId> all = orientations;
-  for (const AxialComponent& component : components) {
-    all.push_back(kNoId);
-    directions.push_back(component.mean);
-  }
-  DirectionAssignment assignment = judge.Assign(all, directions);
-  // A new direction of two views of one wall is none.
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    if (all[k] == kNoId) all[k] = add_orientation(directions[k]);
-  }
-  for (std::size_t k = all.size(); k < assignment.directions.size(); ++k) {
-    const SharedDirection& direction = assignment.directions[k];
-    all.push_back(static_cast<int>(direction.walls.size()) <
-                          std::max(2, options_.minimum_support)
-                      ? kNoId
-                      : add_orientation(direction.angle));
-  }
+  // What can be judged by its innovation is.
+  JudgedWalls judged = CollectJudgedWalls(graph, scope, options_);
   std::int64_t refused = 0;
   std::int64_t moved = 0;
-  for (std::size_t i = 0; i < judge.ids().size(); ++i) {
-    const Feature& wall = graph.GetFeature(judge.ids()[i]);
-    if (!judge.Judges(wall)) continue;
-    const WallTie& old = judge.ties()[i];
-    const int k = assignment.direction_of[i];
-    const FeatureId orientation = k < 0 ? kNoId : all[k];
-    refused += orientation == kNoId;
-    if (old.orientation == kNoId) {
-      if (orientation != kNoId && !IsTied(graph, wall, scope.level)) {
-        tie(wall, orientation, 0.0);
+  if (!judged.ids.empty()) {
+    if (judged.constraints != judged_constraints_ ||
+        judged.ids != judged_ids_) {
+      DirectionAssignmentOptions options = options_.assignment;
+      options.sigma = options_.sigma;
+      assignment_ = AssignDirections(std::move(judged.network), judged.walls,
+                                     {}, options);
+      judged_constraints_ = std::move(judged.constraints);
+      judged_ids_ = judged.ids;
+    }
+    std::vector<WallTie> ties;
+    for (const FeatureId id : judged.ids) ties.push_back(TieOf(graph, id));
+    std::vector<FeatureId> shared =
+        MatchOrientations(assignment_, judged.walls, ties);
+    for (std::size_t k = 0; k < shared.size(); ++k) {
+      const SharedDirection& direction = assignment_.directions[k];
+      if (shared[k] != kNoId || static_cast<int>(direction.walls.size()) <
+                                    std::max(2, options_.minimum_support)) {
+        continue;
       }
-    } else if (orientation != old.orientation &&
-               (orientation != kNoId ||
-                assignment.innovations[i].chi_square >
-                    options_.assignment.breaking_gate)) {
-      transaction.BreakConstraint(old.constraint);
-      ++moved;
-      if (orientation != kNoId) tie(wall, orientation, 0.0);
+      shared[k] = add_orientation(direction.angle);
+      orientations.push_back(shared[k]);
+      directions.push_back(direction.angle);
+    }
+    for (std::size_t i = 0; i < judged.ids.size(); ++i) {
+      const Feature& wall = graph.GetFeature(judged.ids[i]);
+      const int k = assignment_.direction_of[i];
+      const FeatureId orientation = k < 0 ? kNoId : shared[k];
+      refused += orientation == kNoId;
+      if (ties[i].orientation == kNoId) {
+        if (orientation != kNoId && !IsTied(graph, wall, scope.level)) {
+          tie(wall, orientation, 0.0);
+        }
+      } else if (orientation == kNoId ? assignment_.innovations[i].chi_square >
+                                            options_.assignment.breaking_gate
+                                      : orientation != ties[i].orientation) {
+        transaction.BreakConstraint(ties[i].constraint);
+        ++moved;
+        if (orientation != kNoId) tie(wall, orientation, 0.0);
+      }
+    }
+  } else {
+    for (const AxialComponent& component :
+         FindAxialComponents(list.samples(), directions, options_.mixture)) {
+      orientations.push_back(add_orientation(component.mean));
+      directions.push_back(component.mean);
     }
   }
 
+  const std::set<FeatureId> is_judged(judged.ids.begin(), judged.ids.end());
   std::int64_t far = 0;
   for (const Candidate& candidate : candidates) {
-    if (judge.Judges(*candidate.feature)) continue;
+    if (is_judged.count(candidate.feature->id) > 0) continue;
     const int nearest =
         NearestAxial(directions, candidate.angle, options_.mixture.gate);
     if (nearest < 0) {
       ++far;
       continue;
     }
-    tie(*candidate.feature, all[nearest], candidate.expected);
+    tie(*candidate.feature, orientations[nearest], candidate.expected);
   }
   scope.Count("directions found",
               static_cast<std::int64_t>(transaction.added_features().size()));

@@ -8,6 +8,7 @@
 #include <plumbline/detectors/map_directions.h>
 
 #include <string>
+#include <vector>
 
 namespace plumbline {
 
@@ -43,7 +44,12 @@ struct OrientationMixtureOptions {
 /// (expected 0 and pi/2), where they have an orientation; its walls speak for
 /// it among the others, and are not tied themselves.
 ///
-/// A feature that no live constraint ties to an orientation yet joins the
+/// Segments of a whole map that holds the poses which saw them are assigned by
+/// AssignDirections (core/method.md, section 9): what their measurements say
+/// about their directions decides, not how near to a direction a solve has
+/// pulled them. Ties that lose are broken.
+///
+/// Otherwise a feature that no live constraint ties to an orientation joins the
 /// nearest one within the gate, one that is there already or a new one. New
 /// ones are what FindAxialComponents sees in the features that are beyond every
 /// gate. With a list in the scope only the listed features, of this level and
@@ -61,6 +67,12 @@ class OrientationMixture : public StructureDetector {
 
  private:
   OrientationMixtureOptions options_;
+  // The last assignment of walls by innovation, and what it was made of: it
+  // depends on measurements alone, which do not change from one iteration of EM
+  // to the next.
+  mutable std::vector<ConstraintId> judged_constraints_;
+  mutable std::vector<FeatureId> judged_ids_;
+  mutable DirectionAssignment assignment_;
 };
 
 /// "orientation_mixture" with its parameters (angles in degrees).

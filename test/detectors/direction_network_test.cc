@@ -17,10 +17,10 @@ TEST(DirectionNetworkTest, TwoLooksAtOneDifference) {
   network.AddLink(a, b, 0.3, 0.01, false);
   network.AddLink(a, b, 0.6, 0.02, false);
   network.Solve();
-  EXPECT_NEAR(network.Angle(b) - network.Angle(a), 0.4, 1e-9);
+  EXPECT_NEAR(network.Angle(b) - network.Angle(a), 0.4, 1e-6);
   const double variance = network.Variance(a) + network.Variance(b) -
                           2.0 * network.CovarianceColumn(a)[1];
-  EXPECT_NEAR(variance, 0.02 / 3.0, 1e-8);
+  EXPECT_NEAR(variance, 0.02 / 3.0, 1e-7);
 }
 
 TEST(DirectionNetworkTest, LinksOfUndirectedThingsAreModuloPi) {

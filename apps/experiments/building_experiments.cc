@@ -145,7 +145,7 @@ void RunB2(const ExperimentOptions& options, const Registry& registry,
   result->paper =
       "The paper's buildings have right angles only, and structure is broken "
       "where the measurements contradict it.";
-  static const Mode kModes[] = {{"none", false, false, Refinement::kMap},
+  static const Mode kModes[] = {{"none", false, false, Refinement::kFull},
                                 {"structure", true, true, Refinement::kFull}};
   static const int kBends[] = {1, 2, 3, 5, 7, 9};
   std::vector<Job> jobs;

@@ -3,6 +3,7 @@
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/wall_completion.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -58,6 +59,46 @@ class WallCompletionTest : public ::testing::Test {
   std::vector<Pose2> poses_;
   WallCompletionOptions options_;
 };
+
+// Two walls that meet at 2 degrees, 4 and 6 m long, lie within the scatter of
+// one line: they are two all the same. A straight one stays one.
+TEST(WallCompletionKinkTest, AWallIsCutAtAKink) {
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  for (const double bend : {0.0, DegToRad(2.0)}) {
+    const std::vector<Wall> world = {
+        {{-4.0, 2.0}, {0.0, 2.0}},
+        {{0.0, 2.0}, {6.0 * std::cos(bend), 2.0 + 6.0 * std::sin(bend)}}};
+    testing::Laser laser;
+    laser.start_angle = DegToRad(30.0);
+    laser.angle_step = DegToRad(1.0);
+    laser.beams = 121;
+    laser.sigma = 0.01;
+    Noise noise(4);
+    std::vector<Scan> scans;
+    std::vector<Pose2> poses;
+    for (int i = 0; i <= 60; ++i) {
+      poses.emplace_back(-4.0 + 0.16 * i, 0.0, 0.0);
+      scans.push_back(MakeScan(world, poses.back(), laser, &noise));
+    }
+    const Transaction walls =
+        FindGlimpsedWalls(Graph(), registry, scans, poses, {});
+    std::vector<double> directions;
+    for (const Feature& wall : walls.added_features()) {
+      if (wall.extent_end - wall.extent_begin < 2.0) continue;
+      directions.push_back(NormalizeAxial(wall.parameters[2]));
+    }
+    std::sort(directions.begin(), directions.end());
+    if (bend == 0.0) {
+      ASSERT_EQ(directions.size(), 1u);
+      EXPECT_NEAR(RadToDeg(directions[0]), 0.0, 0.1);
+    } else {
+      ASSERT_EQ(directions.size(), 2u);
+      EXPECT_NEAR(RadToDeg(directions[0]), 0.0, 0.2);
+      EXPECT_NEAR(RadToDeg(directions[1]), 2.0, 0.2);
+    }
+  }
+}
 
 TEST_F(WallCompletionTest, FindsTheWallSeenThroughTheDoor) {
   const Transaction walls =

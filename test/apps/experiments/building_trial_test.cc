@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <plumbline/apps/experiments/building_trial.h>
+#include <plumbline/apps/simulation/bent_world.h>
 #include <plumbline/detectors/builtins.h>
 
 #include <set>
@@ -48,6 +49,25 @@ World Ring() {
   world.path = {{0.0, 0.0}, {10.0, 0.0}, {10.0, 8.0}, {0.0, 8.0},
                 {0.0, 0.0}, {10.0, 0.0}, {10.0, 8.0}};
   return world;
+}
+
+// Structure that knows one direction used to straighten these: 2.6, 2.9 and 6.8
+// degrees were missing.
+TEST(BuildingTrialTest, ABentBuildingStaysBent) {
+  Registry registry;
+  RegisterBuiltins(&registry);
+  for (const double bend : {2.0, 3.0, 7.0}) {
+    for (const bool has_niches : {false, true}) {
+      BentOptions options = has_niches ? NichesOptions() : BentOptions();
+      options.bend_deg = bend;
+      const BuildingTrial trial = RunBuildingTrial(
+          MakeBentWorld(options, 1), SimulatorOptions(), 1, registry, {});
+      EXPECT_LT(trial.map.bend_error_deg, 0.8)
+          << bend << " degrees, niches: " << has_niches;
+      EXPECT_LT(trial.mean_position_error, 0.05)
+          << bend << " degrees, niches: " << has_niches;
+    }
+  }
 }
 
 TEST(BuildingTrialTest, ARingOfCorridors) {

@@ -40,9 +40,11 @@ class DirectionNetwork {
   void RemoveLinksOf(std::size_t node);
   void RemoveLinksBetween(std::size_t a, std::size_t b);
 
+  /// Number of nodes.
   std::size_t size() const { return initial_.size(); }
   /// Whether a link is on a node.
   bool HasLinks(std::size_t node) const { return degree_[node] > 0; }
+  /// Number of links.
   std::size_t num_links() const { return links_.size(); }
 
   /// Estimates all nodes and the variances of single nodes. Has to be called

@@ -112,6 +112,10 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
   places_ = GatherPlaces(scans, refined, records_, begins_, options_);
   std::vector<Pose2> poses;
   for (const std::size_t k : begins_) poses.push_back(key_poses[k]);
+  for (std::size_t p = 0; p < places_.size(); ++p) {
+    const KeyScanRecord& record = records_[begins_[p]];
+    places_[p].follows_previous = record.from < 0 && !record.is_loose;
+  }
   finder_ = std::make_unique<ScanMatchFinder>(places_, options_.relations);
 
   Transaction transaction;

@@ -17,6 +17,20 @@ struct Submap {
   int middle() const { return (begin + end) / 2; }
 };
 
+// Consecutive places by so many; none spans a gap in the track.
+std::vector<Submap> Submaps(const std::vector<Place>& places, int size) {
+  std::vector<Submap> submaps;
+  const int count = static_cast<int>(places.size());
+  for (int k = 0; k < count; ++k) {
+    if (submaps.empty() || !places[k].follows_previous ||
+        k - submaps.back().begin == size) {
+      submaps.push_back({k, k});
+    }
+    submaps.back().end = k + 1;
+  }
+  return submaps;
+}
+
 // Poses of a submap's places in the frame of its middle, by refined odometry.
 std::vector<Pose2> ByOdometry(const Submap& submap,
                               const std::vector<Place>& places) {
@@ -104,8 +118,7 @@ ScanMatchFinder::ScanMatchFinder(const std::vector<Place>& places,
     throw PLUMBLINE_ERROR("submap_size or radius out of range",
                           "positive values");
   }
-  attempts_.resize((places.size() + options.submap_size - 1) /
-                   options.submap_size);
+  attempts_.resize(Submaps(places, options.submap_size).size());
 }
 
 void ScanMatchFinder::TrustPoses() {
@@ -120,11 +133,7 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
                               std::to_string(poses.size()) + " poses",
                           "one pose a place");
   }
-  std::vector<Submap> submaps;
-  const int count = static_cast<int>(poses.size());
-  for (int begin = 0; begin < count; begin += options_.submap_size) {
-    submaps.push_back({begin, std::min(count, begin + options_.submap_size)});
-  }
+  const std::vector<Submap> submaps = Submaps(places_, options_.submap_size);
   const std::vector<std::vector<int>> keys = Assign(submaps, poses, options_);
 
   MatchPrior prior;

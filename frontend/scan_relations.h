@@ -48,8 +48,10 @@ struct Place {
   /// the frame of the place, and how many scans they are from.
   std::vector<ScanPoint> returns;
   int num_scans = 1;
-  /// Pose in the frame of the place before, by refined odometry; not used for
-  /// the first place.
+  /// Whether the robot came here from the place before, tracked all the way.
+  bool follows_previous = true;
+  /// Pose in the frame of that place by refined odometry; not used for the
+  /// first place.
   Pose2 since_previous = Pose2::Zero();
 };
 

@@ -112,7 +112,8 @@ TEST_F(ExperimentsBinaryTest, RefusesWrongFlags) {
   EXPECT_EQ(Run("plumbline_experiments" + good, &output), 2);
   EXPECT_THAT(output, HasSubstr("--experiment: it is missing"));
   EXPECT_EQ(Run("plumbline_experiments --experiment=S9" + good, &output), 2);
-  EXPECT_THAT(output, HasSubstr("S1, S2, S3, S4, S5, S6, R1, R2, B1, B2, N1 or all"));
+  EXPECT_THAT(output,
+              HasSubstr("S1, S2, S3, S4, S5, S6, R1, R2, B1, B2, N1 or all"));
   EXPECT_EQ(Run("plumbline_experiments --experiment=S6", &output), 2);
   EXPECT_THAT(output, HasSubstr("--output_dir"));
   EXPECT_EQ(

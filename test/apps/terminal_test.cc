@@ -274,7 +274,8 @@ TEST_F(TerminalTest, VerboseTellsSteps) {
   std::size_t last = 0;
   for (const char* step :
        {"\n1408 of 1408 scans in ", "\nstructure of the whole map, after ",
-        "\nclosing of loops, after ", "\nwalls seen by glimpses, after ",
+        "\nclosing of loops, after ", "\nadjustment of poses, after ",
+        "\nwalls from adjusted poses, after ",
         "\njoint adjustment of poses and walls, after "}) {
     const std::size_t place = process.output().find(step);
     ASSERT_NE(place, std::string::npos) << step;

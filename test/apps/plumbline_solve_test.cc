@@ -1406,7 +1406,7 @@ TEST_F(SolveTest, StructurePrior) {
   EXPECT_EQ(Solve(input, "broken", "--structure_prior=" + broken, &output), 2);
   EXPECT_THAT(output, HasSubstr("broken.prior:2: 'angel' is no statement"));
   EXPECT_EQ(Solve(input, "broken", "--structure_prior=/no/such", &output), 2);
-  EXPECT_THAT(output, HasSubstr("/no/such: cannot be opened"));
+  EXPECT_THAT(output, HasSubstr("/no/such: cannot be read: No such file"));
   EXPECT_TRUE(Files("broken").empty());
 }
 

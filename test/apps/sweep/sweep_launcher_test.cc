@@ -109,10 +109,10 @@ for flag; do
     --x=*) x=${flag#*=};;
   esac
 done
-echo "$HOST_NAME $SLURM_ARRAY_JOB_ID $PLUMBLINE_DATASETS" > $out/where
+echo "$HOST_NAME $SLURM_ARRAY_JOB_ID $PLUMBLINE_DATASETS" > "$out/where"
 if [ "$x" = 2 ]; then exit 7; fi
 if [ "$x" = slow ]; then sleep 60; fi
-echo "{\"y\": $x.$seed}" > $out/summary.json
+echo "{\"y\": $x.$seed}" > "$out/summary.json"
 )");
     fs::permissions(program_, fs::perms::owner_all);
   }
@@ -182,13 +182,13 @@ TEST_F(SweepLauncherTest, ParallelInAFolderOfBraces) {
   const std::string out = "it's {} {#} {.}";
   fs::create_directories(folder_ + "/" + out);
   ASSERT_EQ(RunInShell("cd " + folder_ + " && " + binary_ +
-                           " --grid=x=1,2 --launcher=parallel --output_dir=\"" +
+                           " --grid=x=1,3 --launcher=parallel --output_dir=\"" +
                            out + "\" -- ./program.sh",
                        &output),
             0)
       << output;
   EXPECT_THAT(output, HasSubstr("runs: 2; 2 done"));
-  EXPECT_TRUE(fs::exists(folder_ + "/" + out + "/runs/x=2,seed=1/run.json"));
+  EXPECT_TRUE(fs::exists(folder_ + "/" + out + "/runs/x=3,seed=1/run.json"));
 }
 
 TEST_F(SweepLauncherTest, ParallelOverSshToTwoHosts) {

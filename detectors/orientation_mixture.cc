@@ -201,7 +201,7 @@ JudgedWalls CollectJudgedWalls(const Graph& graph, const DetectionScope& scope,
     const double length = LengthOf(feature);
     judged.ids.push_back(id);
     judged.walls.push_back(
-        {node, length, OwnDirectionSigma(length, options.direction_noise)});
+        {node, length, OwnDirectionSigma(length, options.own_direction_noise)});
   }
   judged.network = std::move(map.network);
   judged.constraints = std::move(map.constraints);
@@ -386,6 +386,7 @@ DetectorType OrientationMixtureType() {
       {"significance", defaults.mixture.significance},
       {"min_contrast", defaults.mixture.min_contrast},
       {"normality_significance", defaults.mixture.normality_significance},
+      {"own_direction_noise_deg", RadToDeg(defaults.own_direction_noise)},
       {"innovation_gate", defaults.assignment.gate},
       {"breaking_gate", defaults.assignment.breaking_gate},
       {"split_gate", defaults.assignment.split_gate},
@@ -410,6 +411,8 @@ DetectorType OrientationMixtureType() {
     options.mixture.min_contrast = reader.Get("min_contrast", 1.0);
     options.mixture.normality_significance =
         reader.Get("normality_significance", 0.0, 1.0);
+    options.own_direction_noise =
+        DegToRad(reader.Get("own_direction_noise_deg", 0.0, 90.0));
     options.assignment.gate = reader.Get("innovation_gate", 0.0);
     options.assignment.breaking_gate = reader.Get("breaking_gate", 0.0);
     options.assignment.split_gate = reader.Get("split_gate", 0.0);

@@ -204,6 +204,13 @@ class Assigner {
         is_rejected_[i] = true;
         continue;
       }
+      const double own = walls_[i].own_sigma;
+      if (best.innovation.difference * best.innovation.difference >
+          options_.gate *
+              (best.innovation.variance -
+               (1.0 - options_.own_share * options_.own_share) * own * own)) {
+        continue;
+      }
       // Uniform over the half turn: a direction of its own.
       if (best_likelihood <
           std::max(next_likelihood, -std::log(kPi)) + options_.margin) {

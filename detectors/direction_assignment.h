@@ -18,6 +18,10 @@ struct DirectionAssignmentOptions {
   /// Largest chi-square (1 degree of freedom) of an innovation that is
   /// accepted.
   double gate = 9.0;
+  /// Share of a wall's own error that may speak for a tie: a short wall that is
+  /// well measured to lie beside a direction waits, although it is no evidence
+  /// against it.
+  double own_share = 0.35;
   /// A direction is left when its innovation is beyond this.
   double breaking_gate = 16.0;
   /// Two directions are two only when the chi-square of their difference (1

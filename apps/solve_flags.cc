@@ -1,6 +1,8 @@
 #include <gflags/gflags.h>
+#include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/cli/detector_parameters.h>
 #include <plumbline/apps/solve_flags.h>
+#include <plumbline/core/detector.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/text_file.h>
@@ -8,6 +10,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <set>
 #include <sstream>
 #include <string>
@@ -203,6 +206,24 @@ std::vector<double> ParseList(const std::string& flag,
 
 // Throws when a flag was given this value, which needs segments. A default of
 // the same value is passed over.
+// Refuses values that no detector takes, in the name of the flag that gave
+// them.
+void CheckDetectorParameters(
+    const Registry& registry,
+    const std::map<std::string, DetectorParameters>& parameters) {
+  const auto given = ParseDetectorParameters(FLAGS_detector_parameters);
+  for (const auto& [detector, values] : parameters) {
+    // What the other flags say of directions has limits that only the detector
+    // knows.
+    const std::string flag = given.count(detector) > 0 ? "detector_parameters"
+                             : FLAGS_angle_resolution > 0.0 ? "angle_resolution"
+                                                            : "allowed_angles";
+    ForFlag(flag, [&registry, &name = detector, &given_values = values] {
+      registry.GetDetector(name).make(given_values);
+    });
+  }
+}
+
 void RefuseForPoints(const std::string& flag, const std::string& value,
                      const std::string& why) {
   const gflags::CommandLineFlagInfo info =
@@ -309,6 +330,7 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
       options.detector_parameters[detector][name] = value;
     }
   }
+  CheckDetectorParameters(registry, options.detector_parameters);
   if (!FLAGS_structure_prior.empty()) {
     std::istringstream text(ReadTextFile(FLAGS_structure_prior, kLargestPrior));
     ApplyStructurePrior(

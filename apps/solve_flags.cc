@@ -186,6 +186,12 @@ std::optional<double> ParseOptional(const std::string& flag,
   return value;
 }
 
+// Throws unless a flag's value is what was expected.
+void Require(const std::string& flag, const std::string& value, bool is_so,
+             const std::string& expected) {
+  if (!is_so) throw Error("--" + flag, 0, "is " + value, expected);
+}
+
 std::vector<double> ParseList(const std::string& flag,
                               const std::string& text) {
   std::vector<double> values;
@@ -204,8 +210,6 @@ std::vector<double> ParseList(const std::string& flag,
   return values;
 }
 
-// Throws when a flag was given this value, which needs segments. A default of
-// the same value is passed over.
 // Refuses values that no detector takes, in the name of the flag that gave
 // them.
 void CheckDetectorParameters(
@@ -224,6 +228,8 @@ void CheckDetectorParameters(
   }
 }
 
+// Throws when a flag was given this value, which needs segments. A default of
+// the same value is passed over.
 void RefuseForPoints(const std::string& flag, const std::string& value,
                      const std::string& why) {
   const gflags::CommandLineFlagInfo info =
@@ -389,12 +395,24 @@ LaserOptions LaserOptionsFromFlags() {
   options.laser_start_angle =
       ParseOptional("laser_start_angle", FLAGS_laser_start_angle);
   if (options.laser_start_angle) {
+    Require("laser_start_angle", FLAGS_laser_start_angle,
+            std::abs(*options.laser_start_angle) <= 360.0,
+            "degrees within a turn");
     options.laser_start_angle = DegToRad(*options.laser_start_angle);
   }
   options.laser_step = ParseOptional("laser_step", FLAGS_laser_step);
-  if (options.laser_step) options.laser_step = DegToRad(*options.laser_step);
+  if (options.laser_step) {
+    Require("laser_step", FLAGS_laser_step,
+            *options.laser_step != 0.0 && std::abs(*options.laser_step) <= 180,
+            "degrees, not zero and within half a turn");
+    options.laser_step = DegToRad(*options.laser_step);
+  }
   options.laser_max_range =
       ParseOptional("laser_max_range", FLAGS_laser_max_range);
+  if (options.laser_max_range) {
+    Require("laser_max_range", FLAGS_laser_max_range,
+            *options.laser_max_range > 0.0, "metres above 0");
+  }
   return options;
 }
 

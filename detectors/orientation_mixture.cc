@@ -161,6 +161,8 @@ void Bind(ParameterBinder* parameters, OrientationMixtureOptions* options) {
            "density of walls at an orientation over that beside it");
   p.Number("normality_significance", &mixture.normality_significance, 0.0, 1.0,
            "", "chance at which one orientation may be split");
+  p.Angle("own_direction_noise_deg", &options->own_direction_noise, 0.0, 90.0,
+          "how far the visible part of a wall of 1 m may be off its direction");
   p.Number("innovation_gate", &options->assignment.gate, 0.0, kNoLimit, "",
            "largest chi-square of the innovation of a new tie");
   p.Number("breaking_gate", &options->assignment.breaking_gate, 0.0, kNoLimit,
@@ -231,7 +233,7 @@ JudgedWalls CollectJudgedWalls(const Graph& graph, const DetectionScope& scope,
     const double length = LengthOf(feature);
     judged.ids.push_back(id);
     judged.walls.push_back(
-        {node, length, OwnDirectionSigma(length, options.direction_noise)});
+        {node, length, OwnDirectionSigma(length, options.own_direction_noise)});
   }
   judged.network = std::move(map.network);
   judged.constraints = std::move(map.constraints);

@@ -126,7 +126,7 @@ Transaction OrientationRelation::Detect(const Graph& graph,
   if (scope.features == nullptr) {
     map = CollectDirections(graph, nullptr, options_.links);
     if (map.has_sightings) {
-      AddOrientations(graph, options_.direction_noise, &map);
+      AddOrientations(graph, options_.own_direction_noise, &map);
       map.network.Solve();
     }
   }

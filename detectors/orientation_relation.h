@@ -36,7 +36,7 @@ struct OrientationRelationOptions {
   /// OrientationMixtureOptions.
   double innovation_gate = 9.0;
   MapDirectionsOptions links;
-  double direction_noise = DegToRad(0.7);
+  double own_direction_noise = DegToRad(2.0);
 };
 
 /// Relations between the "orientation" features of a level (core/method.md,

@@ -325,8 +325,11 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
     track_.way += way;
     track_.turn += turn;
     ++track_.refused;
+    // One scan that contradicts may be a door or a person: without a gap in
+    // the log it takes several in a row.
     const bool contradicted =
-        outcome.verdict == Outcome::Verdict::kContradicted;
+        outcome.verdict == Outcome::Verdict::kContradicted &&
+        (track_.after_gap || track_.refused >= tracking.min_contradictions);
     if (contradicted || track_.way > tracking.max_blind_way ||
         track_.turn > tracking.max_blind_turn) {
       if (trace_) trace_("LOST " + outcome.why);

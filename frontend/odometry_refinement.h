@@ -66,6 +66,9 @@ struct TrackingOptions {
   /// usual one is a gap.
   double gap_seconds = 1.0;
   double gap_factor = 4.0;
+  /// Scans in a row that are refused, the last for contradicting, after which a
+  /// track of its own begins where there was no gap.
+  int min_contradictions = 3;
   /// Way (m) and turn (rad) without any match after which a track of its own
   /// begins.
   double max_blind_way = 1.5;

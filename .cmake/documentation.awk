@@ -15,6 +15,17 @@ function declares(line) {
          line !~ /^ *(namespace|struct|class|enum|union|friend|extern|template|using)/
 }
 
+# What a type says of itself is told once, at DescribedBlock and AddRelation;
+# Doxygen's EXCLUDE_SYMBOLS leaves constants out, but not aliases.
+/^ *using (Blocks|Manifold) =/ {
+  is_left_out = 1
+}
+is_left_out {
+  if (/;$/) is_left_out = 0
+  print ""
+  next
+}
+
 # A comment.
 /^ *\/\/\// {
   line = $0

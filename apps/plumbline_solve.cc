@@ -53,12 +53,30 @@ void LoadPlugins(Registry* registry) {
   }
 }
 
+// Parameters of a detector, a line each: "min_side=1 m", "angle_0, angle_1, ...
+// deg".
+void ListParameters(const DetectorType& detector) {
+  for (const DetectorParameter& parameter : detector.parameters) {
+    std::ostringstream text;
+    if (parameter.is_list) {
+      text << parameter.name << "0, " << parameter.name << "1, ...";
+    } else {
+      text << parameter.name << '=' << parameter.default_value;
+    }
+    if (!parameter.unit.empty()) text << ' ' << parameter.unit;
+    std::printf("    %-32s %s\n", text.str().c_str(),
+                parameter.description.c_str());
+  }
+}
+
 void ListPlugins(const Registry& registry) {
   for (const PluginList* list : registry.lists()) {
     std::printf("%s\n", list->title().c_str());
     for (const PluginList::Entry& entry : list->entries()) {
       std::printf("  %-34s %s\n", entry.name.c_str(),
                   entry.description.c_str());
+      if (list->title() != DetectorType::kTitle) continue;
+      ListParameters(registry.GetDetector(entry.name));
     }
   }
 }
@@ -238,6 +256,17 @@ std::string TitleOf(const InputStream& input) {
   return PrintableUtf8(std::filesystem::path(input.name()).filename().string());
 }
 
+// A hierarchy that does not fit what logs are made of is refused before the log
+// is read.
+void CheckHierarchy(const LogSolverOptions& options, const Registry& registry) {
+  if (!options.structure || options.hierarchy.empty()) return;
+  ForFlag("hierarchy", [&] {
+    MakeHierarchy(options.hierarchy, registry,
+                  {ProfileOf(options.features).feature_type},
+                  options.detector_parameters);
+  });
+}
+
 int SolveLog(InputStream* input, const LogReaderType& reader,
              const Registry& registry, double begin, OutputFolder* folder) {
   SolveOutcome outcome;
@@ -246,6 +275,7 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
   const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
+  CheckHierarchy(options, registry);
   RemarkOnFlags(input->name(), "log", "graphs", GraphFlags());
 
   const double parse_begin = Now();
@@ -417,6 +447,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin,
   Summary::Solver figures;
   PlaceStart(*input, *g2o, &graph, &figures);
 
+  ForFlag("hierarchy", [&] { MakeGraphHierarchy(options, graph, registry); });
   GraphSolver solver(registry, options, &graph);
   if (!std::isfinite(solver.initial_cost().total())) {
     throw Error(input->name(), 0,
@@ -475,7 +506,7 @@ int Run() {
     return kExitUsage;
   }
   // Wrong lists are refused before the work.
-  SelectOutputs(FLAGS_outputs, registry);
+  ForFlag("outputs", [&] { SelectOutputs(FLAGS_outputs, registry); });
   if (ParseMarginalsSelection(FLAGS_marginals, registry).empty() &&
       FLAGS_ellipse_sigmas > 0.0) {
     throw Error("--ellipse_sigmas", 0, "ellipses of nothing",
@@ -488,8 +519,12 @@ int Run() {
     return kExitInterrupted;
   }
   const LogReaderType* reader =
-      FLAGS_log_reader.empty() ? RecognizeLog(registry, prefix)
-                               : &registry.Get<LogReaderType>(FLAGS_log_reader);
+      FLAGS_log_reader.empty()
+          ? RecognizeLog(registry, prefix)
+          : &ForFlag(
+                "log_reader", [&]() -> const auto& {
+                  return registry.Get<LogReaderType>(FLAGS_log_reader);
+                });
   const bool is_graph = reader == nullptr && LooksLikeG2o(prefix);
   // What nobody recognizes is for the reader of the commonest format to refuse:
   // it says what it found.

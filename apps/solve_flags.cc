@@ -1,6 +1,8 @@
 #include <gflags/gflags.h>
+#include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/cli/detector_parameters.h>
 #include <plumbline/apps/solve_flags.h>
+#include <plumbline/core/detector.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/text_file.h>
@@ -8,6 +10,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <set>
 #include <sstream>
 #include <string>
@@ -183,6 +186,12 @@ std::optional<double> ParseOptional(const std::string& flag,
   return value;
 }
 
+// Throws unless a flag's value is what was expected.
+void Require(const std::string& flag, const std::string& value, bool is_so,
+             const std::string& expected) {
+  if (!is_so) throw Error("--" + flag, 0, "is " + value, expected);
+}
+
 std::vector<double> ParseList(const std::string& flag,
                               const std::string& text) {
   std::vector<double> values;
@@ -199,6 +208,24 @@ std::vector<double> ParseList(const std::string& flag,
     begin = end + 1;
   }
   return values;
+}
+
+// Refuses values that no detector takes, in the name of the flag that gave
+// them.
+void CheckDetectorParameters(
+    const Registry& registry,
+    const std::map<std::string, DetectorParameters>& parameters) {
+  const auto given = ParseDetectorParameters(FLAGS_detector_parameters);
+  for (const auto& [detector, values] : parameters) {
+    // What the other flags say of directions has limits that only the detector
+    // knows.
+    const std::string flag = given.count(detector) > 0 ? "detector_parameters"
+                             : FLAGS_angle_resolution > 0.0 ? "angle_resolution"
+                                                            : "allowed_angles";
+    ForFlag(flag, [&registry, &name = detector, &given_values = values] {
+      registry.GetDetector(name).make(given_values);
+    });
+  }
 }
 
 // Throws when a flag was given this value, which needs segments. A default of
@@ -309,6 +336,7 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
       options.detector_parameters[detector][name] = value;
     }
   }
+  CheckDetectorParameters(registry, options.detector_parameters);
   if (!FLAGS_structure_prior.empty()) {
     std::istringstream text(ReadTextFile(FLAGS_structure_prior, kLargestPrior));
     ApplyStructurePrior(
@@ -367,12 +395,24 @@ LaserOptions LaserOptionsFromFlags() {
   options.laser_start_angle =
       ParseOptional("laser_start_angle", FLAGS_laser_start_angle);
   if (options.laser_start_angle) {
+    Require("laser_start_angle", FLAGS_laser_start_angle,
+            std::abs(*options.laser_start_angle) <= 360.0,
+            "degrees within a turn");
     options.laser_start_angle = DegToRad(*options.laser_start_angle);
   }
   options.laser_step = ParseOptional("laser_step", FLAGS_laser_step);
-  if (options.laser_step) options.laser_step = DegToRad(*options.laser_step);
+  if (options.laser_step) {
+    Require("laser_step", FLAGS_laser_step,
+            *options.laser_step != 0.0 && std::abs(*options.laser_step) <= 180,
+            "degrees, not zero and within half a turn");
+    options.laser_step = DegToRad(*options.laser_step);
+  }
   options.laser_max_range =
       ParseOptional("laser_max_range", FLAGS_laser_max_range);
+  if (options.laser_max_range) {
+    Require("laser_max_range", FLAGS_laser_max_range,
+            *options.laser_max_range > 0.0, "metres above 0");
+  }
   return options;
 }
 

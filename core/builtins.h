@@ -6,10 +6,13 @@
 namespace plumbline {
 
 /// Registers the feature types, relations and losses of plumbline::factors:
-/// point, pose, segment, line, circle, orientation; the relations of method.md,
-/// section 4; the names of --delta_mode. Does nothing for what is there
-/// already. Explicit, because static initializers are lost in static
-/// libraries.
+/// those of factors/blocks.h (point, pose, segment, line, end_points, circle,
+/// rectangle, orientation), those of the table in factors/relations.md, and the
+/// names of --delta_mode. Does nothing for what is there already. Explicit,
+/// because static initializers are lost in static libraries.
+///
+/// builtins.cc is the only file of core that knows a relation: a new one is a
+/// header in factors/, a line there and a test.
 void RegisterBuiltinRelations(Registry* registry);
 
 }  // namespace plumbline

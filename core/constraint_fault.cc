@@ -14,16 +14,10 @@ ConstraintFault FindFault(const Constraint& constraint,
     const FeatureId id = constraint.features[i];
     const Feature& feature =
         transaction.added_features()[Transaction::ProvisionalIndex(id)];
-    const std::vector<std::string>& fitting = type.feature_types[i];
-    if (std::find(fitting.begin(), fitting.end(), feature.type->name) ==
-        fitting.end()) {
-      std::string names;
-      for (const std::string& name : fitting) {
-        names += (names.empty() ? "" : " or ") + name;
-      }
+    if (!type.Accepts(i, *feature.type)) {
       return {"feature " + std::to_string(i + 1) + " of " + type.name +
                   " is of type " + feature.type->name,
-              names};
+              type.AcceptedNames(i)};
     }
     if (std::count(constraint.features.begin(), constraint.features.end(), id) >
         1) {

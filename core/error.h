@@ -15,18 +15,22 @@ class Error : public std::runtime_error {
   /// 0 is left out of the message, as is an empty `expected`.
   Error(const std::string& file, int line, const std::string& what_is_wrong,
         const std::string& expected)
-      : std::runtime_error(Format(file, line, what_is_wrong, expected)) {}
+      : Error(line > 0 ? file + ":" + std::to_string(line) : file,
+              expected.empty() ? what_is_wrong
+                               : what_is_wrong + ": expected " + expected) {}
+
+  /// The same said of another place: of the flag whose value a library found
+  /// wrong.
+  Error WithPlace(const std::string& place) const {
+    return Error(place, what_and_expected_);
+  }
 
  private:
-  static std::string Format(const std::string& file, int line,
-                            const std::string& what_is_wrong,
-                            const std::string& expected) {
-    std::string message = file;
-    if (line > 0) message += ":" + std::to_string(line);
-    message += ": " + what_is_wrong;
-    if (!expected.empty()) message += ": expected " + expected;
-    return message;
-  }
+  Error(const std::string& place, const std::string& what_and_expected)
+      : std::runtime_error(place + ": " + what_and_expected),
+        what_and_expected_(what_and_expected) {}
+
+  std::string what_and_expected_;
 };
 
 /// An Error that names the line of source that found it.

@@ -14,8 +14,11 @@ using ConstraintId = std::int64_t;
 
 constexpr std::int64_t kNoId = -1;
 
-/// Most parameters that a feature type may have.
-constexpr int kMaxFeatureSize = 6;
+/// Most parameters that a feature type may have: room for a box in space, that
+/// is a position, a quaternion and three sizes.
+constexpr int kMaxFeatureSize = 10;
+/// Most coordinates of an anchor.
+constexpr int kMaxAnchorSize = 3;
 
 /// Highest level of a feature: far more than any hierarchy has, so that a
 /// number which is none is refused.
@@ -30,11 +33,15 @@ struct FeatureType;  // core/registry.h
 ///   pose         x, y, theta       m, m, rad
 ///   segment      x, y, theta       m, m, rad
 ///   line         d, alpha          m, rad; relative to `anchor`
+///   end_points   x1, y1, x2, y2    m
 ///   circle       x, y, R           m
 ///   rectangle    x, y, theta, half_length, half_width
 ///                                  m, m, rad, m, m; half its size along theta
 ///                                  and across
 ///   orientation  theta             rad
+///
+/// What a type is called and what its parameters are is in the type, and in the
+/// files; code asks for its traits and its frame, not for its name.
 struct Feature {
   FeatureId id = kNoId;
   /// Owned by the registry; never null in a graph.
@@ -49,12 +56,13 @@ struct Feature {
   /// the life of the feature in the graph, solvers write to it.
   std::array<double, kMaxFeatureSize> parameters{};
   /// Reference point (m, map frame) of parameters that would lose accuracy far
-  /// from the origin (lines): constant.
-  std::array<double, 2> anchor{};
-  /// Where the visible part begins and ends along the direction of a segment
-  /// or line, m, relative to the feature's own position (a segment's (x, y), a
-  /// line's foot point seen from its anchor). An attribute for association and
-  /// drawing, not state.
+  /// from the origin (lines): constant. Entries past type->anchor_size are zero
+  /// and mean nothing.
+  std::array<double, kMaxAnchorSize> anchor{};
+  /// Where the visible part of something straight begins and ends along its
+  /// direction, m, relative to the feature's own position (a segment's (x, y),
+  /// a line's foot point seen from its anchor). An attribute for association
+  /// and drawing, not state.
   double extent_begin = 0.0;
   double extent_end = 0.0;
   /// How many scans saw it (0 for virtual features).

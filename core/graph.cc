@@ -95,17 +95,10 @@ Error UnknownId(const std::string& what, Id id) {
 // Does nothing for a type of feature that fits the i-th place of a relation.
 void CheckFits(const RelationType& relation, std::size_t i,
                const FeatureType& type) {
-  const std::vector<std::string>& fitting = relation.feature_types[i];
-  if (std::find(fitting.begin(), fitting.end(), type.name) != fitting.end()) {
-    return;
-  }
-  std::string names;
-  for (const std::string& name : fitting) {
-    names += (names.empty() ? "" : " or ") + name;
-  }
+  if (relation.Accepts(i, type)) return;
   throw PLUMBLINE_ERROR("feature " + std::to_string(i + 1) + " of " +
                             relation.name + " is a " + type.name,
-                        names);
+                        relation.AcceptedNames(i));
 }
 
 }  // namespace

@@ -129,9 +129,8 @@ void TurnInformation(double angle, Eigen::MatrixXd* information) {
 
 bool IsTurned(const G2oOptions& options, const Constraint& constraint) {
   return options.information_at_second &&
-         constraint.type->sighting == Sighting::kPose &&
-         constraint.type->feature_types.size() == 2 &&
-         constraint.information.rows() == 3;
+         constraint.type->Is(RelationRole::kPose) &&
+         constraint.type->feature_types.size() == 2;
 }
 
 // -- Writing elements ---------------------------------------------------------
@@ -164,7 +163,8 @@ void AppendFix(std::int64_t file_id, std::string* text) {
 
 bool IsPlain(const Feature& feature) {
   return feature.level == 0 && !feature.is_virtual &&
-         feature.anchor[0] == 0.0 && feature.anchor[1] == 0.0 &&
+         std::all_of(feature.anchor.begin(), feature.anchor.end(),
+                     [](double coordinate) { return coordinate == 0.0; }) &&
          feature.extent_begin == 0.0 && feature.extent_end == 0.0 &&
          feature.observations == 0 && feature.source == kDefaultSource;
 }
@@ -177,8 +177,11 @@ void AppendAttributes(const Feature& feature, std::int64_t file_id,
   *text += ' ';
   AppendNumber(static_cast<std::int64_t>(feature.level), text);
   *text += feature.is_virtual ? " 1" : " 0";
-  for (const double number : {feature.anchor[0], feature.anchor[1],
-                              feature.extent_begin, feature.extent_end}) {
+  for (int i = 0; i < feature.type->written_anchor_size(); ++i) {
+    *text += ' ';
+    AppendNumber(feature.anchor[i], text);
+  }
+  for (const double number : {feature.extent_begin, feature.extent_end}) {
     *text += ' ';
     AppendNumber(number, text);
   }
@@ -268,6 +271,8 @@ G2oFile::Fingerprint FingerprintOf(const Constraint& constraint,
 struct FeatureLine {
   int line;
   std::int64_t file_id;
+  // Coordinates that it gives.
+  int anchor_size;
   Feature attributes;
 };
 
@@ -461,7 +466,9 @@ class Reader {
     const FeatureType& type = *tag.type;
     std::string what = "id";
     if (tag.format == nullptr) {
-      for (const std::string& name : type.parameter_names) what += ", " + name;
+      for (const Quantity& parameter : type.parameters) {
+        what += ", " + parameter.label();
+      }
     } else {
       what += ", " + std::to_string(type.size) + " numbers";
       for (const std::string& name : tag.format->extra_fields) {
@@ -505,22 +512,30 @@ class Reader {
   }
 
   void ReadFeatureLine() {
-    ExpectFields(9,
+    // The vertex, which says how many coordinates an anchor has, may come
+    // later.
+    const int anchor_size =
+        fields_.size() == 8 + kMaxAnchorSize ? kMaxAnchorSize : 2;
+    ExpectFields(static_cast<std::size_t>(7 + anchor_size),
                  "id, level, virtual, anchor_x, anchor_y, extent_begin, "
                  "extent_end, observations, source");
     FeatureLine own;
+    own.anchor_size = anchor_size;
     own.line = line_;
     own.file_id = Id(fields_[1]);
     Feature& feature = own.attributes;
     feature.level =
         static_cast<int>(Integer(fields_[2], "level", 0, kMaxLevel));
     feature.is_virtual = Integer(fields_[3], "virtual", 0, 1) == 1;
-    feature.anchor = {Number(fields_[4]), Number(fields_[5])};
-    feature.extent_begin = Number(fields_[6]);
-    feature.extent_end = Number(fields_[7]);
+    std::size_t field = 4;
+    for (int i = 0; i < anchor_size; ++i) {
+      feature.anchor[i] = Number(fields_[field++]);
+    }
+    feature.extent_begin = Number(fields_[field++]);
+    feature.extent_end = Number(fields_[field++]);
     feature.observations = static_cast<int>(Integer(
-        fields_[8], "observations", 0, std::numeric_limits<int>::max()));
-    feature.source = Source(fields_[9]);
+        fields_[field++], "observations", 0, std::numeric_limits<int>::max()));
+    feature.source = Source(fields_[field]);
     feature_lines_.push_back(std::move(own));
   }
 
@@ -699,6 +714,13 @@ class Reader {
       line.kind = G2oLine::Kind::kFeatureAttributes;
       line.id = first_feature_ + static_cast<FeatureId>(index);
       Feature& feature = features_[index];
+      const int anchor_size = feature.type->written_anchor_size();
+      if (own.anchor_size != anchor_size) {
+        Fail(own.line,
+             std::string(kFeatureTag) + " has an anchor of " +
+                 std::to_string(own.anchor_size) + " coordinates",
+             std::to_string(anchor_size) + " for a " + feature.type->name);
+      }
       feature.level = own.attributes.level;
       feature.is_virtual = own.attributes.is_virtual;
       feature.anchor = own.attributes.anchor;

@@ -86,7 +86,8 @@ struct G2oFile {
 ///       extent_end observations source
 ///   PLUMBLINE_CONSTRAINT class state delta source
 ///
-/// each on one line. The first belongs to the vertex with this id, the second
+/// each on one line; an anchor in space has an anchor_z after anchor_y. The
+/// first belongs to the vertex with this id, the second
 /// to the edge above it; "virtual" is 0 or 1, "class" measurement or structure,
 /// "state" live or broken; a source is "-" when empty, with %XX for white
 /// space, '%', control characters and a lone "-". Without such a line a feature

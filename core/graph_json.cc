@@ -109,7 +109,10 @@ void AppendFeature(const Graph& graph, const Feature& feature,
       std::vector<double>(feature.data(), feature.data() + feature.type->size),
       text);
   *text += ", \"anchor\": ";
-  AppendNumbers(feature.anchor, text);
+  AppendNumbers(std::vector<double>(feature.anchor.begin(),
+                                    feature.anchor.begin() +
+                                        feature.type->written_anchor_size()),
+                text);
   *text += ", \"extent\": ";
   AppendNumbers(std::vector<double>{feature.extent_begin, feature.extent_end},
                 text);
@@ -259,8 +262,11 @@ Feature ReadFeature(const Node& node, const Registry& registry) {
     feature.parameters[i] = parameters.At(i).Number();
   }
   const Node anchor = node.Get("anchor");
-  anchor.ExpectSize(2);
-  feature.anchor = {anchor.At(0).Number(), anchor.At(1).Number()};
+  const int anchor_size = feature.type->written_anchor_size();
+  anchor.ExpectSize(anchor_size);
+  for (int i = 0; i < anchor_size; ++i) {
+    feature.anchor[i] = anchor.At(i).Number();
+  }
   const Node extent = node.Get("extent");
   extent.ExpectSize(2);
   feature.extent_begin = extent.At(0).Number();

@@ -59,7 +59,7 @@ Hierarchy MakeHierarchy(
                                   std::to_string(level),
                               WhatFitsWhere(registry, types));
       }
-      DetectorParameters values = type.defaults;
+      DetectorParameters values = type.defaults();
       const auto given = parameters.find(name);
       if (given != parameters.end()) {
         for (const auto& value : given->second) {

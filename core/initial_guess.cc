@@ -175,7 +175,7 @@ class Guess {
   void FindPoses() {
     for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
       if (!IsMeasurement(*constraint) ||
-          constraint->type->sighting != Sighting::kPose) {
+          !constraint->type->Is(RelationRole::kPose)) {
         continue;
       }
       for (const FeatureId id : constraint->features) PoseOf(id) = 0;
@@ -194,7 +194,7 @@ class Guess {
     for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
       if (!IsMeasurement(*constraint)) continue;
       const std::vector<FeatureId>& ids = constraint->features;
-      if (constraint->type->sighting == Sighting::kPose) {
+      if (constraint->type->Is(RelationRole::kPose)) {
         const int index = static_cast<int>(pose_sightings_.size());
         pose_sightings_.push_back({constraint->id,
                                    ids.size() == 1 ? kNone : PoseOf(ids[0]),
@@ -203,7 +203,7 @@ class Guess {
         for (const FeatureId id : ids) {
           links_[At(PoseOf(id))].push_back(index);
         }
-      } else if (constraint->type->sighting == Sighting::kPosition &&
+      } else if (constraint->type->Is(RelationRole::kPosition) &&
                  PoseOf(ids[0]) != kNone && PoseOf(ids[1]) == kNone) {
         if (LandmarkOf(ids[1]) == kNone) {
           LandmarkOf(ids[1]) = static_cast<int>(landmarks_.size());

@@ -46,11 +46,12 @@ struct InitialGuessReport {
 };
 
 /// Sets the parameters of raw features from live measurements alone. Poses (and
-/// segments) come from relations whose RelationType::sighting is kPose, as the
-/// method says; landmarks seen as positions (kPosition) from the mean of where
+/// segments) come from relations with RelationRole::kPose, as the method says;
+/// landmarks seen as positions (RelationRole::kPosition) from the mean of where
 /// they are seen, or with kChordal from the linear solve; what else
 /// RelationType::place_second can place from the first relation, in the order
-/// of ids, whose other feature has a place.
+/// of ids, whose other feature has a place. The two roles are those of the
+/// plane, and so are the methods: in space place_second alone is used.
 ///
 /// Fixed features stay. In a connected part without any, the pose with the
 /// lowest id that has a prior is put there; without a prior the pose with the

@@ -44,9 +44,9 @@ LinearizedConstraint LinearizeByDelta(const Graph& graph,
                   std::sqrt(std::max(constraint.delta, kDeltaFloor)));
 }
 
-bool IsPose(const FeatureType& type) {
-  return type.parameter_names ==
-         std::vector<std::string>{"x m", "y m", "theta rad"};
+// Whether the parameters are a frame of the plane and nothing else.
+bool IsFrame(const FeatureType& type) {
+  return type.traits.leading == Leading::kFrame && type.size == 3;
 }
 
 }  // namespace
@@ -100,7 +100,7 @@ struct Marginals::Impl {
       entry->name = Describe(feature);
       entry->size = feature.type->size;
       entry->is_constant = feature.fixed;
-      entry->is_pose = IsPose(*feature.type);
+      entry->is_pose = IsFrame(*feature.type);
       if (entry->is_pose) entry->pose = Eigen::Vector3d(feature.data());
       entry->tangent_size = entry->size;
       if (feature.type->make_manifold) {

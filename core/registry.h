@@ -7,8 +7,11 @@
 #include <plumbline/core/constraint.h>
 #include <plumbline/core/feature.h>
 #include <plumbline/core/named_types.h>
+#include <plumbline/factors/quantity.h>
+#include <plumbline/factors/roles.h>
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <memory>
@@ -61,20 +64,25 @@ struct G2oEdgeFormat {
   std::function<void(double* expected)> write;
 };
 
-/// A kind of node.
+/// A kind of node. AddFeature (core/add_types.h) makes one of a struct that
+/// describes itself.
 struct FeatureType {
   static constexpr char kKind[] = "feature type";
   static constexpr char kTitle[] = "Feature types";
 
   /// Name in files and flags: "segment".
   std::string name;
-  /// Number of parameters, 1 to kMaxFeatureSize.
+  /// The parameters, in order, 1 to kMaxFeatureSize of them.
+  std::vector<Quantity> parameters;
+  /// How many there are; set by Registry::Register.
   int size = 0;
+  /// What it stands for, and what its parameters begin with.
+  FeatureTraits traits;
+  /// How many coordinates of Feature::anchor the parameters are relative to.
+  int anchor_size = 0;
   /// Tag of the vertex in g2o text; a tag of our own starts with PLUMBLINE_.
   std::string g2o_tag;
   std::vector<G2oVertexFormat> other_g2o_formats;
-  /// Names of the parameters with units, in order: {"x m", "y m", "theta rad"}.
-  std::vector<std::string> parameter_names;
   std::string description;
   /// Makes the manifold on which the parameters live; null when they are
   /// Euclidean. One instance may serve every block of the type.
@@ -86,6 +94,18 @@ struct FeatureType {
   std::function<void(const std::vector<const Feature*>& support,
                      Feature* feature)>
       update_extent;
+  /// The frame of a feature in the plane: x, y (m), theta (rad), in the map
+  /// frame. That of a wall lies on it, with x along it, and the extents count
+  /// from there. Register sets it for types whose parameters begin with it;
+  /// null when the type has none. Walls have to have one.
+  std::function<Eigen::Vector3d(const Feature& feature)> frame;
+
+  /// Whether features of the type stand for this.
+  bool Is(FeatureRole role) const { return traits.role == role; }
+  /// How many coordinates of an anchor files hold: two where it has fewer.
+  int written_anchor_size() const { return anchor_size > 2 ? anchor_size : 2; }
+  /// Whether the parameters begin with a position of the plane (x, y).
+  bool HasPosition() const { return traits.leading != Leading::kOther; }
 };
 
 /// What a relation's factory gets.
@@ -99,18 +119,8 @@ struct RelationArguments {
   std::vector<const Feature*> features;
 };
 
-/// What a relation's expected value says about its second feature, seen from
-/// the first, a pose, or about its only feature, in the map: enough for a start
-/// of the whole graph (core/initial_guess.h).
-enum class Sighting {
-  kNone,
-  /// Position and heading: x, y, theta.
-  kPose,
-  /// Position: x, y.
-  kPosition,
-};
-
-/// A kind of edge.
+/// A kind of edge. AddRelation (core/add_types.h) makes one of a functor that
+/// describes itself.
 struct RelationType {
   static constexpr char kKind[] = "relation";
   static constexpr char kTitle[] = "Relations";
@@ -122,20 +132,30 @@ struct RelationType {
   std::vector<G2oEdgeFormat> other_g2o_formats;
   /// For each feature in order the names of the types that fit there.
   std::vector<std::vector<std::string>> feature_types;
-  /// Rows of the residual; also the size of `expected`.
+  /// Rows of the residual before whitening, which are also those of `expected`
+  /// and of the information.
+  std::vector<Quantity> rows;
+  /// How many there are; set by Registry::Register.
   int residual_size = 0;
+  RelationRole role = RelationRole::kOther;
   /// Formula, units and source in one or two lines.
   std::string description;
   /// Makes the cost function; throws Error when the arguments do not fit.
   std::function<std::unique_ptr<ceres::CostFunction>(const RelationArguments&)>
       make_cost;
-  Sighting sighting = Sighting::kNone;
   /// For a relation of two features whose expected value tells all of the
   /// second, given the first: sets the second's parameters so that the residual
   /// is zero. Null when there is no such.
   std::function<void(const Eigen::VectorXd& expected, const Feature& first,
                      Feature* second)>
       place_second;
+
+  /// Whether it says this.
+  bool Is(RelationRole asked) const { return role == asked; }
+  /// Whether a feature of the type fits in a place, from 0.
+  bool Accepts(std::size_t place, const FeatureType& type) const;
+  /// What fits there, for messages: "point or pose".
+  std::string AcceptedNames(std::size_t place) const;
 };
 
 /// A weighting of structure constraints, by the name used in --delta_mode.
@@ -153,6 +173,20 @@ struct LossType {
       make_loss;
 };
 
+/// A number by which a detector is told how to work.
+struct DetectorParameter {
+  /// "sigma_deg".
+  std::string name;
+  double default_value = 0.0;
+  /// "m", "deg"; empty for a pure number.
+  std::string unit = {};
+  /// What it says, in a line.
+  std::string description = {};
+  /// The name is that of a list and has a number behind it, from 0: "angle_0",
+  /// "angle_1", ... None is there by default.
+  bool is_list = false;
+};
+
 /// A kind of structure detector.
 struct DetectorType {
   static constexpr char kKind[] = "detector";
@@ -161,14 +195,18 @@ struct DetectorType {
   /// Name in --hierarchy: "orientation_mixture".
   std::string name;
   std::string description;
-  /// Names of the feature types that it reads, and of those that it makes
-  /// (empty when it proposes constraints only).
+  /// Names of the feature types that it reads, at least one, and of those that
+  /// it makes (empty when it proposes constraints only).
   std::vector<std::string> reads;
   std::vector<std::string> makes;
-  /// Parameters with their defaults; the factory gets all of them.
-  DetectorParameters defaults;
+  std::vector<DetectorParameter> parameters;
+  /// Makes a detector with these parameters, the others at their defaults.
+  /// Throws Error for unknown names and values out of range.
   std::function<std::unique_ptr<StructureDetector>(const DetectorParameters&)>
       make;
+
+  /// The parameters that are no lists, at their defaults.
+  DetectorParameters defaults() const;
 };
 
 /// The plug-ins by name: the kinds that core works with, and any other that a
@@ -185,7 +223,8 @@ class Registry {
   static Registry& Global();
 
   /// Adds a plug-in. Throws Error when the name or tag is empty, has white
-  /// space, or is taken. The returned reference is stable.
+  /// space, or is taken, and when a field is missing or does not fit, which it
+  /// names. The returned reference is stable.
   const FeatureType& Register(FeatureType type);
   const RelationType& Register(RelationType type);
   const LossType& Register(LossType type);
@@ -217,6 +256,12 @@ class Registry {
   const Type& Get(const std::string& name) const {
     return List<Type>().Get(name);
   }
+  /// The relation that says this of features of two types, the first in the
+  /// order of names; null when there is none, or an Error.
+  const RelationType* FindRelation(RelationRole role, const FeatureType& first,
+                                   const FeatureType& second) const;
+  const RelationType& GetRelation(RelationRole role, const FeatureType& first,
+                                  const FeatureType& second) const;
   /// By g2o tag, that of another format included; null when there is none.
   const FeatureType* FindFeatureByTag(const std::string& tag) const;
   const RelationType* FindRelationByTag(const std::string& tag) const;

@@ -84,20 +84,15 @@ ceres::SparseLinearAlgebraLibraryType SparseLibrary() {
 // What the session knows of a feature type.
 struct TypeInfo {
   std::unique_ptr<ceres::Manifold> manifold;
-  // Indices of the parameters that are angles (named with the unit rad).
+  // Indices of the parameters that are angles.
   std::vector<int> angles;
 };
-
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() &&
-         text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 TypeInfo MakeTypeInfo(const FeatureType& type) {
   TypeInfo info;
   if (type.make_manifold) info.manifold = type.make_manifold();
-  for (std::size_t i = 0; i < type.parameter_names.size(); ++i) {
-    if (EndsWith(type.parameter_names[i], " rad")) {
+  for (std::size_t i = 0; i < type.parameters.size(); ++i) {
+    if (type.parameters[i].is_angle) {
       info.angles.push_back(static_cast<int>(i));
     }
   }

@@ -20,17 +20,9 @@ Wall MakeWall(const Pose2& pose, double begin, double end) {
 }
 
 std::optional<Wall> WallOf(const Feature& feature) {
-  const auto& p = feature.parameters;
-  if (feature.type->name == "segment") {
-    return MakeWall(Eigen::Vector2d(p[0], p[1]), p[2], feature.extent_begin,
-                    feature.extent_end);
-  }
-  if (feature.type->name == "line") {
-    return MakeWall(
-        FootPoint({feature.anchor[0], feature.anchor[1]}, p[0], p[1]), p[1],
-        feature.extent_begin, feature.extent_end);
-  }
-  return std::nullopt;
+  if (!feature.type->Is(FeatureRole::kWall)) return std::nullopt;
+  return MakeWall(feature.type->frame(feature), feature.extent_begin,
+                  feature.extent_end);
 }
 
 }  // namespace plumbline

@@ -69,8 +69,9 @@ Wall MakeWall(const Eigen::Vector2d& position, double angle, double begin,
 /// A pose on the wall, x along it.
 Wall MakeWall(const Pose2& pose, double begin, double end);
 
-/// The wall that a "segment" or "line" is; none for other types. The visible
-/// part is the feature's extent as it stands, which may be empty or infinite.
+/// The wall that a feature is; none for one without FeatureRole::kWall. The
+/// visible part is the feature's extent as it stands, which may be empty or
+/// infinite.
 std::optional<Wall> WallOf(const Feature& feature);
 
 }  // namespace plumbline

@@ -113,11 +113,17 @@ std::vector<Eigen::Vector2d> Cluster(const std::vector<Circle>& circles,
   return means;
 }
 
-CenterClusterOptions ReadCenterOptions(const ParameterReader& reader) {
-  CenterClusterOptions options;
-  options.gate = reader.Get("gate", 1e-6);
-  options.sigma = reader.Get("sigma", 1e-6);
-  return options;
+void BindCenters(ParameterBinder* parameters, CenterClusterOptions* options) {
+  parameters->Length("gate", &options->gate, 1e-6, ParameterBinder::kNoLimit,
+                     "how near to a common centre a circle's centre has it");
+  parameters->Length("sigma", &options->sigma, 1e-6, ParameterBinder::kNoLimit,
+                     "tolerance of a centre against the common one");
+}
+
+void BindClusters(ParameterBinder* parameters, CenterClusterOptions* options) {
+  BindCenters(parameters, options);
+  parameters->Count("minimum_support", &options->minimum_support, 2,
+                    "fewest circles that make a common centre");
 }
 
 }  // namespace
@@ -130,12 +136,13 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
                                   const DetectionScope& scope) const {
   std::vector<Circle> circles;
   const auto consider = [&](const Feature& feature) {
-    if (feature.level != scope.level || feature.type->name != "circle") return;
+    if (feature.level != scope.level || !feature.type->Is(FeatureRole::kCircle))
+      return;
     for (const ConstraintId id : graph.ConstraintsOf(feature.id)) {
       const Constraint& constraint = graph.GetConstraint(id);
       if (constraint.state != ConstraintState::kLive ||
           constraint.kind != ConstraintClass::kStructure ||
-          constraint.type->name != "point_point_coincidence") {
+          !constraint.type->Is(RelationRole::kCoincidence)) {
         continue;
       }
       for (const FeatureId other_id : constraint.features) {
@@ -173,7 +180,9 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
     const Feature& feature = graph.GetFeature(id);
     const Eigen::Vector2d position(feature.parameters[0],
                                    feature.parameters[1]);
-    if (feature.type->name != "point" || !position.allFinite()) continue;
+    if (!feature.type->Is(FeatureRole::kPoint) || !position.allFinite()) {
+      continue;
+    }
     centers.Add(position);
     ids.push_back(id);
   }
@@ -247,7 +256,6 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
 }
 
 DetectorType CenterClusterType() {
-  const CenterClusterOptions defaults;
   DetectorType type;
   type.name = kClusterName;
   type.description =
@@ -255,22 +263,16 @@ DetectorType CenterClusterType() {
       "centre of gravity";
   type.reads = {"circle"};
   type.makes = {"point"};
-  type.defaults = {
-      {"gate", defaults.gate},
-      {"sigma", defaults.sigma},
-      {"minimum_support", static_cast<double>(defaults.minimum_support)},
-  };
-  type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kClusterName, known, given);
-    CenterClusterOptions options = ReadCenterOptions(reader);
-    options.minimum_support = reader.GetInt("minimum_support", 2);
-    return std::make_unique<CenterCluster>(kClusterName, options);
-  };
+  SetParameters<CenterClusterOptions>(
+      BindClusters,
+      [](const CenterClusterOptions& options) {
+        return std::make_unique<CenterCluster>(kClusterName, options);
+      },
+      &type);
   return type;
 }
 
 DetectorType CircleCenterType() {
-  const CenterClusterOptions defaults;
   DetectorType type;
   type.name = kCenterName;
   type.description =
@@ -278,13 +280,13 @@ DetectorType CircleCenterType() {
       "through them";
   type.reads = {"circle"};
   type.makes = {"point"};
-  type.defaults = {{"gate", defaults.gate}, {"sigma", defaults.sigma}};
-  type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kCenterName, known, given);
-    CenterClusterOptions options = ReadCenterOptions(reader);
-    options.minimum_support = 1;
-    return std::make_unique<CenterCluster>(kCenterName, options);
-  };
+  SetParameters<CenterClusterOptions>(
+      BindCenters,
+      [](CenterClusterOptions options) {
+        options.minimum_support = 1;
+        return std::make_unique<CenterCluster>(kCenterName, options);
+      },
+      &type);
   return type;
 }
 

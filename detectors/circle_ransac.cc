@@ -33,11 +33,12 @@ DetectorType CircleRansacType() {
       "be expected by chance";
   type.reads = {"point"};
   type.makes = {"circle"};
-  type.defaults = CurveSearchDefaults();
-  type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kName, known, given);
-    return std::make_unique<CircleRansac>(ReadCurveSearchOptions(reader));
-  };
+  SetParameters<CurveSearchOptions>(
+      BindCurveSearch,
+      [](const CurveSearchOptions& options) {
+        return std::make_unique<CircleRansac>(options);
+      },
+      &type);
   return type;
 }
 

@@ -118,12 +118,13 @@ class CurveDetection {
         }
         const Feature& feature = graph.GetFeature(constraint.features[1]);
         PlanarCurve curve;
-        if (constraint.type->name == "point_line_distance") {
+        if (!constraint.type->Is(RelationRole::kOnCurve)) continue;
+        if (feature.type->Is(FeatureRole::kWall)) {
+          const Eigen::Vector3d frame = feature.type->frame(feature);
           curve.kind = CurveKind::kLine;
-          curve.direction = feature.parameters[1];
-          curve.position = FootPoint({feature.anchor[0], feature.anchor[1]},
-                                     feature.parameters[0], curve.direction);
-        } else if (constraint.type->name == "point_circle_distance") {
+          curve.position = frame.head<2>();
+          curve.direction = frame[2];
+        } else if (feature.type->Is(FeatureRole::kCircle)) {
           curve.kind = CurveKind::kCircle;
           curve.position = {feature.parameters[0], feature.parameters[1]};
           curve.radius = feature.parameters[2];
@@ -541,39 +542,33 @@ Transaction DetectCurves(const Graph& graph, const Registry& registry,
       .Propose(graph, registry, scope.level, source);
 }
 
-DetectorParameters CurveSearchDefaults() {
-  const CurveSearchOptions defaults;
-  return {
-      {"tolerance", defaults.tolerance},
-      {"sigma", defaults.sigma},
-      {"gate", defaults.gate},
-      {"max_log_false_alarms", defaults.max_log_false_alarms},
-      {"max_gap_points", static_cast<double>(defaults.max_gap_points)},
-      {"max_gap", defaults.max_gap},
-      {"min_line_points", static_cast<double>(defaults.min_line_points)},
-      {"min_circle_points", static_cast<double>(defaults.min_circle_points)},
-      {"min_arc_deg", RadToDeg(defaults.min_arc)},
-      {"min_corner_deg", RadToDeg(defaults.min_corner)},
-      {"max_radius", defaults.max_radius},
-      {"reach", static_cast<double>(defaults.reach)},
-  };
-}
-
-CurveSearchOptions ReadCurveSearchOptions(const ParameterReader& reader) {
-  CurveSearchOptions options;
-  options.tolerance = reader.Get("tolerance", 1e-6);
-  options.sigma = reader.Get("sigma", 1e-6);
-  options.gate = reader.Get("gate", 1e-6);
-  options.max_log_false_alarms = reader.Get("max_log_false_alarms");
-  options.max_gap_points = reader.GetInt("max_gap_points", 0);
-  options.max_gap = reader.Get("max_gap", 0.0);
-  options.min_line_points = reader.GetInt("min_line_points", 3);
-  options.min_circle_points = reader.GetInt("min_circle_points", 4);
-  options.min_arc = DegToRad(reader.Get("min_arc_deg", 0.0, 360.0));
-  options.min_corner = DegToRad(reader.Get("min_corner_deg", 0.0, 90.0));
-  options.max_radius = reader.Get("max_radius", 0.0);
-  options.reach = reader.GetInt("reach", 0);
-  return options;
+void BindCurveSearch(ParameterBinder* parameters, CurveSearchOptions* options) {
+  ParameterBinder& p = *parameters;
+  p.Length("tolerance", &options->tolerance, 1e-6, ParameterBinder::kNoLimit,
+           "points farther from a curve never support it when it is found");
+  p.Length("sigma", &options->sigma, 1e-6, ParameterBinder::kNoLimit,
+           "tolerance of a point against its curve");
+  p.Length("gate", &options->gate, 1e-6, ParameterBinder::kNoLimit,
+           "how near to a curve a connected point joins it");
+  p.Number("max_log_false_alarms", &options->max_log_false_alarms,
+           -ParameterBinder::kNoLimit, ParameterBinder::kNoLimit, "",
+           "log10 of the curves that 1,000 points may show by chance");
+  p.Count("max_gap_points", &options->max_gap_points, 0,
+          "points between two that support a curve and do not, at most");
+  p.Length("max_gap", &options->max_gap, 0.0, ParameterBinder::kNoLimit,
+           "longest part of a line without a point");
+  p.Count("min_line_points", &options->min_line_points, 3,
+          "fewest points of a line");
+  p.Count("min_circle_points", &options->min_circle_points, 4,
+          "fewest points of a circle");
+  p.Angle("min_arc_deg", &options->min_arc, 0.0, 360.0,
+          "least arc over which the points of a circle reach");
+  p.Angle("min_corner_deg", &options->min_corner, 0.0, 90.0,
+          "lines that touch at less are one, bent by drift");
+  p.Length("max_radius", &options->max_radius, 0.0, ParameterBinder::kNoLimit,
+           "largest circle");
+  p.Count("reach", &options->reach, 0,
+          "constraints from a listed point to those that are taken along");
 }
 
 }  // namespace plumbline

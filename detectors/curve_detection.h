@@ -29,10 +29,8 @@ Transaction DetectCurves(const Graph& graph, const Registry& registry,
                          const std::string& source,
                          const CurveSearchOptions& options);
 
-/// The parameters that both detectors have, with their defaults, and the
-/// options that they give. Angles in degrees.
-DetectorParameters CurveSearchDefaults();
-CurveSearchOptions ReadCurveSearchOptions(const ParameterReader& reader);
+/// The parameters that both detectors have.
+void BindCurveSearch(ParameterBinder* parameters, CurveSearchOptions* options);
 
 }  // namespace plumbline
 

@@ -32,11 +32,12 @@ DetectorType LineRansacType() {
       "be expected by chance";
   type.reads = {"point"};
   type.makes = {"line"};
-  type.defaults = CurveSearchDefaults();
-  type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kName, known, given);
-    return std::make_unique<LineRansac>(ReadCurveSearchOptions(reader));
-  };
+  SetParameters<CurveSearchOptions>(
+      BindCurveSearch,
+      [](const CurveSearchOptions& options) {
+        return std::make_unique<LineRansac>(options);
+      },
+      &type);
   return type;
 }
 

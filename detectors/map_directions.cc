@@ -12,7 +12,7 @@
 namespace plumbline {
 namespace {
 
-// Index of the direction among the parameters of a planar pose (x, y, theta).
+// Index of the direction among the parameters of a frame (x, y, theta).
 constexpr int kDirection = 2;
 // Eigenvalues of the information of the position below this share of the
 // largest one are rounding.
@@ -24,7 +24,9 @@ constexpr int kSighted = 1;
 constexpr int kPasses = 3;
 
 bool HasDirection(const Feature& feature) {
-  return feature.type->name == "segment" || feature.type->name == "pose";
+  return feature.type->traits.leading == Leading::kFrame &&
+         (feature.type->Is(FeatureRole::kPose) ||
+          feature.type->Is(FeatureRole::kWall));
 }
 
 // Information of the direction (third row) when the first two are open.
@@ -53,7 +55,7 @@ Difference DirectionOf(const Constraint& constraint, const Feature& first,
   using RowMajor =
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Difference difference;
-  if (constraint.type->sighting == Sighting::kPose) {
+  if (constraint.type->Is(RelationRole::kPose)) {
     // The expected value is the relative pose.
     difference.angle = constraint.expected[kDirection];
     difference.information = WithoutPosition(constraint.information);
@@ -133,7 +135,7 @@ MapDirections CollectDirections(const Graph& graph,
       if (difference.information <= 0.0) continue;
       const double variance = 1.0 / difference.information;
       if (!(variance < DirectionNetwork::kUnknownVariance)) continue;
-      const bool is_sighting = constraint.type->sighting != Sighting::kPose;
+      const bool is_sighting = !constraint.type->Is(RelationRole::kPose);
       result.constraints.push_back(constraint_id);
       result.has_sightings = result.has_sightings || is_sighting;
       result.network.AddLink(node, second->second, difference.angle, variance,
@@ -173,7 +175,7 @@ void AddOrientations(const Graph& graph, double sigma_of_one_metre,
     for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
       const Constraint& constraint = graph.GetConstraint(constraint_id);
       if (constraint.state != ConstraintState::kLive ||
-          constraint.type->name != "segment_orientation") {
+          !constraint.type->Is(RelationRole::kDirection)) {
         continue;
       }
       const FeatureId orientation = constraint.features[1];

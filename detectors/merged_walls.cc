@@ -71,16 +71,14 @@ std::vector<MergedWall> MergeWalls(const Graph& graph) {
   std::vector<const Feature*> walls;
   std::map<FeatureId, std::size_t> index;
   for (const Feature* feature : graph.Features()) {
-    if (feature->type->name != "segment" && feature->type->name != "line") {
-      continue;
-    }
+    if (!feature->type->Is(FeatureRole::kWall)) continue;
     index[feature->id] = walls.size();
     walls.push_back(feature);
   }
   DisjointSets sets(walls.size());
   for (const Constraint* constraint : graph.Constraints()) {
     if (constraint->state != ConstraintState::kLive ||
-        constraint->type->name != kSameWallRelation) {
+        !constraint->type->Is(RelationRole::kSameWall)) {
       continue;
     }
     sets.Join(index.at(constraint->features[0]),
@@ -98,9 +96,8 @@ std::vector<MergedWall> MergeWalls(const Graph& graph) {
     std::vector<WallPiece> pieces;
     for (const Feature* member : members) {
       wall.members.push_back(member->id);
-      pieces.push_back({Pose2(member->parameters[0], member->parameters[1],
-                              member->parameters[2]),
-                        member->extent_begin, member->extent_end});
+      pieces.push_back({member->type->frame(*member), member->extent_begin,
+                        member->extent_end});
       if (member != members.front()) {
         wall.wall.observations += member->observations;
       }

@@ -25,13 +25,6 @@ struct Candidate {
   double expected;
 };
 
-// Index of the direction among the parameters; -1 for types without one.
-int DirectionParameter(const Feature& feature) {
-  if (feature.type->name == "segment") return 2;
-  if (feature.type->name == "line") return 1;
-  return -1;
-}
-
 double LengthOf(const Feature& feature) {
   const double length = feature.extent_end - feature.extent_begin;
   return length == 0.0 ? 1.0 : std::abs(length);
@@ -50,8 +43,8 @@ bool IsTied(const Graph& graph, const Feature& feature, int level) {
     if (!IsLiveStructure(constraint)) continue;
     for (const FeatureId other_id : constraint.features) {
       const Feature& other = graph.GetFeature(other_id);
-      if (other.type->name == "orientation" ||
-          (other.type->name == "rectangle" && other.level <= level)) {
+      if (other.type->Is(FeatureRole::kDirection) ||
+          (other.type->Is(FeatureRole::kRectangle) && other.level <= level)) {
         return true;
       }
     }
@@ -68,9 +61,8 @@ class CandidateList {
 
   void Consider(const Feature& feature) {
     if (feature.level > level_) return;
-    if (feature.type->name == "rectangle") return AddRectangle(feature);
-    const int parameter = DirectionParameter(feature);
-    if (parameter < 0) return;
+    if (feature.type->Is(FeatureRole::kRectangle)) return AddRectangle(feature);
+    if (!feature.type->Is(FeatureRole::kWall)) return;
     if (LengthOf(feature) < options_.min_length) {
       ++short_;
       return;
@@ -79,8 +71,9 @@ class CandidateList {
       ++tied_;
       return;
     }
-    candidates_.push_back({&feature, feature.parameters[parameter], 0.0});
-    AddSample(feature.parameters[parameter], LengthOf(feature));
+    const double direction = feature.type->frame(feature)[2];
+    candidates_.push_back({&feature, direction, 0.0});
+    AddSample(direction, LengthOf(feature));
   }
 
   const std::vector<Candidate>& candidates() const { return candidates_; }
@@ -107,7 +100,7 @@ class CandidateList {
     for (const ConstraintId id : graph_.ConstraintsOf(rectangle.id)) {
       const Constraint& constraint = graph_.GetConstraint(id);
       if (IsLiveStructure(constraint) &&
-          constraint.type->name == "rectangle_orientation") {
+          constraint.type->Is(RelationRole::kDirection)) {
         is_tied[is_across(constraint.expected[0])] = true;
       }
     }
@@ -120,8 +113,7 @@ class CandidateList {
     for (const ConstraintId id : graph_.ConstraintsOf(rectangle.id)) {
       const Constraint& constraint = graph_.GetConstraint(id);
       if (!IsLiveStructure(constraint) ||
-          (constraint.type->name != "segment_rectangle" &&
-           constraint.type->name != "line_rectangle") ||
+          !constraint.type->Is(RelationRole::kSide) ||
           is_tied[is_across(constraint.expected[1])]) {
         continue;
       }
@@ -142,6 +134,46 @@ class CandidateList {
   std::int64_t short_ = 0;
   std::int64_t tied_ = 0;
 };
+
+void Bind(ParameterBinder* parameters, OrientationMixtureOptions* options) {
+  ParameterBinder& p = *parameters;
+  constexpr double kNoLimit = ParameterBinder::kNoLimit;
+  p.Angle("sigma_deg", &options->sigma, 1e-6, 90.0,
+          "tolerance of a wall against its orientation");
+  p.Length("min_length", &options->min_length, 0.0, kNoLimit,
+           "shortest wall that is looked at");
+  p.Angle("direction_noise_deg", &options->direction_noise, 0.0, 90.0,
+          "noise of the direction of a wall of 1 m");
+  AxialMixtureOptions& mixture = options->mixture;
+  p.Angle("gate_deg", &mixture.gate, 0.1, 45.0,
+          "how near to an orientation a wall joins it");
+  p.Angle("max_stddev_deg", &mixture.max_stddev, 0.1, 45.0,
+          "widest spread of the walls of one orientation");
+  p.Angle("min_separation_deg", &mixture.min_separation, 0.1, 45.0,
+          "orientations nearer to each other are one");
+  p.Count("min_support", &mixture.min_support, 2,
+          "fewest walls that make an orientation");
+  p.Length("min_support_length", &mixture.min_support_length, 0.0, kNoLimit,
+           "least length of wall that makes one");
+  p.Number("significance", &mixture.significance, 1e-300, 1.0, "",
+           "chance at which clutter may look like an orientation");
+  p.Number("min_contrast", &mixture.min_contrast, 1.0, kNoLimit, "",
+           "density of walls at an orientation over that beside it");
+  p.Number("normality_significance", &mixture.normality_significance, 0.0, 1.0,
+           "", "chance at which one orientation may be split");
+  p.Angle("own_direction_noise_deg", &options->own_direction_noise, 0.0, 90.0,
+          "how far the visible part of a wall of 1 m may be off its direction");
+  p.Number("innovation_gate", &options->assignment.gate, 0.0, kNoLimit, "",
+           "largest chi-square of the innovation of a new tie");
+  p.Number("breaking_gate", &options->assignment.breaking_gate, 0.0, kNoLimit,
+           "", "chi-square of its innovation beyond which a tie is broken");
+  p.Number("split_gate", &options->assignment.split_gate, 0.0, kNoLimit, "",
+           "chi-square at which two orientations are two, not one");
+  p.Number("link_sigma_scale", &options->links.sigma_scale, 1e-3, kNoLimit, "",
+           "factor of the standard deviations of the map's links");
+  p.Angle("link_sigma_floor_deg", &options->links.sigma_floor, 0.0, 90.0,
+          "no link is known better than this");
+}
 
 }  // namespace
 
@@ -166,7 +198,7 @@ WallTie TieOf(const Graph& graph, FeatureId wall) {
     const Constraint& constraint = graph.GetConstraint(id);
     if (!IsLiveStructure(constraint)) continue;
     for (const FeatureId other : constraint.features) {
-      if (graph.GetFeature(other).type->name == "orientation") {
+      if (graph.GetFeature(other).type->Is(FeatureRole::kDirection)) {
         return {id, other};
       }
     }
@@ -194,7 +226,7 @@ JudgedWalls CollectJudgedWalls(const Graph& graph, const DetectionScope& scope,
   if (!map.has_sightings) return judged;
   for (const auto& [id, node] : map.nodes) {
     const Feature& feature = graph.GetFeature(id);
-    if (DirectionParameter(feature) < 0 || feature.level > scope.level ||
+    if (!feature.type->Is(FeatureRole::kWall) || feature.level > scope.level ||
         LengthOf(feature) < options.min_length || !map.network.HasLinks(node)) {
       continue;
     }
@@ -265,15 +297,19 @@ Transaction OrientationMixture::Detect(const Graph& graph,
   std::vector<double> directions;
   for (const FeatureId id : graph.VirtualFeatures(scope.level + 1)) {
     const Feature& feature = graph.GetFeature(id);
-    if (feature.type->name != "orientation") continue;
+    if (!feature.type->Is(FeatureRole::kDirection)) continue;
     orientations.push_back(id);
     directions.push_back(feature.parameters[0]);
   }
 
+  const FeatureType& orientation_type = registry.GetFeature("orientation");
   const auto tie = [&](const Feature& wall, FeatureId orientation,
                        double expected) {
+    const RelationType* relation = registry.FindRelation(
+        RelationRole::kDirection, *wall.type, orientation_type);
+    if (relation == nullptr) return;
     Constraint constraint;
-    constraint.type = &registry.GetRelation(wall.type->name + "_orientation");
+    constraint.type = relation;
     constraint.features = {wall.id, orientation};
     constraint.expected = Eigen::VectorXd::Constant(1, expected);
     constraint.information = Eigen::MatrixXd::Constant(
@@ -284,7 +320,7 @@ Transaction OrientationMixture::Detect(const Graph& graph,
   };
   const auto add_orientation = [&](double angle) {
     Feature orientation;
-    orientation.type = &registry.GetFeature("orientation");
+    orientation.type = &orientation_type;
     orientation.level = scope.level + 1;
     orientation.is_virtual = true;
     orientation.parameters[0] = angle;
@@ -366,7 +402,6 @@ Transaction OrientationMixture::Detect(const Graph& graph,
 }
 
 DetectorType OrientationMixtureType() {
-  const OrientationMixtureOptions defaults;
   DetectorType type;
   type.name = kName;
   type.description =
@@ -374,53 +409,12 @@ DetectorType OrientationMixtureType() {
       "unknown size over clutter, split by the K^2 test of normality";
   type.reads = {"segment", "line", "rectangle"};
   type.makes = {"orientation"};
-  type.defaults = {
-      {"sigma_deg", RadToDeg(defaults.sigma)},
-      {"min_length", defaults.min_length},
-      {"direction_noise_deg", RadToDeg(defaults.direction_noise)},
-      {"gate_deg", RadToDeg(defaults.mixture.gate)},
-      {"max_stddev_deg", RadToDeg(defaults.mixture.max_stddev)},
-      {"min_separation_deg", RadToDeg(defaults.mixture.min_separation)},
-      {"min_support", static_cast<double>(defaults.mixture.min_support)},
-      {"min_support_length", defaults.mixture.min_support_length},
-      {"significance", defaults.mixture.significance},
-      {"min_contrast", defaults.mixture.min_contrast},
-      {"normality_significance", defaults.mixture.normality_significance},
-      {"own_direction_noise_deg", RadToDeg(defaults.own_direction_noise)},
-      {"innovation_gate", defaults.assignment.gate},
-      {"breaking_gate", defaults.assignment.breaking_gate},
-      {"split_gate", defaults.assignment.split_gate},
-      {"link_sigma_scale", defaults.links.sigma_scale},
-      {"link_sigma_floor_deg", RadToDeg(defaults.links.sigma_floor)},
-  };
-  type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kName, known, given);
-    OrientationMixtureOptions options;
-    options.sigma = DegToRad(reader.Get("sigma_deg", 1e-6, 90.0));
-    options.min_length = reader.Get("min_length", 0.0);
-    options.direction_noise =
-        DegToRad(reader.Get("direction_noise_deg", 0.0, 90.0));
-    options.mixture.gate = DegToRad(reader.Get("gate_deg", 0.1, 45.0));
-    options.mixture.max_stddev =
-        DegToRad(reader.Get("max_stddev_deg", 0.1, 45.0));
-    options.mixture.min_separation =
-        DegToRad(reader.Get("min_separation_deg", 0.1, 45.0));
-    options.mixture.min_support = reader.GetInt("min_support", 2);
-    options.mixture.min_support_length = reader.Get("min_support_length", 0.0);
-    options.mixture.significance = reader.Get("significance", 1e-300, 1.0);
-    options.mixture.min_contrast = reader.Get("min_contrast", 1.0);
-    options.mixture.normality_significance =
-        reader.Get("normality_significance", 0.0, 1.0);
-    options.own_direction_noise =
-        DegToRad(reader.Get("own_direction_noise_deg", 0.0, 90.0));
-    options.assignment.gate = reader.Get("innovation_gate", 0.0);
-    options.assignment.breaking_gate = reader.Get("breaking_gate", 0.0);
-    options.assignment.split_gate = reader.Get("split_gate", 0.0);
-    options.links.sigma_scale = reader.Get("link_sigma_scale", 1e-3);
-    options.links.sigma_floor =
-        DegToRad(reader.Get("link_sigma_floor_deg", 0.0, 90.0));
-    return std::make_unique<OrientationMixture>(options);
-  };
+  SetParameters<OrientationMixtureOptions>(
+      Bind,
+      [](const OrientationMixtureOptions& options) {
+        return std::make_unique<OrientationMixture>(options);
+      },
+      &type);
   return type;
 }
 

@@ -5,11 +5,12 @@
 #include <plumbline/detectors/parameters.h>
 
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -17,6 +18,53 @@ namespace {
 constexpr char kName[] = "orientation_relation";
 constexpr char kAnglePrefix[] = "angle_";
 constexpr char kAngleSigmaPrefix[] = "angle_sigma_deg_";
+
+void Bind(ParameterBinder* parameters, OrientationRelationOptions* options) {
+  ParameterBinder& p = *parameters;
+  p.Angle("gate_deg", &options->gate, 0.0, 45.0,
+          "how near to an expected angle two orientations are related");
+  p.Angle("sigma_deg", &options->sigma, 1e-6, 90.0,
+          "tolerance of the relation");
+  p.Count("max_relations", &options->max_relations, 1,
+          "orientations before it that one is related to, at most");
+  p.Number("innovation_gate", &options->innovation_gate, 0.0,
+           ParameterBinder::kNoLimit, "",
+           "largest chi-square of the innovation of a relation");
+  p.Number("link_sigma_scale", &options->links.sigma_scale, 1e-3,
+           ParameterBinder::kNoLimit, "",
+           "factor of the standard deviations of the map's links");
+  std::map<std::string, double> angles;
+  p.AngleList(kAnglePrefix, &angles, -360.0, 360.0, "angles that are expected");
+  std::map<std::string, double> sigmas;
+  p.AngleList(kAngleSigmaPrefix, &sigmas, 1e-6, 90.0,
+              "tolerances of the angles that have one of their own");
+  double resolution = 0.0;
+  p.Number("resolution_deg", &resolution, 0.0, 180.0, "deg",
+           "its multiples are expected as well; 0: they are not");
+  for (const auto& [number, unused] : sigmas) {
+    if (angles.count(number) > 0) continue;
+    throw PLUMBLINE_ERROR(std::string(kName) + ": " + kAngleSigmaPrefix +
+                              number + " is of no angle",
+                          kAnglePrefix + number);
+  }
+  if (resolution > 0.0 && resolution < 0.01) {
+    throw PLUMBLINE_ERROR(std::string(kName) + ": resolution_deg is " +
+                              std::to_string(resolution),
+                          "0, or at least 0.01");
+  }
+  std::vector<double> expected;
+  for (const auto& [number, angle] : angles) {
+    expected.push_back(angle);
+    const auto own = sigmas.find(number);
+    options->angle_sigmas.push_back(own == sigmas.end() ? 0.0 : own->second);
+  }
+  if (resolution > 0.0) {
+    for (int i = 0; i * resolution < 180.0 - 1e-9; ++i) {
+      expected.push_back(DegToRad(i * resolution));
+    }
+  }
+  if (!expected.empty()) options->angles = std::move(expected);
+}
 
 }  // namespace
 
@@ -48,7 +96,8 @@ Transaction OrientationRelation::Detect(const Graph& graph,
                                         const DetectionScope& scope) const {
   std::vector<const Feature*> orientations;
   const auto consider = [&](const Feature& feature) {
-    if (feature.level == scope.level && feature.type->name == "orientation") {
+    if (feature.level == scope.level &&
+        feature.type->Is(FeatureRole::kDirection)) {
       orientations.push_back(&feature);
     }
   };
@@ -105,7 +154,7 @@ Transaction OrientationRelation::Detect(const Graph& graph,
     for (const ConstraintId id : graph.ConstraintsOf(second.id)) {
       const Constraint& constraint = graph.GetConstraint(id);
       if (constraint.state != ConstraintState::kLive ||
-          constraint.type->name != "orientation_orientation") {
+          !constraint.type->Is(RelationRole::kAngle)) {
         continue;
       }
       related.insert(constraint.features.begin(), constraint.features.end());
@@ -134,7 +183,8 @@ Transaction OrientationRelation::Detect(const Graph& graph,
         continue;
       }
       Constraint constraint;
-      constraint.type = &registry.GetRelation("orientation_orientation");
+      constraint.type = &registry.GetRelation(RelationRole::kAngle, *first.type,
+                                              *second.type);
       constraint.features = {first.id, second.id};
       constraint.expected =
           Eigen::VectorXd::Constant(1, options_.angles[nearest]);
@@ -156,65 +206,18 @@ Transaction OrientationRelation::Detect(const Graph& graph,
 }
 
 DetectorType OrientationRelationType() {
-  const OrientationRelationOptions defaults;
   DetectorType type;
   type.name = kName;
   type.description =
       "Relations between orientations at allowed angles: angle_0, angle_1, ... "
       "in degrees (0, 45, 90, 135), or the multiples of resolution_deg";
   type.reads = {"orientation"};
-  type.defaults = {
-      {"gate_deg", RadToDeg(defaults.gate)},
-      {"sigma_deg", RadToDeg(defaults.sigma)},
-      {"resolution_deg", 0.0},
-      {"max_relations", static_cast<double>(defaults.max_relations)},
-      {"innovation_gate", defaults.innovation_gate},
-      {"link_sigma_scale", defaults.links.sigma_scale},
-  };
-  type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kName, known, given,
-                                 {kAnglePrefix, kAngleSigmaPrefix});
-    OrientationRelationOptions options;
-    options.gate = DegToRad(reader.Get("gate_deg", 0.0, 45.0));
-    options.sigma = DegToRad(reader.Get("sigma_deg", 1e-6, 90.0));
-    options.max_relations = reader.GetInt("max_relations", 1);
-    options.innovation_gate = reader.Get("innovation_gate", 0.0);
-    options.links.sigma_scale = reader.Get("link_sigma_scale", 1e-3);
-    std::vector<double> angles;
-    std::vector<double> sigmas;
-    for (const auto& [name, value] : reader.values()) {
-      if (name.rfind(kAngleSigmaPrefix, 0) == 0) {
-        const std::string number =
-            name.substr(std::string(kAngleSigmaPrefix).size());
-        if (reader.values().count(kAnglePrefix + number) == 0) {
-          throw PLUMBLINE_ERROR(
-              std::string(kName) + ": " + name + " is of no angle",
-              kAnglePrefix + number);
-        }
-      } else if (name.rfind(kAnglePrefix, 0) == 0) {
-        angles.push_back(DegToRad(reader.Get(name, -360.0, 360.0)));
-        const std::string own =
-            kAngleSigmaPrefix + name.substr(std::string(kAnglePrefix).size());
-        sigmas.push_back(reader.values().count(own) > 0
-                             ? DegToRad(reader.Get(own, 1e-6, 90.0))
-                             : 0.0);
-      }
-    }
-    const double resolution = reader.Get("resolution_deg", 0.0, 180.0);
-    if (resolution > 0.0) {
-      if (resolution < 0.01) {
-        throw PLUMBLINE_ERROR(std::string(kName) + ": resolution_deg is " +
-                                  std::to_string(resolution),
-                              "0, or at least 0.01");
-      }
-      for (int i = 0; i * resolution < 180.0 - 1e-9; ++i) {
-        angles.push_back(DegToRad(i * resolution));
-      }
-    }
-    if (!angles.empty()) options.angles = std::move(angles);
-    options.angle_sigmas = std::move(sigmas);
-    return std::make_unique<OrientationRelation>(std::move(options));
-  };
+  SetParameters<OrientationRelationOptions>(
+      Bind,
+      [](const OrientationRelationOptions& options) {
+        return std::make_unique<OrientationRelation>(options);
+      },
+      &type);
   return type;
 }
 

@@ -1,8 +1,9 @@
 #include <plumbline/core/error.h>
 #include <plumbline/detectors/parameters.h>
+#include <plumbline/factors/angle.h>
 
-#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <sstream>
 #include <utility>
 
@@ -22,63 +23,98 @@ std::string Text(double value) {
   return text.str();
 }
 
+// "of at least 0 and at most 1".
+std::string Range(double minimum, double maximum) {
+  std::string range = "a finite number";
+  const bool is_bounded_below = minimum > -ParameterBinder::kNoLimit;
+  if (is_bounded_below) range += " of at least " + Text(minimum);
+  if (maximum < ParameterBinder::kNoLimit) {
+    range += (is_bounded_below ? " and" : " of") + std::string(" at most ") +
+             Text(maximum);
+  }
+  return range;
+}
+
 }  // namespace
 
-ParameterReader::ParameterReader(
-    std::string detector, const DetectorParameters& defaults,
-    const DetectorParameters& given,
-    const std::vector<std::string>& numbered_prefixes)
-    : detector_(std::move(detector)), values_(defaults) {
-  for (const auto& [name, value] : given) {
-    if (defaults.count(name) == 0 &&
-        std::none_of(numbered_prefixes.begin(), numbered_prefixes.end(),
-                     [&given_name = name](const std::string& prefix) {
-                       return IsNumbered(given_name, prefix);
-                     })) {
-      std::string known;
-      for (const auto& [known_name, unused] : defaults) {
-        known += (known.empty() ? "" : ", ") + known_name;
-      }
-      for (const std::string& prefix : numbered_prefixes) {
-        known += ", " + prefix + "0 ...";
-      }
-      throw PLUMBLINE_ERROR(detector_ + " has no parameter \"" + name + "\"",
-                            "one of " + known);
-    }
-    values_[name] = value;
+ParameterBinder::ParameterBinder(std::string detector, DetectorParameters given)
+    : detector_(std::move(detector)), given_(std::move(given)) {}
+
+bool ParameterBinder::Find(const std::string& name, double minimum,
+                           double maximum, double* value) {
+  known_.insert(name);
+  const auto found = given_.find(name);
+  if (found == given_.end()) return false;
+  *value = found->second;
+  if (!std::isfinite(*value) || *value < minimum || *value > maximum) {
+    throw PLUMBLINE_ERROR(detector_ + ": " + name + " is " + Text(*value),
+                          Range(minimum, maximum));
   }
+  return true;
 }
 
-double ParameterReader::Get(const std::string& name, double minimum,
-                            double maximum) const {
-  const auto found = values_.find(name);
-  if (found == values_.end()) {
-    throw PLUMBLINE_ERROR(detector_ + " was not given \"" + name + "\"",
-                          "a value");
-  }
-  const double value = found->second;
-  if (!std::isfinite(value) || value < minimum || value > maximum) {
-    std::string range = "a finite number";
-    const bool bounded_below = minimum > std::numeric_limits<double>::lowest();
-    const bool bounded_above = maximum < std::numeric_limits<double>::max();
-    if (bounded_below) range += " of at least " + Text(minimum);
-    if (bounded_above) {
-      range += (bounded_below ? " and" : " of") + std::string(" at most ") +
-               Text(maximum);
-    }
-    throw PLUMBLINE_ERROR(detector_ + ": " + name + " is " + Text(value),
-                          range);
-  }
-  return value;
+void ParameterBinder::Length(const std::string& name, double* metres,
+                             double minimum, double maximum,
+                             const std::string& description) {
+  Number(name, metres, minimum, maximum, "m", description);
 }
 
-int ParameterReader::GetInt(const std::string& name, int minimum) const {
-  const double value = Get(name, minimum, 1e9);
-  if (value != std::floor(value)) {
-    throw PLUMBLINE_ERROR(detector_ + ": " + name + " is " + Text(value),
+void ParameterBinder::Angle(const std::string& name, double* radians,
+                            double minimum, double maximum,
+                            const std::string& description) {
+  parameters_.push_back({name, RadToDeg(*radians), "deg", description});
+  double degrees = 0.0;
+  if (Find(name, minimum, maximum, &degrees)) *radians = DegToRad(degrees);
+}
+
+void ParameterBinder::Number(const std::string& name, double* value,
+                             double minimum, double maximum,
+                             const std::string& unit,
+                             const std::string& description) {
+  parameters_.push_back({name, *value, unit, description});
+  Find(name, minimum, maximum, value);
+}
+
+void ParameterBinder::Count(const std::string& name, int* value, int minimum,
+                            const std::string& description) {
+  parameters_.push_back({name, static_cast<double>(*value), "", description});
+  double given = 0.0;
+  if (!Find(name, minimum, 1e9, &given)) return;
+  if (given != std::floor(given)) {
+    throw PLUMBLINE_ERROR(detector_ + ": " + name + " is " + Text(given),
                           "a whole number");
   }
-  return static_cast<int>(value);
+  *value = static_cast<int>(given);
+}
+
+void ParameterBinder::AngleList(const std::string& prefix,
+                                std::map<std::string, double>* radians,
+                                double minimum, double maximum,
+                                const std::string& description) {
+  parameters_.push_back({prefix, 0.0, "deg", description, /*is_list=*/true});
+  for (const auto& [name, unused] : given_) {
+    if (!IsNumbered(name, prefix)) continue;
+    double degrees = 0.0;
+    Find(name, minimum, maximum, &degrees);
+    (*radians)[name.substr(prefix.size())] = DegToRad(degrees);
+  }
+}
+
+void ParameterBinder::CheckNames() const {
+  for (const auto& [name, unused] : given_) {
+    if (known_.count(name) > 0) continue;
+    std::string names;
+    for (const DetectorParameter& parameter : parameters_) {
+      names += (names.empty() ? "" : ", ") + parameter.name +
+               (parameter.is_list ? "0 ..." : "");
+    }
+    if (names.empty()) {
+      throw PLUMBLINE_ERROR(detector_ + " has no parameter \"" + name + "\"",
+                            "none");
+    }
+    throw PLUMBLINE_ERROR(detector_ + " has no parameter \"" + name + "\"",
+                          "one of " + names);
+  }
 }
 
 }  // namespace plumbline

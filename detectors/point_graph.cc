@@ -1,3 +1,4 @@
+#include <plumbline/core/registry.h>
 #include <plumbline/detectors/point_graph.h>
 
 #include <algorithm>
@@ -33,7 +34,7 @@ using Tree = nanoflann::KDTreeSingleIndexAdaptor<
     int>;
 
 bool IsPoint(const Feature& feature, int level) {
-  return feature.level == level && feature.type->name == "point" &&
+  return feature.level == level && feature.type->Is(FeatureRole::kPoint) &&
          std::isfinite(feature.parameters[0]) &&
          std::isfinite(feature.parameters[1]);
 }

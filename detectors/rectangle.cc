@@ -606,8 +606,7 @@ class RectangleSearch {
 int SideOf(const Constraint& constraint) {
   if (constraint.state != ConstraintState::kLive ||
       constraint.kind != ConstraintClass::kStructure ||
-      (constraint.type->name != "segment_rectangle" &&
-       constraint.type->name != "line_rectangle")) {
+      !constraint.type->Is(RelationRole::kSide)) {
     return -1;
   }
   for (int side = 0; side < kNumSides; ++side) {
@@ -638,6 +637,30 @@ Rectangle ReadRectangle(const Graph& graph, const Feature& feature) {
          false});
   }
   return rectangle;
+}
+
+void Bind(ParameterBinder* parameters, RectangleOptions* options) {
+  ParameterBinder& p = *parameters;
+  constexpr double kNoLimit = ParameterBinder::kNoLimit;
+  p.Length("sigma", &options->sigma, 1e-6, kNoLimit,
+           "tolerance of a wall across its side");
+  p.Angle("sigma_deg", &options->sigma_angle, 1e-6, 90.0,
+          "tolerance of its direction");
+  p.Length("gate", &options->gate, 1e-6, kNoLimit,
+           "how near to a side a wall is on it");
+  p.Angle("gate_deg", &options->gate_angle, 1e-6, 40.0,
+          "the same in direction, and how square a corner is");
+  p.Length("min_length", &options->min_length, 0.0, kNoLimit,
+           "shortest wall that is looked at");
+  p.Length("corner_gap", &options->corner_gap, 1e-3, kNoLimit,
+           "how near to a corner walls on both sides of it begin");
+  p.Number("min_coverage", &options->min_coverage, 0.0, 1.0, "",
+           "least part of each side that walls cover");
+  p.Length("max_opening", &options->max_opening, 0.0, kNoLimit,
+           "widest opening between two walls of a side");
+  p.Length("min_side", &options->min_side, 1e-3, kNoLimit, "shortest side");
+  p.Length("max_side", &options->max_side, options->min_side, kNoLimit,
+           "longest side");
 }
 
 }  // namespace
@@ -686,10 +709,11 @@ Transaction RectangleDetector::Detect(const Graph& graph,
   Transaction transaction;
   if (walls.empty()) return transaction;
 
+  const FeatureType& rectangle_type = registry.GetFeature("rectangle");
   RectangleSearch search(options_, std::move(walls));
   for (const FeatureId id : graph.VirtualFeatures(scope.level + 1)) {
     const Feature& feature = graph.GetFeature(id);
-    if (feature.type->name != "rectangle") continue;
+    if (!feature.type->Is(FeatureRole::kRectangle)) continue;
     Rectangle rectangle = ReadRectangle(graph, feature);
     if (rectangle.center.allFinite() && std::isfinite(rectangle.theta) &&
         rectangle.a > 0.0 && rectangle.b > 0.0 &&
@@ -701,7 +725,7 @@ Transaction RectangleDetector::Detect(const Graph& graph,
     FeatureId id = rectangle.id;
     if (id == kNoId) {
       Feature feature;
-      feature.type = &registry.GetFeature("rectangle");
+      feature.type = &rectangle_type;
       feature.level = scope.level + 1;
       feature.is_virtual = true;
       feature.parameters = {rectangle.center.x(), rectangle.center.y(),
@@ -712,9 +736,11 @@ Transaction RectangleDetector::Detect(const Graph& graph,
     for (std::size_t side = 0; side < kSides.size(); ++side) {
       for (const Rectangle::Member& member : rectangle.sides[side]) {
         if (!member.is_new) continue;
+        const RelationType* relation = registry.FindRelation(
+            RelationRole::kSide, *member.feature->type, rectangle_type);
+        if (relation == nullptr) continue;
         Constraint constraint;
-        constraint.type =
-            &registry.GetRelation(member.feature->type->name + "_rectangle");
+        constraint.type = relation;
         constraint.features = {member.feature->id, id};
         constraint.expected = Eigen::Vector2d(0.0, kSides[side]);
         constraint.information =
@@ -731,7 +757,6 @@ Transaction RectangleDetector::Detect(const Graph& graph,
 }
 
 DetectorType RectangleType() {
-  const RectangleOptions defaults;
   DetectorType type;
   type.name = kName;
   type.description =
@@ -739,33 +764,12 @@ DetectorType RectangleType() {
       "meet";
   type.reads = {"segment", "line"};
   type.makes = {"rectangle"};
-  type.defaults = {
-      {"sigma", defaults.sigma},
-      {"sigma_deg", RadToDeg(defaults.sigma_angle)},
-      {"gate", defaults.gate},
-      {"gate_deg", RadToDeg(defaults.gate_angle)},
-      {"min_length", defaults.min_length},
-      {"corner_gap", defaults.corner_gap},
-      {"min_coverage", defaults.min_coverage},
-      {"max_opening", defaults.max_opening},
-      {"min_side", defaults.min_side},
-      {"max_side", defaults.max_side},
-  };
-  type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kName, known, given);
-    RectangleOptions options;
-    options.sigma = reader.Get("sigma", 1e-6);
-    options.sigma_angle = DegToRad(reader.Get("sigma_deg", 1e-6, 90.0));
-    options.gate = reader.Get("gate", 1e-6);
-    options.gate_angle = DegToRad(reader.Get("gate_deg", 1e-6, 40.0));
-    options.min_length = reader.Get("min_length", 0.0);
-    options.corner_gap = reader.Get("corner_gap", 1e-3);
-    options.min_coverage = reader.Get("min_coverage", 0.0, 1.0);
-    options.max_opening = reader.Get("max_opening", 0.0);
-    options.min_side = reader.Get("min_side", 1e-3);
-    options.max_side = reader.Get("max_side", options.min_side);
-    return std::make_unique<RectangleDetector>(options);
-  };
+  SetParameters<RectangleOptions>(
+      Bind,
+      [](const RectangleOptions& options) {
+        return std::make_unique<RectangleDetector>(options);
+      },
+      &type);
   return type;
 }
 

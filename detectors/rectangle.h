@@ -68,8 +68,7 @@ class RectangleDetector : public StructureDetector {
   RectangleOptions options_;
 };
 
-/// "rectangle". Parameters: sigma, gate, min_length, corner_gap, max_opening,
-/// min_side, max_side (m), sigma_deg, gate_deg, min_coverage.
+/// "rectangle" with its parameters (angles in degrees).
 DetectorType RectangleType();
 
 }  // namespace plumbline

@@ -12,11 +12,60 @@
 
 namespace plumbline {
 
-const char kSameWallRelation[] = "segment_segment_collinearity";
+const char* const kSameWallRelation = SegmentSegmentCollinearity::kName;
 
 namespace {
 
 constexpr char kName[] = "same_wall";
+
+void Bind(ParameterBinder* parameters, SameWallOptions* options) {
+  ParameterBinder& p = *parameters;
+  constexpr double kNoLimit = ParameterBinder::kNoLimit;
+  p.Length("sigma_offset", &options->sigma_offset, 1e-6, 10.0,
+           "tolerance of a wall seen twice, across");
+  p.Angle("sigma_angle_deg", &options->sigma_angle, 1e-6, 90.0,
+          "tolerance of its direction");
+  p.Length("min_length", &options->min_length, 0.0, kNoLimit,
+           "shortest segment that is looked at");
+  p.Count("place_links", &options->place_links, 1,
+          "measurement links from the middle of a place to its walls");
+  p.Length("place_radius", &options->place_radius, 0.1, kNoLimit,
+           "how far they are from it");
+  p.Length("place_spacing", &options->place_spacing, 0.0, kNoLimit,
+           "how far from the last a new place begins");
+  p.Count("min_links", &options->min_links, 1,
+          "places fewer measurement links apart are of one visit");
+  p.Number("covariance_scale", &options->covariance_scale, 1e-3, 1e3, "",
+           "factor of the standard deviations that the graph gives");
+  p.Number("drift_rate", &options->drift_rate, 0.0, 1.0, "m/m",
+           "drift along the way between two places that is added");
+  p.Length("known_sigma", &options->known_sigma, 0.0, kNoLimit,
+           "walls side by side known to this are one ...");
+  p.Length("known_offset", &options->known_offset, 0.0, kNoLimit,
+           "... when they are within this offset");
+  p.Length("contradiction", &options->contradiction, 0.0, kNoLimit,
+           "two places that put a third this far apart are not both right");
+  PlaceMatchOptions& match = options->match;
+  p.Number("gate_sigmas", &match.gate, 0.1, 100.0, "",
+           "displacements up to so many standard deviations are looked at");
+  p.Length("tolerance", &match.tolerance, 1e-3, 10.0,
+           "how close walls that are one lie");
+  p.Angle("angle_tolerance_deg", &match.angle_tolerance, 1e-3, 45.0,
+          "the same in direction, apart from noise");
+  p.Angle("direction_noise_deg", &match.direction_noise, 0.0, 45.0,
+          "noise of the direction of a wall of 1 m");
+  p.Length("min_overlap", &match.min_overlap, 0.0, kNoLimit,
+           "length over which they lie side by side");
+  p.Length("narrow", &match.narrow, 0.0, kNoLimit,
+           "half width of a search that reaches no other corridor");
+  p.Number("min_evidence", &match.min_evidence, -kNoLimit, kNoLimit, "nats",
+           "evidence beyond chance that a wider one needs");
+  p.Number(
+      "rival_margin", &match.rival_margin, 0.0, kNoLimit, "nats",
+      "displacements that are not worse by this make a match ambiguous ...");
+  p.Length("rival_offset", &match.rival_offset, 0.0, kNoLimit,
+           "... where they put its wall elsewhere by more");
+}
 
 }  // namespace
 
@@ -56,64 +105,18 @@ Transaction SameWall::Detect(const Graph& graph, const Registry& registry,
 }
 
 DetectorType SameWallType() {
-  const SameWallOptions defaults;
   DetectorType type;
   type.name = kName;
   type.description =
       "Loop closures: segments of different visits that are one wall, matched "
       "place by place in agreement on one displacement";
   type.reads = {"segment"};
-  type.defaults = {
-      {"sigma_offset", defaults.sigma_offset},
-      {"sigma_angle_deg", RadToDeg(defaults.sigma_angle)},
-      {"min_length", defaults.min_length},
-      {"place_links", static_cast<double>(defaults.place_links)},
-      {"place_radius", defaults.place_radius},
-      {"place_spacing", defaults.place_spacing},
-      {"min_links", static_cast<double>(defaults.min_links)},
-      {"covariance_scale", defaults.covariance_scale},
-      {"drift_rate", defaults.drift_rate},
-      {"known_sigma", defaults.known_sigma},
-      {"known_offset", defaults.known_offset},
-      {"contradiction", defaults.contradiction},
-      {"gate_sigmas", defaults.match.gate},
-      {"tolerance", defaults.match.tolerance},
-      {"angle_tolerance_deg", RadToDeg(defaults.match.angle_tolerance)},
-      {"direction_noise_deg", RadToDeg(defaults.match.direction_noise)},
-      {"min_overlap", defaults.match.min_overlap},
-      {"narrow", defaults.match.narrow},
-      {"min_evidence", defaults.match.min_evidence},
-      {"rival_margin", defaults.match.rival_margin},
-      {"rival_offset", defaults.match.rival_offset},
-  };
-  type.make = [known = type.defaults](const DetectorParameters& given) {
-    const ParameterReader reader(kName, known, given);
-    SameWallOptions options;
-    options.sigma_offset = reader.Get("sigma_offset", 1e-6, 10.0);
-    options.sigma_angle = DegToRad(reader.Get("sigma_angle_deg", 1e-6, 90.0));
-    options.min_length = reader.Get("min_length", 0.0);
-    options.place_links = reader.GetInt("place_links", 1);
-    options.place_radius = reader.Get("place_radius", 0.1);
-    options.place_spacing = reader.Get("place_spacing", 0.0);
-    options.min_links = reader.GetInt("min_links", 1);
-    options.covariance_scale = reader.Get("covariance_scale", 1e-3, 1e3);
-    options.drift_rate = reader.Get("drift_rate", 0.0, 1.0);
-    options.known_sigma = reader.Get("known_sigma", 0.0);
-    options.known_offset = reader.Get("known_offset", 0.0);
-    options.contradiction = reader.Get("contradiction", 0.0);
-    options.match.gate = reader.Get("gate_sigmas", 0.1, 100.0);
-    options.match.tolerance = reader.Get("tolerance", 1e-3, 10.0);
-    options.match.angle_tolerance =
-        DegToRad(reader.Get("angle_tolerance_deg", 1e-3, 45.0));
-    options.match.direction_noise =
-        DegToRad(reader.Get("direction_noise_deg", 0.0, 45.0));
-    options.match.min_overlap = reader.Get("min_overlap", 0.0);
-    options.match.narrow = reader.Get("narrow", 0.0);
-    options.match.min_evidence = reader.Get("min_evidence");
-    options.match.rival_margin = reader.Get("rival_margin", 0.0);
-    options.match.rival_offset = reader.Get("rival_offset", 0.0);
-    return std::make_unique<SameWall>(options);
-  };
+  SetParameters<SameWallOptions>(
+      Bind,
+      [](const SameWallOptions& options) {
+        return std::make_unique<SameWall>(options);
+      },
+      &type);
   return type;
 }
 

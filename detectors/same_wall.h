@@ -74,7 +74,7 @@ class SameWall : public StructureDetector {
 };
 
 /// Name of the relation that closures are made of.
-extern const char kSameWallRelation[];
+extern const char* const kSameWallRelation;
 
 /// "same_wall" with its parameters (angles in degrees).
 DetectorType SameWallType();

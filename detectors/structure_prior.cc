@@ -2,6 +2,7 @@
 #include <plumbline/core/number_text.h>
 #include <plumbline/detectors/structure_prior.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/orientation_orientation.h>
 
 #include <charconv>
 #include <cmath>
@@ -13,28 +14,26 @@
 namespace plumbline {
 namespace {
 
-constexpr char kAngleRelation[] = "orientation_orientation";
 constexpr char kAngleDetector[] = "orientation_relation";
 // Angles nearer to each other are one, degrees.
 constexpr double kSameAngle = 1e-6;
 
-// Rows that are angles, of the relations that structure is made of: a tolerance
-// with the wrong unit is not what was meant. Others are taken as they come.
-const std::map<std::string, std::vector<bool>>& AngleRows() {
-  static const auto* const rows = new std::map<std::string, std::vector<bool>>{
-      {"line_line", {false, true}},
-      {"line_orientation", {true}},
-      {"line_rectangle", {false, true}},
-      {"orientation_orientation", {true}},
-      {"point_circle_distance", {false}},
-      {"point_line_distance", {false}},
-      {"point_point_coincidence", {false, false}},
-      {"point_point_distance", {false}},
-      {"rectangle_orientation", {true}},
-      {"segment_orientation", {true}},
-      {"segment_rectangle", {false, true}},
-      {"segment_segment_collinearity", {false, true}}};
-  return *rows;
+// The unit in which a tolerance of a row is given; "1" for pure numbers.
+std::string ToleranceUnit(const Quantity& row) {
+  const std::string unit(row.shown_unit());
+  return unit.empty() ? "1" : unit;
+}
+
+// "offset tolerance in m, angle tolerance in deg".
+std::string Tolerances(const RelationType& type) {
+  std::string text;
+  for (const Quantity& row : type.rows) {
+    if (!text.empty()) text += ", ";
+    text += row.tolerance.empty() ? "tolerance of " + std::string(row.name)
+                                  : std::string(row.tolerance);
+    text += " in " + ToleranceUnit(row);
+  }
+  return text;
 }
 
 class PriorReader {
@@ -149,24 +148,22 @@ class PriorReader {
     if (words_.size() != 2 + 2 * rows) {
       Refuse(type->name + " with " + std::to_string(words_.size() - 2) +
                  " words behind it",
-             std::to_string(rows) + (rows == 1
-                                         ? " tolerance with its unit"
-                                         : " tolerances, each with its unit"));
+             std::to_string(rows) +
+                 (rows == 1 ? " tolerance with its unit: "
+                            : " tolerances, each with its unit: ") +
+                 Tolerances(*type));
     }
-    const auto known = AngleRows().find(type->name);
     for (std::size_t row = 0; row < rows; ++row) {
       const std::string& unit = words_[3 + 2 * row];
+      const std::string expected = ToleranceUnit(type->rows[row]);
+      if (unit != expected) {
+        Refuse("the unit " + unit + " in row " + std::to_string(row) + " of " +
+                   type->name,
+               expected);
+      }
       PriorTolerance tolerance;
-      tolerance.is_angle = unit == "deg";
-      const std::string which = "row " + std::to_string(row);
-      if (unit != "m" && unit != "deg") {
-        Refuse("the unit '" + unit + "' in " + which, "m or deg");
-      }
-      if (known != AngleRows().end() &&
-          known->second[row] != tolerance.is_angle) {
-        Refuse("the unit " + unit + " in " + which + " of " + type->name,
-               known->second[row] ? "deg" : "m");
-      }
+      tolerance.is_angle = type->rows[row].is_angle;
+      tolerance.unit = unit;
       tolerance.sigma = Sigma(2 + 2 * row, tolerance.is_angle ? 45.0 : 1e3);
       relation.tolerances.push_back(tolerance);
     }
@@ -206,7 +203,9 @@ void WriteStructurePrior(const StructurePrior& prior, std::ostream& output) {
     for (const PriorTolerance& tolerance : relation.tolerances) {
       line += ' ';
       AppendNumber(tolerance.sigma, &line);
-      line += tolerance.is_angle ? " deg" : " m";
+      line += ' ' + (!tolerance.unit.empty() ? tolerance.unit
+                     : tolerance.is_angle    ? "deg"
+                                             : "m");
     }
     output << line << '\n';
   }
@@ -221,7 +220,7 @@ void ApplyStructurePrior(
     expected.is_expected = relation.is_expected;
     expected.sigmas.clear();
     // The detector knows which angle has a tolerance of its own.
-    if (name == kAngleRelation && relation.is_expected) {
+    if (name == OrientationOrientation::kName && relation.is_expected) {
       angles["sigma_deg"] = relation.tolerances.at(0).sigma;
       continue;
     }

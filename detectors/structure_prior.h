@@ -12,11 +12,14 @@
 
 namespace plumbline {
 
-/// How tightly one row of a relation holds.
+/// How tightly one row of a relation (RelationType::rows) holds.
 struct PriorTolerance {
-  /// Standard deviation, > 0: m, or degrees.
+  /// Standard deviation, > 0: degrees for an angle, else in the row's unit.
   double sigma = 0.0;
   bool is_angle = false;
+  /// As it is written: "deg", the row's unit, "1" for a pure number. Empty for
+  /// "deg" and "m".
+  std::string unit = {};
 };
 
 /// What is known of a relation before the building was seen.

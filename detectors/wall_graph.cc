@@ -24,12 +24,16 @@ WallGraph::WallGraph(const Graph& graph)
 
 void WallGraph::ReadWalls(const Graph& graph) {
   for (const Feature* feature : graph.Features()) {
-    if (feature->level != 0 || feature->type->name != "segment") continue;
+    if (feature->level != 0 || !feature->type->Is(FeatureRole::kWall) ||
+        !feature->type->traits.is_one_sided) {
+      continue;
+    }
     index_[feature->id] = static_cast<int>(walls_.size());
     PlaceWall wall;
     wall.id = feature->id;
-    wall.position = {feature->parameters[0], feature->parameters[1]};
-    wall.direction = feature->parameters[2];
+    const Eigen::Vector3d frame = feature->type->frame(*feature);
+    wall.position = frame.head<2>();
+    wall.direction = frame[2];
     wall.begin = feature->extent_begin;
     wall.end = feature->extent_end;
     walls_.push_back(wall);
@@ -57,7 +61,7 @@ void WallGraph::ReadConstraints(const Graph& graph) {
       const double distance = (walls_[i].position - walls_[j].position).norm();
       links_[i].push_back({j, distance});
       links_[j].push_back({i, distance});
-    } else if (constraint->type->name == kSameWallRelation) {
+    } else if (constraint->type->Is(RelationRole::kSameWall)) {
       if (is_live) {
         classes_.Join(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
         closures_.push_back({i, j});

@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -32,6 +33,17 @@ namespace plumbline {
 ///   source:     EDGE_LINE2D of g2o, which does not wrap the angle
 class LineLine {
  public:
+  static constexpr char kName[] = "line_line";
+  static constexpr char kG2oTag[] = "PLUMBLINE_LINE_LINE";
+  static constexpr char kDescription[] =
+      "difference of distances from the origin and of directions, minus u; m, "
+      "rad (EDGE_LINE2D of g2o)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("offset", "offset tolerance"),
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<LineBlock, LineBlock>;
+
   /// `expected`: f, m and rad; `anchor1`, `anchor2` in m; `sqrt_information`: L
   /// with L' L = information, in 1/m and 1/rad.
   LineLine(const Eigen::Vector2d& expected, const Eigen::Vector2d& anchor1,

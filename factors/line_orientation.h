@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 namespace plumbline {
 
@@ -21,6 +22,15 @@ namespace plumbline {
 ///               ours
 class LineOrientation {
  public:
+  static constexpr char kName[] = "line_orientation";
+  static constexpr char kG2oTag[] = "PLUMBLINE_LINE_ORIENTATION";
+  static constexpr char kDescription[] =
+      "o - alpha - u modulo pi; rad (Eq. 22)";
+  static constexpr RelationRole kRole = RelationRole::kDirection;
+  static constexpr Quantity kRows[] = {
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<LineBlock, OrientationBlock>;
+
   /// `expected` in rad, `sqrt_information` in 1/rad.
   LineOrientation(double expected, double sqrt_information)
       : expected_(expected), sqrt_information_(sqrt_information) {}

@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -36,6 +37,17 @@ namespace plumbline {
 ///               Rodriguez-Losada 2014
 class LineRectangle {
  public:
+  static constexpr char kName[] = "line_rectangle";
+  static constexpr char kG2oTag[] = "PLUMBLINE_LINE_RECTANGLE";
+  static constexpr char kDescription[] =
+      "segment_rectangle with a line, its distance taken at the middle of the "
+      "side; m, rad (Table 1, #4)";
+  static constexpr RelationRole kRole = RelationRole::kSide;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("offset", "offset tolerance"),
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<LineBlock, RectangleBlock>;
+
   /// `expected`: (u0, phi), m and rad; `anchor` of the line, m;
   /// `sqrt_information`: L with L' L = information, in 1/m and 1/rad.
   LineRectangle(const Eigen::Vector2d& expected, const Eigen::Vector2d& anchor,

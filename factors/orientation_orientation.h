@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 namespace plumbline {
 
@@ -21,6 +22,14 @@ namespace plumbline {
 ///               ours
 class OrientationOrientation {
  public:
+  static constexpr char kName[] = "orientation_orientation";
+  static constexpr char kG2oTag[] = "PLUMBLINE_ORIENTATION_ORIENTATION";
+  static constexpr char kDescription[] = "o2 - o1 - u modulo pi; rad (Eq. 23)";
+  static constexpr RelationRole kRole = RelationRole::kAngle;
+  static constexpr Quantity kRows[] = {
+      Quantity::Angle("angle", "angle tolerance")};
+  using Blocks = BlockList<OrientationBlock, OrientationBlock>;
+
   /// `expected` in rad, `sqrt_information` in 1/rad.
   OrientationOrientation(double expected, double sqrt_information)
       : expected_(expected), sqrt_information_(sqrt_information) {}

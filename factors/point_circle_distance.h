@@ -3,6 +3,7 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
 #include <plumbline/factors/planar_norm.h>
 
 namespace plumbline {
@@ -21,6 +22,14 @@ namespace plumbline {
 ///   source:     de la Puente and Rodriguez-Losada 2014, Eq. 18
 class PointCircleDistance {
  public:
+  static constexpr char kName[] = "point_circle_distance";
+  static constexpr char kG2oTag[] = "PLUMBLINE_POINT_CIRCLE_DISTANCE";
+  static constexpr char kDescription[] = "|p - c| - R - u; m (Eq. 18)";
+  static constexpr RelationRole kRole = RelationRole::kOnCurve;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("distance", "distance tolerance")};
+  using Blocks = BlockList<AnyOf<PointBlock, PoseBlock>, CircleBlock>;
+
   /// `distance` in m, `sqrt_information` in 1/m.
   PointCircleDistance(double distance, double sqrt_information)
       : distance_(distance), sqrt_information_(sqrt_information) {}

@@ -3,6 +3,7 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -30,6 +31,16 @@ namespace plumbline {
 ///               anchor is ours
 class PointLineDistance {
  public:
+  static constexpr char kName[] = "point_line_distance";
+  static constexpr char kG2oTag[] = "PLUMBLINE_POINT_LINE_DISTANCE";
+  static constexpr char kDescription[] =
+      "-d - x sin(alpha) + y cos(alpha) - u, x and y from the line's anchor; m "
+      "(Eq. 16)";
+  static constexpr RelationRole kRole = RelationRole::kOnCurve;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("distance", "distance tolerance")};
+  using Blocks = BlockList<PositionBlocks, LineBlock>;
+
   /// `distance` in m, `anchor` in m, `sqrt_information` in 1/m.
   PointLineDistance(double distance, const Eigen::Vector2d& anchor,
                     double sqrt_information)

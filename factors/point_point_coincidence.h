@@ -3,6 +3,7 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 
@@ -24,6 +25,16 @@ namespace plumbline {
 ///               Eq. 14 where the expected distance is zero
 class PointPointCoincidence {
  public:
+  static constexpr char kName[] = "point_point_coincidence";
+  static constexpr char kG2oTag[] = "PLUMBLINE_POINT_POINT_COINCIDENCE";
+  static constexpr char kDescription[] =
+      "p2 - p1 - u; m, m (method.md, section 4)";
+  static constexpr RelationRole kRole = RelationRole::kCoincidence;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("x", "position tolerance"),
+      Quantity::Length("y", "position tolerance")};
+  using Blocks = BlockList<PositionBlocks, PositionBlocks>;
+
   /// `expected` in m; `sqrt_information`: L with L' L = information, in 1/m.
   PointPointCoincidence(const Eigen::Vector2d& expected,
                         const Eigen::Matrix2d& sqrt_information)

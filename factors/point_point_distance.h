@@ -3,6 +3,7 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
 #include <plumbline/factors/planar_norm.h>
 
 namespace plumbline {
@@ -23,6 +24,14 @@ namespace plumbline {
 ///   source:     de la Puente and Rodriguez-Losada 2014, Eq. 14, 15
 class PointPointDistance {
  public:
+  static constexpr char kName[] = "point_point_distance";
+  static constexpr char kG2oTag[] = "PLUMBLINE_POINT_POINT_DISTANCE";
+  static constexpr char kDescription[] = "|p2 - p1| - u; m (Eq. 14)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("distance", "distance tolerance")};
+  using Blocks = BlockList<PositionBlocks, PositionBlocks>;
+
   /// `distance` in m, `sqrt_information` in 1/m.
   PointPointDistance(double distance, double sqrt_information)
       : distance_(distance), sqrt_information_(sqrt_information) {}

@@ -3,6 +3,8 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
+#include <plumbline/factors/pose2.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -27,6 +29,19 @@ namespace plumbline {
 ///   source:     EDGE_SE2_SEGMENT2D of g2o
 class PoseEndPoints {
  public:
+  static constexpr char kName[] = "pose_end_points";
+  static constexpr char kG2oTag[] = "EDGE_SE2_SEGMENT2D";
+  static constexpr char kDescription[] =
+      "both ends seen from the pose minus u; m, m, m, m (EDGE_SE2_SEGMENT2D of "
+      "g2o)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("x1", "position tolerance"),
+      Quantity::Length("y1", "position tolerance"),
+      Quantity::Length("x2", "position tolerance"),
+      Quantity::Length("y2", "position tolerance")};
+  using Blocks = BlockList<PoseBlock, EndPointsBlock>;
+
   /// `expected`: the ends (x1, y1, x2, y2) seen from the pose, m;
   /// `sqrt_information`: L with L' L = information, in 1/m.
   PoseEndPoints(const Eigen::Vector4d& expected,
@@ -55,6 +70,15 @@ class PoseEndPoints {
                     sqrt_information_(i, 3) * error[3];
     }
     return true;
+  }
+
+  /// Sets the ends to where the pose sees them: the residual is zero.
+  static void PlaceSecond(const double* expected, const double* pose,
+                          const double* /*anchor*/, double* ends) {
+    for (int i = 0; i < 4; i += 2) {
+      Eigen::Map<Eigen::Vector2d>{ends + i} =
+          TransformPoint(Pose2(pose), Eigen::Vector2d(expected + i));
+    }
   }
 
   /// The caller (or the ceres::Problem) owns the cost function.

@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -32,6 +33,17 @@ namespace plumbline {
 ///               (theta, rho): theta = alpha + pi/2, rho = d
 class PoseLine {
  public:
+  static constexpr char kName[] = "pose_line";
+  static constexpr char kG2oTag[] = "PLUMBLINE_POSE_LINE";
+  static constexpr char kDescription[] =
+      "line (d, alpha) seen from the pose minus u; m, rad (EDGE_SE2_LINE2D of "
+      "g2o)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("d", "offset tolerance"),
+      Quantity::Angle("alpha", "angle tolerance")};
+  using Blocks = BlockList<PoseBlock, LineBlock>;
+
   /// `expected`: (d, alpha) of the line in the frame of the pose, m and rad;
   /// `anchor` in m; `sqrt_information`: L with L' L = information, in 1/m and
   /// 1/rad.
@@ -53,6 +65,16 @@ class PoseLine {
     residual[0] = sqrt_information_(0, 0) * e0 + sqrt_information_(0, 1) * e1;
     residual[1] = sqrt_information_(1, 0) * e0 + sqrt_information_(1, 1) * e1;
     return true;
+  }
+
+  /// Sets the line, relative to its anchor, to where the pose sees it: the
+  /// residual is zero.
+  static void PlaceSecond(const double* expected, const double* pose,
+                          const double* anchor, double* line) {
+    const double alpha = NormalizeAngle(pose[2] + expected[1]);
+    line[0] = expected[0] - (pose[0] - anchor[0]) * std::sin(alpha) +
+              (pose[1] - anchor[1]) * std::cos(alpha);
+    line[1] = alpha;
   }
 
   /// The caller (or the ceres::Problem) owns the cost function.

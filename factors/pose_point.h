@@ -3,6 +3,8 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
+#include <plumbline/factors/pose2.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -25,6 +27,16 @@ namespace plumbline {
 ///               that it is accurate far from the origin
 class PosePoint {
  public:
+  static constexpr char kName[] = "pose_point";
+  static constexpr char kG2oTag[] = "EDGE_SE2_XY";
+  static constexpr char kDescription[] =
+      "point seen from the pose minus u; m, m (EDGE_SE2_XY of g2o)";
+  static constexpr RelationRole kRole = RelationRole::kPosition;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("x", "position tolerance"),
+      Quantity::Length("y", "position tolerance")};
+  using Blocks = BlockList<PoseBlock, PointBlock>;
+
   /// `expected`: the point seen from the pose, m; `sqrt_information`: L with
   /// L' L = information, in 1/m.
   PosePoint(const Eigen::Vector2d& expected,
@@ -46,6 +58,13 @@ class PosePoint {
     residual[0] = sqrt_information_(0, 0) * e0 + sqrt_information_(0, 1) * e1;
     residual[1] = sqrt_information_(1, 0) * e0 + sqrt_information_(1, 1) * e1;
     return true;
+  }
+
+  /// Sets the point to where the pose sees it: the residual is zero.
+  static void PlaceSecond(const double* expected, const double* pose,
+                          const double* /*anchor*/, double* point) {
+    Eigen::Map<Eigen::Vector2d>{point} =
+        TransformPoint(Pose2(pose), Eigen::Vector2d(expected));
   }
 
   /// The caller (or the ceres::Problem) owns the cost function.

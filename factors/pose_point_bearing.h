@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 #include <cmath>
 
@@ -25,6 +26,16 @@ namespace plumbline {
 ///   source:     EDGE_BEARING_SE2_XY of g2o
 class PosePointBearing {
  public:
+  static constexpr char kName[] = "pose_point_bearing";
+  static constexpr char kG2oTag[] = "EDGE_BEARING_SE2_XY";
+  static constexpr char kDescription[] =
+      "direction in which the pose sees the point minus u; rad "
+      "(EDGE_BEARING_SE2_XY of g2o)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Angle("bearing", "angle tolerance")};
+  using Blocks = BlockList<PoseBlock, PointBlock>;
+
   /// m
   static constexpr double kNearest = 1e-9;
 

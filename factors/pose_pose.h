@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 #include <plumbline/factors/pose2.h>
 
 #include <Eigen/Core>
@@ -30,6 +31,17 @@ namespace plumbline {
 ///               origin
 class PosePose {
  public:
+  static constexpr char kName[] = "pose_pose";
+  static constexpr char kG2oTag[] = "EDGE_SE2";
+  static constexpr char kDescription[] =
+      "inverse(p1) (+) p2 (-) u; m, m, rad (Eq. 19)";
+  static constexpr RelationRole kRole = RelationRole::kPose;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("x", "position tolerance"),
+      Quantity::Length("y", "position tolerance"),
+      Quantity::Angle("theta", "angle tolerance")};
+  using Blocks = BlockList<FrameBlocks, FrameBlocks>;
+
   /// `relative`: p2 seen from p1 (m, m, rad); `sqrt_information`: L with
   /// L' L = information, in 1/m and 1/rad.
   PosePose(const Pose2& relative, const Eigen::Matrix3d& sqrt_information)
@@ -53,6 +65,12 @@ class PosePose {
                     sqrt_information_(i, 2) * error[2];
     }
     return true;
+  }
+
+  /// Sets p2 to where `relative` puts it, seen from p1: the residual is zero.
+  static void PlaceSecond(const double* relative, const double* p1,
+                          const double* /*anchor2*/, double* p2) {
+    Eigen::Map<Pose2>{p2} = Compose(Pose2(p1), Pose2(relative));
   }
 
   /// The caller (or the ceres::Problem) owns the cost function.

@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 #include <plumbline/factors/pose2.h>
 
 #include <Eigen/Core>
@@ -29,6 +30,17 @@ namespace plumbline {
 ///   source:     EDGE_PRIOR_SE2 of g2o
 class PosePrior {
  public:
+  static constexpr char kName[] = "pose_prior";
+  static constexpr char kG2oTag[] = "EDGE_PRIOR_SE2";
+  static constexpr char kDescription[] =
+      "inverse(u) (+) p; m, m, rad (EDGE_PRIOR_SE2 of g2o)";
+  static constexpr RelationRole kRole = RelationRole::kPose;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("x", "position tolerance"),
+      Quantity::Length("y", "position tolerance"),
+      Quantity::Angle("theta", "angle tolerance")};
+  using Blocks = BlockList<PoseBlock>;
+
   /// `expected`: (x, y, theta), m and rad; `sqrt_information`: L with
   /// L' L = information in the frame `expected`, in 1/m and 1/rad.
   PosePrior(const Pose2& expected, const Eigen::Matrix3d& sqrt_information)

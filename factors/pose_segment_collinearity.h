@@ -5,6 +5,7 @@
 #include <ceres/cost_function.h>
 #include <ceres/jet.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -31,6 +32,17 @@ namespace plumbline {
 ///               differences so that it is accurate far from the origin
 class PoseSegmentCollinearity {
  public:
+  static constexpr char kName[] = "pose_segment_collinearity";
+  static constexpr char kG2oTag[] = "PLUMBLINE_POSE_SEGMENT_COLLINEARITY";
+  static constexpr char kDescription[] =
+      "distance of the pose across the segment and angle between them, minus "
+      "u; m, rad (Eq. 20)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("offset", "offset tolerance"),
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<FrameBlocks, SegmentBlock>;
+
   /// `expected`: f as observed, m and rad; `sqrt_information`: L with
   /// L' L = information, in 1/m and 1/rad.
   PoseSegmentCollinearity(const Eigen::Vector2d& expected,
@@ -74,6 +86,18 @@ class PoseSegmentCollinearity {
 ///   source:     de la Puente and Rodriguez-Losada 2014, Eq. 21
 class PoseSegmentCollinearityClamped {
  public:
+  static constexpr char kName[] = "pose_segment_collinearity_clamped";
+  static constexpr char kG2oTag[] =
+      "PLUMBLINE_POSE_SEGMENT_COLLINEARITY_CLAMPED";
+  static constexpr char kDescription[] =
+      "pose_segment_collinearity that does not move the segment; m, rad (Eq. "
+      "21)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("offset", "offset tolerance"),
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<FrameBlocks, SegmentBlock>;
+
   /// As PoseSegmentCollinearity.
   PoseSegmentCollinearityClamped(const Eigen::Vector2d& expected,
                                  const Eigen::Matrix2d& sqrt_information)

@@ -3,6 +3,7 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -33,6 +34,18 @@ namespace plumbline {
 ///               condensation is this project's
 class PoseSegmentPoints {
  public:
+  static constexpr char kName[] = "pose_segment_points";
+  static constexpr char kG2oTag[] = "PLUMBLINE_POSE_SEGMENT_POINTS";
+  static constexpr char kDescription[] =
+      "normal of the segment in the pose's frame and distance of the pose from "
+      "it, minus u: points seen on it; -, -, m (Eq. 16)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Number("normal_x", "normal tolerance"),
+      Quantity::Number("normal_y", "normal tolerance"),
+      Quantity::Length("distance", "distance tolerance")};
+  using Blocks = BlockList<FrameBlocks, SegmentBlock>;
+
   /// `expected`: zero for points on the segment; `sqrt_information`: L with
   /// L' L = information.
   PoseSegmentPoints(const Eigen::Vector3d& expected,

@@ -3,6 +3,7 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 
@@ -21,6 +22,11 @@ namespace plumbline {
 ///   source:     EDGE_PRIOR_XY and EDGE_PRIOR_SE2_XY of g2o
 class PositionPrior {
  public:
+  static constexpr RelationRole kRole = RelationRole::kOther;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("x", "position tolerance"),
+      Quantity::Length("y", "position tolerance")};
+
   /// `expected` in m; `sqrt_information`: L with L' L = information, in 1/m.
   PositionPrior(const Eigen::Vector2d& expected,
                 const Eigen::Matrix2d& sqrt_information)
@@ -49,6 +55,31 @@ class PositionPrior {
  private:
   Eigen::Vector2d expected_;
   Eigen::Matrix2d sqrt_information_;
+};
+
+/// PositionPrior of a point. In g2o text a tag stands for one kind of vertex,
+/// so points and poses have relations of their own.
+class PointPrior : public PositionPrior {
+ public:
+  static constexpr char kName[] = "point_prior";
+  static constexpr char kG2oTag[] = "EDGE_PRIOR_XY";
+  static constexpr char kDescription[] =
+      "point minus u; m, m (EDGE_PRIOR_XY of g2o)";
+  using Blocks = BlockList<PointBlock>;
+
+  using PositionPrior::PositionPrior;
+};
+
+/// PositionPrior of a pose.
+class PosePositionPrior : public PositionPrior {
+ public:
+  static constexpr char kName[] = "pose_position_prior";
+  static constexpr char kG2oTag[] = "EDGE_PRIOR_SE2_XY";
+  static constexpr char kDescription[] =
+      "position of the pose minus u; m, m (EDGE_PRIOR_SE2_XY of g2o)";
+  using Blocks = BlockList<PoseBlock>;
+
+  using PositionPrior::PositionPrior;
 };
 
 }  // namespace plumbline

@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 namespace plumbline {
 
@@ -23,6 +24,15 @@ namespace plumbline {
 ///               a rectangle in place of the line
 class RectangleOrientation {
  public:
+  static constexpr char kName[] = "rectangle_orientation";
+  static constexpr char kG2oTag[] = "PLUMBLINE_RECTANGLE_ORIENTATION";
+  static constexpr char kDescription[] =
+      "o - theta - u modulo pi; rad (Table 1, #4)";
+  static constexpr RelationRole kRole = RelationRole::kDirection;
+  static constexpr Quantity kRows[] = {
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<RectangleBlock, OrientationBlock>;
+
   /// `expected` in rad, `sqrt_information` in 1/rad.
   RectangleOrientation(double expected, double sqrt_information)
       : expected_(expected), sqrt_information_(sqrt_information) {}

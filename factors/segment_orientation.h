@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 namespace plumbline {
 
@@ -21,6 +22,15 @@ namespace plumbline {
 ///               in place of the line; modulo pi is ours
 class SegmentOrientation {
  public:
+  static constexpr char kName[] = "segment_orientation";
+  static constexpr char kG2oTag[] = "PLUMBLINE_SEGMENT_ORIENTATION";
+  static constexpr char kDescription[] =
+      "o - theta - u modulo pi; rad (Eq. 22)";
+  static constexpr RelationRole kRole = RelationRole::kDirection;
+  static constexpr Quantity kRows[] = {
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<SegmentBlock, OrientationBlock>;
+
   /// `expected` in rad, `sqrt_information` in 1/rad.
   SegmentOrientation(double expected, double sqrt_information)
       : expected_(expected), sqrt_information_(sqrt_information) {}

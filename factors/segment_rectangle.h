@@ -4,6 +4,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/factors/blocks.h>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -38,6 +39,17 @@ namespace plumbline {
 ///               names rectangles without a formula. Collinearity as in Eq. 20
 class SegmentRectangle {
  public:
+  static constexpr char kName[] = "segment_rectangle";
+  static constexpr char kG2oTag[] = "PLUMBLINE_SEGMENT_RECTANGLE";
+  static constexpr char kDescription[] =
+      "distance past the side in the direction u1 of the rectangle minus u0, "
+      "and angle between them minus u1 modulo pi; m, rad (Table 1, #4)";
+  static constexpr RelationRole kRole = RelationRole::kSide;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("offset", "offset tolerance"),
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<SegmentBlock, RectangleBlock>;
+
   /// `expected`: (u0, phi), m and rad; `sqrt_information`: L with
   /// L' L = information, in 1/m and 1/rad.
   SegmentRectangle(const Eigen::Vector2d& expected,

@@ -3,6 +3,7 @@
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/cost_function.h>
+#include <plumbline/factors/blocks.h>
 #include <plumbline/factors/pose_segment_collinearity.h>
 
 #include <Eigen/Core>
@@ -35,6 +36,17 @@ namespace plumbline {
 ///               from the origin
 class SegmentSegmentCollinearity {
  public:
+  static constexpr char kName[] = "segment_segment_collinearity";
+  static constexpr char kG2oTag[] = "PLUMBLINE_SEGMENT_SEGMENT_COLLINEARITY";
+  static constexpr char kDescription[] =
+      "distance of the second segment across the first and angle between them, "
+      "minus u; m, rad (Eq. 20)";
+  static constexpr RelationRole kRole = RelationRole::kSameWall;
+  static constexpr Quantity kRows[] = {
+      Quantity::Length("offset", "offset tolerance"),
+      Quantity::Angle("turn", "angle tolerance")};
+  using Blocks = BlockList<SegmentBlock, SegmentBlock>;
+
   /// `expected`: f, m and rad; `sqrt_information`: L with L' L = information,
   /// in 1/m and 1/rad.
   SegmentSegmentCollinearity(const Eigen::Vector2d& expected,

@@ -33,7 +33,10 @@ class WallIndex {
  public:
   WallIndex(const Graph& graph, double reach) : reach_(reach) {
     for (const Feature* feature : graph.Features()) {
-      if (feature->type->name != "segment" || feature->is_virtual) continue;
+      if (!feature->type->Is(FeatureRole::kWall) ||
+          !feature->type->traits.is_one_sided || feature->is_virtual) {
+        continue;
+      }
       Insert({feature->id, *WallOf(*feature)});
     }
     num_known_ = walls_.size();

@@ -25,7 +25,10 @@ class WallGrid {
  public:
   WallGrid(const Graph& graph, const WallVoteOptions& options) {
     for (const Feature* feature : graph.Features()) {
-      if (feature->type->name != "segment" || feature->level != 0) continue;
+      if (!feature->type->Is(FeatureRole::kWall) ||
+          !feature->type->traits.is_one_sided || feature->level != 0) {
+        continue;
+      }
       GridWall wall;
       static_cast<Wall&>(wall) = *WallOf(*feature);
       wall.id = feature->id;

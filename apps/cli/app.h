@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_APPS_CLI_APP_H_
 #define PLUMBLINE_APPS_CLI_APP_H_
 
+#include <plumbline/core/error.h>
 #include <plumbline/core/flag_value.h>
 
 #include <functional>
@@ -63,6 +64,18 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc, char** argv);
 /// kExitInternal for any other exception; kExitInterrupted when it succeeded
 /// but was cut short by Ctrl-C.
 int RunMain(const std::function<int()>& run);
+
+/// Does what the value of a flag says. What a library finds wrong with it is
+/// then said of the flag: "--hierarchy: unknown detector ...".
+template <typename Function>
+auto ForFlag(const std::string& name, const Function& function)
+    -> decltype(function()) {
+  try {
+    return function();
+  } catch (const Error& error) {
+    throw error.WithPlace("--" + name);
+  }
+}
 
 /// True once the user pressed Ctrl-C (or the process got SIGTERM). Long work
 /// asks between steps, writes what it has and returns. A second Ctrl-C ends

@@ -76,12 +76,12 @@ std::vector<Pairing> PairWalls(const Graph& graph, const MapTruth& truth,
   }
   std::vector<Pairing> pairs;
   for (const Feature* feature : graph.Features()) {
-    if (feature->type->name != "segment" || feature->level != 0 ||
+    if (!feature->type->Is(FeatureRole::kWall) ||
+        !feature->type->traits.is_one_sided || feature->level != 0 ||
         feature->extent_end - feature->extent_begin < options.minimum_length) {
       continue;
     }
-    const Pose2 pose(feature->parameters[0], feature->parameters[1],
-                     feature->parameters[2]);
+    const Pose2 pose = feature->type->frame(*feature);
     const Eigen::Vector2d middle = TransformPoint(
         pose, Eigen::Vector2d(
                   0.5 * (feature->extent_begin + feature->extent_end), 0.0));

@@ -25,11 +25,10 @@ struct PlacedLine {
   double direction;
 
   PlacedLine(const Feature& line, const RigidTransform& transform) {
-    const double alpha = line.parameters[1];
-    point = transform * FootPoint({line.anchor[0], line.anchor[1]},
-                                  line.parameters[0], alpha);
-    direction =
-        alpha + std::atan2(transform.rotation(1, 0), transform.rotation(0, 0));
+    const Eigen::Vector3d frame = line.type->frame(line);
+    point = transform * Eigen::Vector2d(frame.head<2>());
+    direction = frame[2] +
+                std::atan2(transform.rotation(1, 0), transform.rotation(0, 0));
   }
 
   double Distance(const Eigen::Vector2d& p) const {
@@ -159,10 +158,11 @@ StructureMatch MatchStructure(const Graph& graph, const SyntheticTruth& truth,
   std::vector<const Feature*> orientations;
   for (const Feature* feature : graph.Features()) {
     if (!feature->is_virtual) continue;
-    if (feature->type->name == "line") lines.push_back(feature);
-    if (feature->type->name == "circle") circles.push_back(feature);
-    if (feature->type->name == "point") centers.push_back(feature);
-    if (feature->type->name == "orientation") orientations.push_back(feature);
+    const FeatureType& type = *feature->type;
+    if (type.Is(FeatureRole::kWall)) lines.push_back(feature);
+    if (type.Is(FeatureRole::kCircle)) circles.push_back(feature);
+    if (type.Is(FeatureRole::kPoint)) centers.push_back(feature);
+    if (type.Is(FeatureRole::kDirection)) orientations.push_back(feature);
   }
 
   StructureMatch result;

@@ -12,7 +12,7 @@ void AddConcentricity(Concentricity method, double sigma,
   std::vector<FeatureId> circles;
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
   for (const Feature* feature : std::as_const(*graph).Features()) {
-    if (feature->level == 0 && feature->type->name == "circle") {
+    if (feature->level == 0 && feature->type->Is(FeatureRole::kCircle)) {
       circles.push_back(feature->id);
       center += Eigen::Vector2d(feature->parameters[0], feature->parameters[1]);
     }
@@ -80,7 +80,7 @@ ConcentricityResult CheckConcentricity(const Graph& graph,
   // Circles that the first one which is no outlier reaches past none.
   std::vector<FeatureId> circles;
   for (const Feature* feature : graph.Features()) {
-    if (feature->level == 0 && feature->type->name == "circle" &&
+    if (feature->level == 0 && feature->type->Is(FeatureRole::kCircle) &&
         outliers.count(feature->id) == 0) {
       circles.push_back(feature->id);
     }

@@ -25,8 +25,8 @@ double Tolerance(const Registry& registry, const SyntheticRunOptions& options,
     return given->second.at(name);
   }
   const DetectorType* type = registry.FindDetector(detector);
-  if (type == nullptr || type->defaults.count(name) == 0) return fallback;
-  return type->defaults.at(name);
+  if (type == nullptr || type->defaults().count(name) == 0) return fallback;
+  return type->defaults().at(name);
 }
 
 }  // namespace

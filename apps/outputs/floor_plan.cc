@@ -114,7 +114,7 @@ std::vector<double> SquaredDirections(const Graph& graph,
       const FeatureId id = drawing.cluster_features[from];
       for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
         const Constraint& constraint = graph.GetConstraint(constraint_id);
-        if (constraint.type->name != "orientation_orientation" ||
+        if (!constraint.type->Is(RelationRole::kAngle) ||
             constraint.state != ConstraintState::kLive) {
           continue;
         }
@@ -159,7 +159,7 @@ std::vector<Face> Faces(const Graph& graph, const MapDrawing& drawing,
     face.end = 0.5 * (to - from).norm();
     face.begin = -face.end;
     face.weight = face.length();
-    face.knows_side = graph.GetFeature(wall.id).type->name == "segment";
+    face.knows_side = graph.GetFeature(wall.id).type->traits.is_one_sided;
     face.features = wall.members;
     faces.push_back(std::move(face));
   }

@@ -6,7 +6,6 @@
 #include <plumbline/core/wall.h>
 #include <plumbline/core/xml_text.h>
 #include <plumbline/detectors/merged_walls.h>
-#include <plumbline/detectors/same_wall.h>
 #include <plumbline/outputs/map_drawing.h>
 
 #include <algorithm>
@@ -792,7 +791,7 @@ FeatureId OrientationOfSide(const Graph& graph, FeatureId rectangle,
   for (const ConstraintId id : graph.ConstraintsOf(rectangle)) {
     const Constraint& constraint = graph.GetConstraint(id);
     if (IsLiveStructure(constraint) &&
-        constraint.type->name == "rectangle_orientation" &&
+        constraint.type->Is(RelationRole::kDirection) &&
         std::abs(NormalizeAxial(constraint.expected[0] - phi)) < 0.25 * kPi) {
       return constraint.features[1];
     }
@@ -808,9 +807,9 @@ FeatureId OrientationOf(const Graph& graph, FeatureId wall) {
     const Constraint& constraint = graph.GetConstraint(id);
     if (!IsLiveStructure(constraint)) continue;
     for (const FeatureId other : constraint.features) {
-      const std::string& type = graph.GetFeature(other).type->name;
-      if (type == "orientation") return other;
-      if (type == "rectangle" && by_rectangle == kNoId) {
+      const FeatureType& type = *graph.GetFeature(other).type;
+      if (type.Is(FeatureRole::kDirection)) return other;
+      if (type.Is(FeatureRole::kRectangle) && by_rectangle == kNoId) {
         by_rectangle = OrientationOfSide(graph, other, constraint.expected[1]);
       }
     }
@@ -854,24 +853,24 @@ MapDrawing DrawingFromGraph(const Graph& graph,
   }
   for (const Constraint* constraint : graph.Constraints()) {
     if (constraint->state == ConstraintState::kLive &&
-        constraint->type->name == kSameWallRelation) {
+        constraint->type->Is(RelationRole::kSameWall)) {
       drawing.closures.push_back(
           MiddleOfCommonPart(graph.GetFeature(constraint->features[0]),
                              graph.GetFeature(constraint->features[1])));
     }
   }
   for (const Feature* feature : graph.Features()) {
-    const std::string& type = feature->type->name;
-    if (type == "circle") {
+    const FeatureType& type = *feature->type;
+    if (type.Is(FeatureRole::kCircle)) {
       drawing.circles.push_back({feature->parameters[0], feature->parameters[1],
                                  feature->parameters[2], feature->id});
-    } else if (type == "rectangle") {
+    } else if (type.Is(FeatureRole::kRectangle)) {
       const auto& p = feature->parameters;
       drawing.rectangles.push_back({p[0], p[1], p[2], p[3], p[4], feature->id});
-    } else if (type == "point") {
+    } else if (type.Is(FeatureRole::kPoint)) {
       (feature->is_virtual ? drawing.centers : drawing.points)
           .emplace_back(feature->parameters[0], feature->parameters[1]);
-    } else if (type == "pose" && path.empty()) {
+    } else if (type.Is(FeatureRole::kPose) && path.empty()) {
       drawing.path.emplace_back(feature->parameters[0], feature->parameters[1],
                                 feature->parameters[2]);
     }

@@ -38,8 +38,8 @@ MarginalsSelection ParseMarginalsSelection(const std::string& list,
       selection.all = true;
     } else if (ParseNumber(word, &id)) {
       selection.ids.insert(id);
-    } else if (registry.FindFeature(word) != nullptr) {
-      selection.types.insert(word);
+    } else if (const FeatureType* type = registry.FindFeature(word)) {
+      selection.types.insert(type);
     } else {
       std::string names = "all, none";
       for (const FeatureType* type : registry.features()) {
@@ -75,7 +75,7 @@ void CheckGauge(const Graph& graph, const MarginalsSelection& selection) {
   }
   for (const Feature* feature : features) {
     const bool is_selected = selection.all ||
-                             selection.types.count(feature->type->name) > 0 ||
+                             selection.types.count(feature->type) > 0 ||
                              selection.ids.count(feature->id) > 0;
     if (is_selected && HasLiveConstraint(graph, feature->id) &&
         !has_gauge[parts.Find(static_cast<std::size_t>(feature->id))]) {
@@ -104,7 +104,7 @@ FeatureCovariances ComputeMarginals(const Graph& graph,
   }
   for (const Feature* feature : graph.Features()) {
     const bool is_of_type =
-        selection.all || selection.types.count(feature->type->name) > 0;
+        selection.all || selection.types.count(feature->type) > 0;
     if (selection.ids.count(feature->id) > 0 ||
         (is_of_type && HasLiveConstraint(graph, feature->id))) {
       ids.push_back(feature->id);
@@ -126,8 +126,7 @@ std::vector<DrawnEllipse> EllipsesOf(const Graph& graph,
   std::vector<DrawnEllipse> ellipses;
   for (const auto& [id, covariance] : covariances) {
     const Feature& feature = graph.GetFeature(id);
-    const std::vector<std::string>& names = feature.type->parameter_names;
-    if (names.size() < 2 || names[0] != "x m" || names[1] != "y m") continue;
+    if (!feature.type->HasPosition()) continue;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(
         Eigen::Matrix2d(covariance.topLeftCorner<2, 2>()));
     // Ascending; a fixed feature has none.

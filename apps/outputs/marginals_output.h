@@ -17,7 +17,7 @@ namespace plumbline {
 /// map.json) and "all", separated by commas; "none" and "" nothing.
 struct MarginalsSelection {
   bool all = false;
-  std::set<std::string> types;
+  std::set<const FeatureType*> types;
   std::set<FeatureId> ids;
   bool empty() const { return !all && types.empty() && ids.empty(); }
 };

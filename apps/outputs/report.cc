@@ -52,15 +52,15 @@ Json RoundedArray(const std::vector<double>& values) {
 // What is drawn of a feature: 4 numbers are the ends of a wall, 3 a circle, 2 a
 // point, 8 the corners of a rectangle; null for what has no place.
 Json Geometry(const Feature& feature) {
-  const std::string& type = feature.type->name;
+  const FeatureType& type = *feature.type;
   const auto& p = feature.parameters;
   DrawnWall wall;
   if (WallEnds(feature, &wall)) {
     return RoundedArray({wall.x1, wall.y1, wall.x2, wall.y2});
   }
-  if (type == "circle") return RoundedArray({p[0], p[1], p[2]});
-  if (type == "point") return RoundedArray({p[0], p[1]});
-  if (type == "rectangle") {
+  if (type.Is(FeatureRole::kCircle)) return RoundedArray({p[0], p[1], p[2]});
+  if (type.Is(FeatureRole::kPoint)) return RoundedArray({p[0], p[1]});
+  if (type.Is(FeatureRole::kRectangle)) {
     const Eigen::Vector2d center(p[0], p[1]);
     const Eigen::Vector2d along(p[3] * std::cos(p[2]), p[3] * std::sin(p[2]));
     const Eigen::Vector2d across(-p[4] * std::sin(p[2]), p[4] * std::cos(p[2]));
@@ -92,24 +92,23 @@ class Names {
   Json names_ = Json::array();
 };
 
-// Units of the rows of the relations that come with the program: "deg" for what
-// is kept in rad and shown in degrees.
-const std::map<std::string, std::vector<std::string>>& RowUnits() {
-  static const auto* units =
-      new std::map<std::string, std::vector<std::string>>{
-          {"point_point_distance", {"m"}},
-          {"point_point_coincidence", {"m", "m"}},
-          {"point_line_distance", {"m"}},
-          {"point_circle_distance", {"m"}},
-          {"pose_pose", {"m", "m", "deg"}},
-          {"pose_segment_collinearity", {"m", "deg"}},
-          {"line_orientation", {"deg"}},
-          {"segment_orientation", {"deg"}},
-          {"orientation_orientation", {"deg"}},
-          {"rectangle_orientation", {"deg"}},
-          {"segment_rectangle", {"m", "deg"}},
-          {"line_rectangle", {"m", "deg"}}};
-  return *units;
+// Of each relation of the graph's structure, the units in which its rows are
+// shown: "deg" for what is kept in rad.
+Json UnitsOfRows(const Graph& graph) {
+  Json units = Json::object();
+  for (const Constraint* constraint : graph.Constraints()) {
+    const RelationType& type = *constraint->type;
+    if (constraint->kind != ConstraintClass::kStructure ||
+        units.contains(type.name)) {
+      continue;
+    }
+    Json rows = Json::array();
+    for (const Quantity& row : type.rows) {
+      rows.push_back(std::string(row.shown_unit()));
+    }
+    units[type.name] = std::move(rows);
+  }
+  return units;
 }
 
 // f(x) (-) u at the present state, in the relation's units; null when it cannot
@@ -149,7 +148,7 @@ Json FeaturesToJson(const Report& report,
   Json before = Json::array(), cluster = Json::array();
   for (const Feature* feature : graph.Features()) {
     // A path is shown as such; thousands of poses would hide the rest.
-    if (feature->type->name == "pose") continue;
+    if (feature->type->Is(FeatureRole::kPose)) continue;
     id.push_back(feature->id);
     type.push_back(types->Add(feature->type->name));
     level.push_back(feature->level);
@@ -325,7 +324,7 @@ Json DataToJson(const Report& report) {
   json["types"] = types.ToJson();
   json["sources"] = sources.ToJson();
   json["relations"] = relations.ToJson();
-  json["units"] = RowUnits();
+  json["units"] = UnitsOfRows(*report.graph);
   const std::vector<std::size_t> way = SparsePath(report.path);
   json["path"] = PathToJson(report.path, way);
   json["path_before"] = report.before.path.size() == report.path.size()

@@ -2,7 +2,6 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/core/version.h>
 #include <plumbline/detectors/merged_walls.h>
-#include <plumbline/detectors/same_wall.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/outputs/map_drawing.h>
 #include <plumbline/outputs/summary.h>
@@ -117,9 +116,8 @@ std::optional<double> OrthogonalityDeg(const Graph& graph) {
     const Feature& wall = merged.wall;
     DrawnWall ends;
     if (!WallEnds(wall, &ends)) continue;
-    const int angle = wall.type->name == "line" ? 1 : 2;
     walls.push_back(
-        {wall.parameters[angle], wall.extent_end - wall.extent_begin});
+        {wall.type->frame(wall)[2], wall.extent_end - wall.extent_begin});
   }
   return OrthogonalityDeg(walls);
 }
@@ -146,25 +144,23 @@ void CountGraph(const Graph& graph, Summary* summary) {
     ++summary->features[feature->type->name][feature->level];
   }
   summary->constraints.clear();
+  summary->closures = {};
   for (const Constraint* constraint : graph.Constraints()) {
     Summary::ConstraintCounts& counts =
         summary->constraints[constraint->type->name];
+    const bool is_closure = constraint->type->Is(RelationRole::kSameWall);
     if (constraint->state == ConstraintState::kBroken) {
       ++counts.broken;
+      if (is_closure) ++summary->closures.broken;
     } else if (constraint->kind == ConstraintClass::kStructure) {
       ++counts.structure;
+      if (is_closure) ++summary->closures.live;
     } else {
       ++counts.measurement;
     }
   }
-  summary->closures = {};
-  const auto closures = summary->constraints.find(kSameWallRelation);
-  if (closures != summary->constraints.end()) {
-    summary->closures.live = closures->second.structure;
-    summary->closures.broken = closures->second.broken;
-    summary->closures.proposed =
-        summary->closures.live + summary->closures.broken;
-  }
+  summary->closures.proposed =
+      summary->closures.live + summary->closures.broken;
   summary->orthogonality_deg = OrthogonalityDeg(graph);
 }
 

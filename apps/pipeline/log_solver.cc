@@ -340,7 +340,8 @@ void LogSolver::BeginClosing() {
   for (const Constraint* constraint : std::as_const(graph_).Constraints()) {
     if (constraint->kind != ConstraintClass::kMeasurement ||
         constraint->state != ConstraintState::kLive ||
-        constraint->type->name != "pose_pose") {
+        !constraint->type->Is(RelationRole::kPose) ||
+        constraint->features.size() != 2) {
       continue;
     }
     graph_.UpdateConstraint(

@@ -1519,6 +1519,10 @@ TEST_F(SolveTest, ListPlugins) {
         "geman_mcclure", "orientation_mixture", "orientation_relation"}) {
     EXPECT_THAT(output, HasSubstr(std::string("  ") + name + " ")) << name;
   }
+  // Parameters of detectors with their defaults, units and meanings.
+  EXPECT_THAT(output, HasSubstr("\n    min_side=1 m "));
+  EXPECT_THAT(output, HasSubstr("\n    gate_deg=3 deg "));
+  EXPECT_THAT(output, HasSubstr("\n    angle_0, angle_1, ... deg "));
   EXPECT_EQ(Run("--list_plugins --plugins=no_such_plugin.so", &output), 2);
   EXPECT_THAT(output, HasSubstr("no_such_plugin.so"));
 }
@@ -1561,9 +1565,14 @@ TEST_F(SolveTest, AbsurdFlags) {
         "--detector_parameters=no_such_detector.sigma=1",
         "--detector_parameters=orientation_mixture.no_such=1",
         "--detector_parameters=orientation_mixture.sigma_deg=-1",
+        "--log_reader=no_such_reader", "--outputs=no_such_file",
         "--laser_step=nan", "--laser_step=0", "--laser_max_range=-1"}) {
     EXPECT_EQ(Solve(log, "out", flag, &output), 2) << flag << "\n" << output;
     EXPECT_THAT(output, HasSubstr(": expected ")) << flag;
+    // Under the name of the flag, and no source file's.
+    const std::string name = flag;
+    EXPECT_THAT(output, StartsWith(name.substr(0, name.find('=')) + ": "));
+    EXPECT_THAT(output, Not(HasSubstr(".cc:")));
   }
   EXPECT_TRUE(Files("out").empty());
   // At the ends of their ranges.

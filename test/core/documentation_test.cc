@@ -226,6 +226,44 @@ constexpr char kRelationsPage[] = "factors/relations.md";
 constexpr char kTableBegin[] = "<!-- relations -->";
 constexpr char kTableEnd[] = "<!-- end of relations -->";
 
+// The unit of each row, as the comment says it: "rows 0, 1: m, rad (...)",
+// "rows 0 to 3: m (...)", "rows 0, 1: none, row 2: m (...)".
+std::vector<std::string> UnitsOf(const std::string& comment, int rows) {
+  std::istringstream words(comment.substr(0, comment.find('(')));
+  std::vector<int> at;
+  std::vector<std::string> units(static_cast<std::size_t>(rows));
+  std::size_t next = 0;
+  std::string last;
+  const auto fill = [&] {
+    for (; next < at.size(); ++next) units[at[next]] = last;
+    at.clear();
+    next = 0;
+  };
+  for (std::string word; words >> word;) {
+    while (word.back() == ',' || word.back() == ':') word.pop_back();
+    if (word == "row" || word == "rows") {
+      fill();
+    } else if (std::isdigit(static_cast<unsigned char>(word[0]))) {
+      at.push_back(std::stoi(word));
+    } else if (word == "to") {
+      words >> word;
+      for (int i = at.back() + 1; i <= std::stoi(word); ++i) at.push_back(i);
+    } else {
+      last = word == "none" ? "" : word;
+      if (next < at.size()) units[at[next++]] = last;
+    }
+  }
+  // A unit that is said once is that of all rows that are left.
+  fill();
+  return units;
+}
+
+std::vector<std::string> UnitsOf(const RelationType& type) {
+  std::vector<std::string> units;
+  for (const Quantity& row : type.rows) units.emplace_back(row.unit);
+  return units;
+}
+
 class RelationsPageTest : public ::testing::Test {
  protected:
   RelationsPageTest() { RegisterBuiltinRelations(&registry_); }
@@ -262,6 +300,7 @@ TEST_F(RelationsPageTest, EveryRegisteredRelationIsDescribed) {
       }
     }
     EXPECT_EQ(rows, type->residual_size) << unit;
+    EXPECT_EQ(UnitsOf(unit, rows), UnitsOf(*type)) << unit;
   }
   for (const RelationType* type : registry_.relations()) {
     EXPECT_EQ(described.count(type->name), 1u)
@@ -289,11 +328,6 @@ TEST_F(RelationsPageTest, TableIsThatOfTheHeaders) {
 
 constexpr char kGraphFilesPage[] = "core/graph_files.md";
 
-// "theta" of "theta rad".
-std::string NameOf(const std::string& parameter) {
-  return parameter.substr(0, parameter.find(' '));
-}
-
 class GraphFilesPageTest : public RelationsPageTest {};
 
 TEST_F(GraphFilesPageTest, VerticesAreThoseOfTheRegistry) {
@@ -302,10 +336,9 @@ TEST_F(GraphFilesPageTest, VerticesAreThoseOfTheRegistry) {
   for (const FeatureType* type : registry_.features()) {
     std::string fields;
     std::string units;
-    for (const std::string& parameter : type->parameter_names) {
-      fields += " " + NameOf(parameter);
-      units += (units.empty() ? "" : ", ") +
-               parameter.substr(parameter.find(' ') + 1);
+    for (const Quantity& parameter : type->parameters) {
+      fields += " " + std::string(parameter.name);
+      units += (units.empty() ? "" : ", ") + std::string(parameter.unit);
     }
     table.push_back("| `" + type->g2o_tag + " id" + fields + "` | " +
                     type->name + ": " + type->description + " | " + units +
@@ -421,6 +454,8 @@ TEST(ExamplesPageTest, PluginsPageQuotesFilesThatAreBuilt) {
       ::testing::IsSupersetOf({folder + "equal_radius.h [relation]",
                                folder + "mine.cc [plugin]",
                                folder + "equal_radius_detector.cc [detector]",
+                               folder + "equal_radius_detector.cc [parameters]",
+                               folder + "ranges_reader.h [reader]",
                                folder + "columns_writer.h [writer]"}));
   // What the page promises.
   EXPECT_LE(Snippet(folder + "equal_radius.h", "relation").size(), 40u);

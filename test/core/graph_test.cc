@@ -119,11 +119,13 @@ TEST_F(GraphTest, ResultNamesTheIdsGiven) {
 
 TEST_F(GraphTest, ParametersPastTheSizeAreZero) {
   Feature feature = Dot();
-  feature.parameters = {1, 2, 3, 4, 5, 6};
+  feature.parameters.fill(1.0);
+  feature.parameters[1] = 2.0;
   Transaction transaction;
   transaction.AddFeature(feature);
   graph_.Apply(transaction);
-  EXPECT_THAT(graph_.GetFeature(0).parameters, ElementsAre(1, 2, 0, 0, 0, 0));
+  std::array<double, kMaxFeatureSize> expected = {1.0, 2.0};
+  EXPECT_EQ(graph_.GetFeature(0).parameters, expected);
 }
 
 TEST_F(GraphTest, IdsAreNeverReusedAndIterationSkipsHoles) {

@@ -34,7 +34,7 @@ class HierarchyTest : public ::testing::Test {
     type.name = name;
     type.reads = std::move(reads);
     type.makes = std::move(makes);
-    type.defaults = {{"sigma", 0.5}, {"support", 2.0}};
+    type.parameters = {{"sigma", 0.5}, {"support", 2.0}};
     type.make = [this, name](const DetectorParameters& parameters) {
       if (parameters.count("typo") > 0) {
         throw PLUMBLINE_ERROR("unknown parameter typo", "sigma or support");

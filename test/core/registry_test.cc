@@ -19,9 +19,8 @@ using ::testing::HasSubstr;
 FeatureType Dot() {
   FeatureType type;
   type.name = "dot";
-  type.size = 2;
   type.g2o_tag = "VERTEX_DOT";
-  type.parameter_names = {"x m", "y m"};
+  type.parameters = {Quantity::Length("x"), Quantity::Length("y")};
   return type;
 }
 
@@ -30,7 +29,7 @@ RelationType Link() {
   type.name = "link";
   type.g2o_tag = "EDGE_LINK";
   type.feature_types = {{"dot"}, {"dot"}};
-  type.residual_size = 1;
+  type.rows = {Quantity::Length("distance", "distance tolerance")};
   type.make_cost = [](const RelationArguments&) {
     return std::unique_ptr<ceres::CostFunction>();
   };
@@ -88,17 +87,36 @@ TEST(RegistryTest, RefusesNamesThatAreTakenOrBad) {
 TEST(RegistryTest, RefusesIncompleteTypes) {
   Registry registry;
   FeatureType large = Dot();
-  large.size = kMaxFeatureSize + 1;
-  EXPECT_THROW(registry.Register(large), Error);
+  large.parameters.resize(kMaxFeatureSize + 1, Quantity::Length("x"));
+  EXPECT_THAT(MessageOf([&] { registry.Register(large); }),
+              HasSubstr("'dot' has 11 parameters: expected 1 to 10"));
+  FeatureType miscounted = Dot();
+  miscounted.size = 3;
+  EXPECT_THAT(MessageOf([&] { registry.Register(miscounted); }),
+              HasSubstr("describes 2 parameters of 3"));
+  FeatureType undescribed = Dot();
+  undescribed.parameters.clear();
+  EXPECT_THAT(MessageOf([&] { registry.Register(undescribed); }),
+              HasSubstr("expected parameters: the name and unit of each"));
   FeatureType unnamed = Dot();
-  unnamed.parameter_names.pop_back();
-  EXPECT_THROW(registry.Register(unnamed), Error);
+  unnamed.parameters[1].name = "";
+  EXPECT_THAT(MessageOf([&] { registry.Register(unnamed); }),
+              HasSubstr("parameters without a name"));
+  FeatureType anchored = Dot();
+  anchored.anchor_size = kMaxAnchorSize + 1;
+  EXPECT_THAT(MessageOf([&] { registry.Register(anchored); }),
+              HasSubstr("anchor_size of 4: expected 0 to 3"));
   RelationType costless = Link();
   costless.make_cost = nullptr;
   EXPECT_THROW(registry.Register(costless), Error);
   RelationType rowless = Link();
-  rowless.residual_size = 0;
-  EXPECT_THROW(registry.Register(rowless), Error);
+  rowless.rows.clear();
+  EXPECT_THAT(MessageOf([&] { registry.Register(rowless); }),
+              HasSubstr("relation 'link' has no rows: expected rows: "));
+  RelationType misplaced = Link();
+  misplaced.role = RelationRole::kPosition;
+  EXPECT_THAT(MessageOf([&] { registry.Register(misplaced); }),
+              HasSubstr("expected 2 rows, x and y, and 2 features"));
   RelationType unrelated = Link();
   unrelated.feature_types[1].clear();
   EXPECT_THROW(registry.Register(unrelated), Error);
@@ -128,7 +146,71 @@ TEST(RegistryTest, RefusesIncompleteTypes) {
   EXPECT_THROW(registry.Register(loss), Error);
   DetectorType detector;
   detector.name = "nothing";
-  EXPECT_THROW(registry.Register(detector), Error);
+  EXPECT_THAT(MessageOf([&] { registry.Register(detector); }),
+              HasSubstr("detector 'nothing' makes nothing: expected make"));
+  detector.make = [](const DetectorParameters&) {
+    return std::unique_ptr<StructureDetector>();
+  };
+  EXPECT_THAT(MessageOf([&] { registry.Register(detector); }),
+              HasSubstr("does not say what it reads: expected reads: the names "
+                        "of the feature types"));
+  detector.reads = {"dot"};
+  detector.parameters = {{"sigma", 0.1, "m"}, {"sigma", 0.2, "m"}};
+  EXPECT_THAT(MessageOf([&] { registry.Register(detector); }),
+              HasSubstr("parameter 'sigma' is registered already"));
+  detector.parameters.pop_back();
+  EXPECT_NO_THROW(registry.Register(detector));
+}
+
+// A role promises what the parameters begin with.
+TEST(RegistryTest, RefusesTraitsThatDoNotFit) {
+  Registry registry;
+  FeatureType type = Dot();
+  type.traits.role = FeatureRole::kPoint;
+  EXPECT_THAT(MessageOf([&] { registry.Register(type); }),
+              HasSubstr("expected traits.leading to be Leading::kPosition"));
+  type.traits.leading = Leading::kFrame;
+  type.traits.role = FeatureRole::kPose;
+  EXPECT_THAT(MessageOf([&] { registry.Register(type); }),
+              HasSubstr("2 parameters, too few for its traits: expected at "
+                        "least 3"));
+  type.traits = {FeatureRole::kWall};
+  EXPECT_THAT(MessageOf([&] { registry.Register(type); }),
+              HasSubstr("is a wall and has no frame: expected frame"));
+  type.frame = [](const Feature& feature) {
+    return Eigen::Vector3d(feature.parameters[0], feature.parameters[1], 0.5);
+  };
+  EXPECT_NO_THROW(registry.Register(type));
+}
+
+TEST(RegistryTest, FindsTheRelationThatSaysIt) {
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  const FeatureType& segment = registry.GetFeature("segment");
+  const FeatureType& line = registry.GetFeature("line");
+  const FeatureType& orientation = registry.GetFeature("orientation");
+  const auto name = [&](RelationRole role, const FeatureType& first,
+                        const FeatureType& second) {
+    const RelationType* type = registry.FindRelation(role, first, second);
+    return type == nullptr ? std::string("none") : type->name;
+  };
+  EXPECT_EQ(name(RelationRole::kDirection, segment, orientation),
+            "segment_orientation");
+  EXPECT_EQ(name(RelationRole::kDirection, line, orientation),
+            "line_orientation");
+  EXPECT_EQ(name(RelationRole::kAngle, orientation, orientation),
+            "orientation_orientation");
+  EXPECT_EQ(name(RelationRole::kSide, line, registry.GetFeature("rectangle")),
+            "line_rectangle");
+  EXPECT_EQ(name(RelationRole::kSameWall, segment, segment),
+            "segment_segment_collinearity");
+  EXPECT_EQ(name(RelationRole::kSameWall, line, line), "none");
+  EXPECT_THAT(MessageOf([&] {
+                registry.GetRelation(RelationRole::kDirection, orientation,
+                                     segment);
+              }),
+              HasSubstr("of the types orientation and segment: expected what "
+                        "one of these relates: line_orientation, "));
 }
 
 TEST(RegistryTest, UnknownNamesListTheNearestFirst) {
@@ -343,9 +425,9 @@ TEST_F(BuiltinsTest, PlacesOfTheSecondFeature) {
   for (const RelationType* relation : registry_.relations()) {
     if (relation->place_second == nullptr) {
       // A prior says where its only feature is.
-      EXPECT_EQ(relation->sighting, relation->name == "pose_prior"
-                                        ? Sighting::kPose
-                                        : Sighting::kNone)
+      EXPECT_EQ(relation->Is(RelationRole::kPose) ||
+                    relation->Is(RelationRole::kPosition),
+                relation->name == "pose_prior")
           << relation->name;
       continue;
     }
@@ -413,6 +495,23 @@ TEST_F(BuiltinsTest, SidesOfARectangle) {
   EXPECT_NEAR(Residual("rectangle_orientation", Numbers({kPi / 2}),
                        {rectangle, Make("orientation", {0.2 - kPi / 2})})[0],
               0.2, 1e-12);
+}
+
+// Frames that say the same of a wall given in two ways.
+TEST_F(BuiltinsTest, FramesOfWalls) {
+  const Feature segment = Make("segment", {3.0, 4.0, 0.5});
+  EXPECT_EQ(segment.type->frame(segment), Eigen::Vector3d(3.0, 4.0, 0.5));
+  // Two metres to the left of the anchor (100, 10), along x.
+  Feature line = Make("line", {2.0, 0.0});
+  line.anchor = {100.0, 10.0};
+  EXPECT_EQ(line.type->frame(line), Eigen::Vector3d(100.0, 12.0, 0.0));
+  EXPECT_TRUE(segment.type->traits.is_one_sided);
+  EXPECT_FALSE(line.type->traits.is_one_sided);
+  for (const FeatureType* type : registry_.features()) {
+    EXPECT_EQ(type->Is(FeatureRole::kWall),
+              type->name == "segment" || type->name == "line")
+        << type->name;
+  }
 }
 
 TEST_F(BuiltinsTest, LinesAreRelativeToTheirAnchor) {

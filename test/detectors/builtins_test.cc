@@ -22,7 +22,7 @@ TEST(DetectorBuiltinsTest, EveryDetectorIsMadeFromItsDefaults) {
   Registry registry;
   RegisterBuiltins(&registry);
   for (const DetectorType* type : registry.detectors()) {
-    const auto detector = type->make(type->defaults);
+    const auto detector = type->make(type->defaults());
     ASSERT_NE(detector, nullptr) << type->name;
     EXPECT_EQ(detector->name(), type->name);
     EXPECT_FALSE(type->description.empty());

@@ -110,7 +110,7 @@ TEST_F(StructurePriorTest, BrokenOnesAreRefusedByLine) {
       {"relation segment_orientation 0.1 m",
        "the unit m in row 0 of segment_orientation: expected deg"},
       {"relation segment_orientation 0.1 rad",
-       "the unit 'rad' in row 0: expected m or deg"},
+       "the unit rad in row 0 of segment_orientation: expected deg"},
       {"relation segment_orientation inf deg", "cannot read 'inf'"},
       {"relation segment_orientation 0 deg", "a tolerance of 0"},
       {"relation segment_orientation maybe", "1 tolerance with its unit"},

@@ -65,7 +65,9 @@ TEST_F(MarginalsOutputTest, Selections) {
   EXPECT_TRUE(ParseMarginalsSelection("none", registry_).empty());
   const MarginalsSelection selection =
       ParseMarginalsSelection("point,17,line,3", registry_);
-  EXPECT_EQ(selection.types, (std::set<std::string>{"line", "point"}));
+  EXPECT_EQ(selection.types,
+            (std::set<const FeatureType*>{registry_.FindFeature("line"),
+                                          registry_.FindFeature("point")}));
   EXPECT_EQ(selection.ids, (std::set<FeatureId>{3, 17}));
   EXPECT_TRUE(ParseMarginalsSelection("all", registry_).all);
   const std::string refusal = Refusal("point,tree");

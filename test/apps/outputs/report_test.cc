@@ -269,6 +269,19 @@ TEST_F(ReportTest, ColoursAreThoseOfTheMap) {
   EXPECT_EQ(cluster[rectangle], -1);
 }
 
+// Rows of every relation of the structure have units, closures among them.
+TEST_F(ReportTest, UnitsOfRows) {
+  MakeCorridor(3);
+  Tie("segment_segment_collinearity", {0, 2}, {0.0, 0.0}, 0.05,
+      ConstraintClass::kStructure);
+  const auto data = Script(Text(MakeReport()), "data");
+  EXPECT_EQ(data["units"]["segment_segment_collinearity"],
+            (std::vector<std::string>{"m", "deg"}));
+  EXPECT_EQ(data["units"]["segment_orientation"],
+            std::vector<std::string>{"deg"});
+  EXPECT_EQ(data["units"].size(), 2u);
+}
+
 TEST_F(ReportTest, TextInTheDataEndsNothing) {
   MakeCorridor(2);
   Report report = MakeReport();

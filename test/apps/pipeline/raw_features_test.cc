@@ -19,7 +19,7 @@ TEST(RawFeaturesTest, ProfilesNameTheirOwnKind) {
               profile.feature_type);
     // Parameters that the detectors have.
     for (const auto& [detector, parameters] : profile.detector_parameters) {
-      DetectorParameters values = registry.GetDetector(detector).defaults;
+      DetectorParameters values = registry.GetDetector(detector).defaults();
       for (const auto& [name, value] : parameters) {
         EXPECT_EQ(values.count(name), 1u) << detector << "." << name;
         values[name] = value;

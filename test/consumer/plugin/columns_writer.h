@@ -3,6 +3,7 @@
 
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
 #include <plumbline/frontend/output_writer.h>
 
 #include <filesystem>
@@ -23,7 +24,7 @@ inline plumbline::OutputWriterType ColumnsWriterType() {
         folder / "columns.csv", [&](std::ostream& output) {
           output << "x_m,y_m,radius_m\n";
           for (const plumbline::Feature* feature : run.graph->Features()) {
-            if (feature->type->name != "circle") continue;
+            if (!feature->type->Is(plumbline::FeatureRole::kCircle)) continue;
             const auto& circle = feature->parameters;
             output << circle[0] << ',' << circle[1] << ',' << circle[2] << '\n';
           }

@@ -1,10 +1,7 @@
 #ifndef MINE_EQUAL_RADIUS_H_
 #define MINE_EQUAL_RADIUS_H_
 
-#include <ceres/autodiff_cost_function.h>
-#include <plumbline/core/registry.h>
-
-#include <memory>
+#include <plumbline/factors/blocks.h>
 
 namespace mine {
 
@@ -20,6 +17,16 @@ namespace mine {
 ///   source:     this example
 class EqualRadius {
  public:
+  static constexpr char kName[] = "equal_radius";
+  static constexpr char kG2oTag[] = "MINE_EQUAL_RADIUS";
+  static constexpr char kDescription[] = "R2 - R1 - u; m";
+  static constexpr plumbline::RelationRole kRole =
+      plumbline::RelationRole::kOther;
+  static constexpr plumbline::Quantity kRows[] = {
+      plumbline::Quantity::Length("difference", "radius tolerance")};
+  using Blocks =
+      plumbline::BlockList<plumbline::CircleBlock, plumbline::CircleBlock>;
+
   EqualRadius(double difference, double sqrt_information)
       : difference_(difference), sqrt_information_(sqrt_information) {}
 
@@ -33,20 +40,6 @@ class EqualRadius {
   double difference_;
   double sqrt_information_;
 };
-
-inline plumbline::RelationType EqualRadiusType() {
-  plumbline::RelationType type;
-  type.name = "equal_radius";
-  type.g2o_tag = "MINE_EQUAL_RADIUS";
-  type.feature_types = {{"circle"}, {"circle"}};
-  type.residual_size = 1;
-  type.description = "R2 - R1 - u; m";
-  type.make_cost = [](const plumbline::RelationArguments& a) {
-    return std::make_unique<ceres::AutoDiffCostFunction<EqualRadius, 1, 3, 3>>(
-        new EqualRadius(a.expected[0], a.sqrt_information(0, 0)));
-  };
-  return type;
-}
 //! [relation]
 
 }  // namespace mine

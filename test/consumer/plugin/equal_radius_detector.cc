@@ -8,14 +8,17 @@
 #include <utility>
 #include <vector>
 
+#include "equal_radius.h"
+
 namespace mine {
 namespace {
 
-// Whether a live equal_radius ties the circle to one that stood before it.
-bool IsTied(const plumbline::Graph& graph, const plumbline::Feature& circle) {
+// Whether a live relation of the type ties the circle to one before it.
+bool IsTied(const plumbline::Graph& graph, const plumbline::Feature& circle,
+            const plumbline::RelationType& relation) {
   for (const plumbline::ConstraintId id : graph.ConstraintsOf(circle.id)) {
     const plumbline::Constraint& constraint = graph.GetConstraint(id);
-    if (constraint.type->name == "equal_radius" &&
+    if (constraint.type == &relation &&
         constraint.state == plumbline::ConstraintState::kLive &&
         constraint.features[1] == circle.id) {
       return true;
@@ -35,14 +38,17 @@ const std::string& EqualRadiusDetector::name() const {
 plumbline::Transaction EqualRadiusDetector::Detect(
     const plumbline::Graph& graph, const plumbline::Registry& registry,
     const plumbline::DetectionScope& scope) const {
+  const plumbline::RelationType& relation =
+      registry.GetRelation(EqualRadius::kName);
   plumbline::Transaction transaction;
   std::vector<const plumbline::Feature*> before;
   for (const plumbline::Feature* circle : graph.Features()) {
-    if (circle->type->name != "circle" || circle->level != scope.level) {
+    if (!circle->type->Is(plumbline::FeatureRole::kCircle) ||
+        circle->level != scope.level) {
       continue;
     }
     const plumbline::Feature* nearest = nullptr;
-    double nearest_gap = gate_;
+    double nearest_gap = options_.gate;
     for (const plumbline::Feature* other : before) {
       const double gap = std::abs(circle->parameters[2] - other->parameters[2]);
       if (gap < nearest_gap) {
@@ -51,14 +57,14 @@ plumbline::Transaction EqualRadiusDetector::Detect(
       }
     }
     before.push_back(circle);
-    if (nearest == nullptr || IsTied(graph, *circle)) continue;
+    if (nearest == nullptr || IsTied(graph, *circle, relation)) continue;
 
     plumbline::Constraint constraint;
-    constraint.type = &registry.GetRelation("equal_radius");
+    constraint.type = &relation;
     constraint.features = {nearest->id, circle->id};
     constraint.expected = Eigen::VectorXd::Zero(1);
-    constraint.information =
-        Eigen::MatrixXd::Constant(1, 1, 1.0 / (sigma_ * sigma_));
+    constraint.information = Eigen::MatrixXd::Constant(
+        1, 1, 1.0 / (options_.sigma * options_.sigma));
     constraint.kind = plumbline::ConstraintClass::kStructure;
     constraint.source = name();
     transaction.AddConstraint(std::move(constraint));
@@ -67,19 +73,25 @@ plumbline::Transaction EqualRadiusDetector::Detect(
 }
 //! [detector]
 
+//! [parameters]
 plumbline::DetectorType EqualRadiusDetectorType() {
   plumbline::DetectorType type;
   type.name = "equal_radius";
   type.description = "Circles of the same radius: columns cast in one mould";
   type.reads = {"circle"};
-  type.defaults = {{"gate", 0.1}, {"sigma", 0.002}};
-  type.make = [defaults =
-                   type.defaults](const plumbline::DetectorParameters& given) {
-    const plumbline::ParameterReader reader("equal_radius", defaults, given);
-    return std::make_unique<EqualRadiusDetector>(reader.Get("gate", 0.0, 10.0),
-                                                 reader.Get("sigma", 1e-6));
-  };
+  plumbline::SetParameters<EqualRadiusOptions>(
+      [](plumbline::ParameterBinder* parameters, EqualRadiusOptions* options) {
+        parameters->Length("gate", &options->gate, 0.0, 10.0,
+                           "radii nearer to each other are the same");
+        parameters->Length("sigma", &options->sigma, 1e-6, 1.0,
+                           "tolerance of the casting");
+      },
+      [](const EqualRadiusOptions& options) {
+        return std::make_unique<EqualRadiusDetector>(options);
+      },
+      &type);
   return type;
 }
+//! [parameters]
 
 }  // namespace mine

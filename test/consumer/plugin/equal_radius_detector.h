@@ -10,14 +10,21 @@
 
 namespace mine {
 
+/// Which circles have one radius, and how tightly they are tied.
+struct EqualRadiusOptions {
+  /// Radii that differ by less are the same, m.
+  double gate = 0.1;
+  /// Tolerance of the relation, m.
+  double sigma = 0.002;
+};
+
 /// Proposes equal_radius between circles of a level whose radii differ by less
 /// than a gate: each circle with the one of the nearest radius that stood
 /// before it in the graph, unless it has such a relation already.
 class EqualRadiusDetector : public plumbline::StructureDetector {
  public:
-  /// `gate`: largest difference of radii, m. `sigma`: tolerance of the
-  /// relation, m.
-  EqualRadiusDetector(double gate, double sigma) : gate_(gate), sigma_(sigma) {}
+  explicit EqualRadiusDetector(const EqualRadiusOptions& options)
+      : options_(options) {}
 
   const std::string& name() const override;
   plumbline::Transaction Detect(
@@ -25,8 +32,7 @@ class EqualRadiusDetector : public plumbline::StructureDetector {
       const plumbline::DetectionScope& scope) const override;
 
  private:
-  double gate_;
-  double sigma_;
+  EqualRadiusOptions options_;
 };
 
 /// "equal_radius" with its parameters gate and sigma, m.

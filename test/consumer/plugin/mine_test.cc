@@ -1,10 +1,14 @@
 #include <gtest/gtest.h>
+#include <plumbline/core/add_types.h>
+#include <plumbline/core/error.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/core/plugin.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/detectors/builtins.h>
+#include <plumbline/factors/angle.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -28,10 +32,16 @@ using plumbline::Registry;
 using plumbline::Transaction;
 
 TEST(EqualRadiusTest, ResidualAndJacobianByHand) {
+  Registry registry;
+  plumbline::RegisterBuiltins(&registry);
+  Feature circle;
+  circle.type = &registry.GetFeature("circle");
   plumbline::RelationArguments arguments;
   arguments.expected = Eigen::VectorXd::Constant(1, 0.1);
   arguments.sqrt_information = Eigen::MatrixXd::Constant(1, 1, 4.0);
-  const auto cost = EqualRadiusType().make_cost(arguments);
+  arguments.features = {&circle, &circle};
+  const auto cost =
+      plumbline::AddRelation<EqualRadius>(&registry).make_cost(arguments);
   const double first[] = {1.0, 2.0, 0.5};
   const double second[] = {-3.0, 7.0, 0.85};
   const double* blocks[] = {first, second};
@@ -50,7 +60,7 @@ TEST(EqualRadiusTest, ResidualAndJacobianByHand) {
 TEST(EqualRadiusDetectorTest, ProposesWhatIsNotThereYet) {
   Registry registry;
   plumbline::RegisterBuiltins(&registry);
-  registry.Register(EqualRadiusType());
+  plumbline::AddRelation<EqualRadius>(&registry);
   Graph graph;
   Transaction circles;
   for (const double radius : {0.30, 0.38, 0.80, 0.35}) {
@@ -61,7 +71,7 @@ TEST(EqualRadiusDetectorTest, ProposesWhatIsNotThereYet) {
   }
   graph.Apply(std::move(circles));
 
-  const EqualRadiusDetector detector(0.1, 0.002);
+  const EqualRadiusDetector detector(EqualRadiusOptions{});
   Transaction proposal = detector.Detect(graph, registry, {});
   ASSERT_EQ(proposal.added_constraints().size(), 2u);
   EXPECT_EQ(proposal.added_constraints()[0].features,
@@ -99,12 +109,12 @@ Solved Solve(const std::string& flags) {
   plumbline::ReadGraphJson(map, "map.json", registry, &graph);
   Solved solved;
   for (const Feature* feature : graph.Features()) {
-    if (feature->type->name == "circle") {
+    if (feature->type->Is(plumbline::FeatureRole::kCircle)) {
       solved.radii.push_back(feature->parameters[2]);
     }
   }
   for (const Constraint* constraint : graph.Constraints()) {
-    if (constraint->type->name == "equal_radius" &&
+    if (constraint->type == registry.FindRelation(EqualRadius::kName) &&
         constraint->state == ConstraintState::kLive) {
       ++solved.relations;
     }
@@ -138,6 +148,61 @@ TEST(PluginTest, SolvesByName) {
   EXPECT_NEAR(with.radii[4], without.radii[4], 1e-6);
 }
 
+// The parameters of the detector by name, in units and limits of its own.
+TEST(EqualRadiusDetectorTest, ParametersByName) {
+  const plumbline::DetectorType type = EqualRadiusDetectorType();
+  ASSERT_EQ(type.parameters.size(), 2u);
+  EXPECT_EQ(type.parameters[0].name, "gate");
+  EXPECT_EQ(type.parameters[1].default_value, EqualRadiusOptions().sigma);
+  EXPECT_EQ(type.parameters[1].unit, "m");
+  EXPECT_NO_THROW(type.make({{"gate", 0.2}}));
+  EXPECT_THROW(type.make({{"gate", -1.0}}), plumbline::Error);
+  EXPECT_THROW(type.make({{"gaet", 0.2}}), plumbline::Error);
+  // A gate that no two columns fit in.
+  EXPECT_EQ(Solve("--hierarchy=equal_radius "
+                  "--detector_parameters=equal_radius.gate=0")
+                .relations,
+            0);
+}
+
+// A robot that drives along a corridor of 8 m x 4 m.
+TEST(PluginTest, ReadsALogByItself) {
+  std::string name =
+      (std::filesystem::temp_directory_path() / "rangesXXXXXX").string();
+  const std::filesystem::path folder = mkdtemp(name.data());
+  std::ofstream log(folder / "drive.txt");
+  log << "#ranges\n";
+  for (int scan = 0; scan < 5; ++scan) {
+    const double x = 0.2 * scan;
+    log << 10 + scan << ".25 " << x << " 0 0";
+    for (int beam = 0; beam < 180; ++beam) {
+      const double angle = (beam - 90) * plumbline::kPi / 180.0;
+      const double to_front = (8.0 - x) / std::max(1e-9, std::cos(angle));
+      const double to_side = 2.0 / std::max(1e-9, std::abs(std::sin(angle)));
+      log << ' ' << std::min(to_front, to_side);
+    }
+    log << '\n';
+  }
+  log.close();
+  const std::string command =
+      std::string(PLUMBLINE_SOLVE) +
+      " --input=" + (folder / "drive.txt").string() +
+      " --plugins=" PLUGIN " --output_dir=" + (folder / "out").string();
+  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  std::ifstream trajectory(folder / "out" / "trajectory.tum");
+  std::string line;
+  std::string last;
+  int poses = 0;
+  while (std::getline(trajectory, line)) {
+    if (line.empty() || line[0] == '#') continue;
+    ++poses;
+    last = line;
+  }
+  EXPECT_EQ(poses, 5);
+  EXPECT_EQ(last.substr(0, 5), "14.25") << last;
+  std::filesystem::remove_all(folder);
+}
+
 TEST(PluginTest, IsListed) {
   std::string name =
       (std::filesystem::temp_directory_path() / "columnsXXXXXX").string();
@@ -151,6 +216,7 @@ TEST(PluginTest, IsListed) {
   EXPECT_NE(text.find("columns cast in one mould"), std::string::npos) << text;
   EXPECT_NE(text.find("R2 - R1 - u; m"), std::string::npos) << text;
   EXPECT_NE(text.find("\n  columns.csv "), std::string::npos) << text;
+  EXPECT_NE(text.find("\n  ranges "), std::string::npos) << text;
   std::filesystem::remove_all(folder);
 }
 

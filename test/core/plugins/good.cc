@@ -6,8 +6,8 @@
 PLUMBLINE_PLUGIN(registry) {
   plumbline::FeatureType type;
   type.name = "tree";
-  type.size = 2;
   type.g2o_tag = "MINE_TREE";
-  type.parameter_names = {"x m", "y m"};
+  type.parameters = {plumbline::Quantity::Length("x"),
+                     plumbline::Quantity::Length("y")};
   registry->Register(std::move(type));
 }

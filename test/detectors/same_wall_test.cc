@@ -86,7 +86,8 @@ class SameWallTest : public ::testing::Test {
   }
 
   DetectorParameters WithDefaults(const DetectorParameters& given) const {
-    DetectorParameters parameters = registry_.GetDetector("same_wall").defaults();
+    DetectorParameters parameters =
+        registry_.GetDetector("same_wall").defaults();
     for (const auto& entry : given) parameters[entry.first] = entry.second;
     return parameters;
   }

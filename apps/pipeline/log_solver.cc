@@ -301,12 +301,9 @@ void LogSolver::AdjustJointly(Context* context) {
   };
   take_trajectory();
   context->Begin("walls from adjusted poses");
-  {
-    const ScopedTimer completion(&result.completion_seconds);
-    adjustment.AddWalls(FindGlimpsedWalls(graph_, registry_, context->scans,
-                                          result.trajectory,
-                                          options_.completion));
-  }
+  adjustment.AddWalls(FindGlimpsedWalls(graph_, registry_, context->scans,
+                                        result.trajectory,
+                                        options_.completion));
   context->Begin("joint adjustment of poses and walls");
   adjustment.Adjust(context->control.stop);
   HierarchySpec hierarchy = HierarchyOfOptions();

@@ -64,7 +64,8 @@ struct LogSolverOptions {
   /// EmOptions::break_share while closing: a wrong closure bends the map and
   /// must not take right ones with it.
   double closing_break_share = 0.25;
-  /// Add walls that no single scan saw well, in the end.
+  /// Add walls that no single scan saw well, in the end; with Refinement::kMap
+  /// only: full refinement grows all walls anew.
   bool complete_walls = true;
   WallCompletionOptions completion;
   Refinement refine = Refinement::kFull;
@@ -86,8 +87,8 @@ struct LogSolverResult {
   CostReport initial_cost;
   CostReport final_cost;
   /// Scans without the EM steps between them; detecting and solving of all EM
-  /// steps; finding scans again; completing walls; adjusting jointly, with the
-  /// EM that follows.
+  /// steps; finding scans again; completing walls; the second map of full
+  /// refinement, with its walls and the EM that follows.
   double frontend_seconds = 0.0;
   double detect_seconds = 0.0;
   double solve_seconds = 0.0;
@@ -126,7 +127,8 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
 
 /// Turns the scans of a log into a map: front-end and EM steps near the robot
 /// scan by scan, then, once all are in, EM on the whole map, closing of loops,
-/// completion of walls and joint adjustment.
+/// and, with full refinement, a second map on poses that were adjusted without
+/// walls (core/method.md, section 7).
 ///
 ///     LogSolver solver(registry, {});
 ///     for (...) robot = solver.AddScan(scan);    // the map so far: graph()

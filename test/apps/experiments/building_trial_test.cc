@@ -51,8 +51,8 @@ World Ring() {
   return world;
 }
 
-// Structure that knows one direction used to straighten these: 2.6, 2.9 and 6.8
-// degrees were missing.
+// Structure that knows one direction used to take most of the bend out of such
+// corridors.
 TEST(BuildingTrialTest, ABentBuildingStaysBent) {
   Registry registry;
   RegisterBuiltins(&registry);

@@ -130,8 +130,8 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
 }
 
 int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
-                                  const Eigen::Vector2d& normal,
-                                  double radius) const {
+                                  const Eigen::Vector2d& normal, double radius,
+                                  int hint) const {
   if (reference_.empty()) return -1;
   const Eigen::Vector2d local = point - origin_;
   const bool has_normal = normal.squaredNorm() > 0.0;
@@ -139,36 +139,36 @@ int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
   double best_distance = radius * radius;
   // Of two at the same distance the first of the reference, whatever the order
   // of the search.
+  const auto consider = [&](int i) {
+    const Surface& candidate = reference_[i];
+    const double distance = (candidate.position - point).squaredNorm();
+    if (distance > best_distance ||
+        (distance == best_distance && (best < 0 || i >= best))) {
+      return;
+    }
+    if (has_normal && candidate.normal.dot(normal) < 0.7) return;
+    best_distance = distance;
+    best = i;
+  };
   const auto look = [&](int row, int column_begin, int column_end) {
     column_end = std::min(bucket_columns_ - 1, column_end);
     if (column_begin > column_end) return;
     const int base = row * bucket_columns_;
     const int end = bucket_begin_[base + column_end + 1];
-    for (int i = bucket_begin_[base + column_begin]; i < end; ++i) {
-      const Surface& candidate = reference_[i];
-      const double distance = (candidate.position - point).squaredNorm();
-      if (distance > best_distance ||
-          (distance == best_distance && (best < 0 || i >= best))) {
-        continue;
-      }
-      if (has_normal && candidate.normal.dot(normal) < 0.7) continue;
-      best_distance = distance;
-      best = i;
-    }
+    for (int i = bucket_begin_[base + column_begin]; i < end; ++i) consider(i);
   };
+  if (hint >= 0) consider(hint);
   // Of coordinates left of the first bucket the first.
   const double buckets_per_metre = 1.0 / bucket_size_;
   const auto cell = [&](double value) {
     return static_cast<int>(
         std::clamp(value * buckets_per_metre, 0.0, kFarthestBucket));
   };
-  // The point's own bucket first: what it holds narrows the rest.
   const int own_row = cell(local.y());
-  const int own_column = cell(local.x());
-  if (own_row < bucket_rows_) look(own_row, own_column, own_column);
   // Rows outwards from there.
-  const int row_begin = std::max(0, cell(local.y() - radius));
-  const int row_end = std::min(bucket_rows_ - 1, cell(local.y() + radius));
+  const double reach = std::sqrt(best_distance);
+  const int row_begin = std::max(0, cell(local.y() - reach));
+  const int row_end = std::min(bucket_rows_ - 1, cell(local.y() + reach));
   const auto look_at_row = [&](int row) {
     const double low = row * bucket_size_ - local.y();
     const double across = std::max({low, -low - bucket_size_, 0.0});
@@ -177,12 +177,7 @@ int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
     const double half = std::sqrt(left);
     const int begin = cell(local.x() - half);
     const int end = cell(local.x() + half);
-    if (row != own_row) {
-      look(row, begin, end);
-    } else {
-      look(row, begin, std::min(end, own_column - 1));
-      look(row, std::max(begin, own_column + 1), end);
-    }
+    look(row, begin, end);
   };
   for (int step = 0; own_row - step >= row_begin || own_row + step <= row_end;
        ++step) {
@@ -201,6 +196,7 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
                                 const MatchPrior& prior) const {
   MatchResult result;
   result.pose = guess;
+  partners_.assign(scan.size(), -1);
   const double inverse_variance =
       1.0 / (options_.point_sigma * options_.point_sigma);
   Eigen::Matrix3d information;
@@ -218,7 +214,9 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
     double cost = 0.0;
     int inliers = 0;
     int tried = 0;
-    for (const ScanPoint& point : scan) {
+    int neighbour = -1;
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const ScanPoint& point = scan[i];
       if (point.normal.squaredNorm() == 0.0) continue;
       ++tried;
       const Eigen::Vector2d rotated(
@@ -227,7 +225,12 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
       const Eigen::Vector2d position = rotated + result.pose.head<2>();
       const Eigen::Vector2d normal(c * point.normal.x() - s * point.normal.y(),
                                    s * point.normal.x() + c * point.normal.y());
-      const int index = NearestReference(position, normal, radius);
+      // The partner that it had is near, as is that of the beam before.
+      const int index =
+          NearestReference(position, normal, radius,
+                           partners_[i] >= 0 ? partners_[i] : neighbour);
+      partners_[i] = index;
+      neighbour = index;
       if (index < 0) {
         cost += 4.0;
         continue;
@@ -279,14 +282,14 @@ double ScanMatcher::Overlap(const std::vector<ScanPoint>& scan,
   const PoseTransform transform(pose);
   int tried = 0;
   int found = 0;
+  int neighbour = -1;
   for (const ScanPoint& point : scan) {
     if (point.normal.squaredNorm() == 0.0) continue;
     ++tried;
-    if (NearestReference(transform.Point(point.position),
-                         transform.Direction(point.normal),
-                         options_.initial_radius) >= 0) {
-      ++found;
-    }
+    neighbour = NearestReference(transform.Point(point.position),
+                                 transform.Direction(point.normal),
+                                 options_.initial_radius, neighbour);
+    if (neighbour >= 0) ++found;
   }
   return tried > 0 ? static_cast<double>(found) / tried : 0.0;
 }

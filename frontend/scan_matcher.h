@@ -147,8 +147,10 @@ class ScanMatcher {
 
  private:
   // Index of the nearest reference point whose normal agrees, -1 for none.
+  // `hint`: one that may be near, or -1.
   int NearestReference(const Eigen::Vector2d& point,
-                       const Eigen::Vector2d& normal, double radius) const;
+                       const Eigen::Vector2d& normal, double radius,
+                       int hint) const;
 
   ScanMatcherOptions options_;
   // What matching needs of a reference point: the search runs through many.
@@ -157,6 +159,8 @@ class ScanMatcher {
     Eigen::Vector2d normal;
   };
   std::vector<Surface> reference_;
+  // By point of the scan that is refined.
+  mutable std::vector<int> partners_;
   // Buckets of reference points, by counting sort over cells.
   double bucket_size_ = 0.1;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();

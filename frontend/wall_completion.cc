@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
@@ -113,6 +114,7 @@ struct Cell {
   Eigen::Vector2d direction = Eigen::Vector2d::Zero();
   double straightness = 0.0;
   bool used = false;
+  int bucket = 0;
 
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
 };
@@ -269,33 +271,77 @@ class Completion {
   // Cells by buckets as wide as the largest neighbourhood asked for.
   void FillBuckets() {
     bucket_size_ = std::max(options_.normal_radius, options_.max_gap);
+    bucket_of_.clear();
     for (std::size_t i = 0; i < cells_.size(); ++i) {
-      cells_[i].mean = cells_[i].sum / cells_[i].returns;
-      const Eigen::Vector2d p = cells_[i].mean / bucket_size_;
-      buckets_[CellKey(static_cast<std::int64_t>(std::floor(p.x())),
-                       static_cast<std::int64_t>(std::floor(p.y())))]
-          .push_back({cells_[i].mean, static_cast<int>(i)});
+      Cell& cell = cells_[i];
+      cell.mean = cell.sum / cell.returns;
+      const auto inserted = bucket_of_.try_emplace(
+          BucketKey(cell.mean, 0, 0), static_cast<int>(buckets_.size()));
+      if (inserted.second) {
+        buckets_.emplace_back();
+        buckets_.back().middle =
+            bucket_size_ * ((cell.mean / bucket_size_).array().floor() + 0.5);
+      }
+      cell.bucket = inserted.first->second;
+      buckets_[cell.bucket].entries.push_back({cell.mean, static_cast<int>(i)});
+    }
+    for (Bucket& bucket : buckets_) {
+      bucket.around = BucketsAround(bucket.middle);
     }
   }
 
-  template <typename Function>
-  void ForNeighbors(const Eigen::Vector2d& center, double radius,
-                    Function function) const {
-    const auto column =
-        static_cast<std::int64_t>(std::floor(center.x() / bucket_size_));
-    const auto row =
-        static_cast<std::int64_t>(std::floor(center.y() / bucket_size_));
+  std::int64_t BucketKey(const Eigen::Vector2d& point, int dx, int dy) const {
+    return CellKey(
+        static_cast<std::int64_t>(std::floor(point.x() / bucket_size_)) + dx,
+        static_cast<std::int64_t>(std::floor(point.y() / bucket_size_)) + dy);
+  }
+
+  // The bucket of a point and those beside it; -1 for one without cells.
+  std::array<int, 9> BucketsAround(const Eigen::Vector2d& point) const {
+    std::array<int, 9> around;
+    int k = 0;
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
-        const auto found = buckets_.find(CellKey(column + dx, row + dy));
-        if (found == buckets_.end()) continue;
-        for (const auto& [mean, index] : found->second) {
-          if ((mean - center).squaredNorm() <= radius * radius) {
-            function(index);
-          }
+        const auto found = bucket_of_.find(BucketKey(point, dx, dy));
+        around[k++] = found == bucket_of_.end() ? -1 : found->second;
+      }
+    }
+    return around;
+  }
+
+  // Cells that were used up are left out.
+  template <typename Function>
+  void ForNeighbors(const Eigen::Vector2d& center,
+                    const std::array<int, 9>& around, double radius,
+                    Function function) const {
+    for (const int bucket : around) {
+      if (bucket < 0) continue;
+      for (const Bucket::Entry& entry : buckets_[bucket].entries) {
+        if ((entry.mean - center).squaredNorm() <= radius * radius) {
+          function(entry.index);
         }
       }
     }
+  }
+
+  void Use(int index) {
+    Cell& cell = cells_[index];
+    if (cell.used) return;
+    cell.used = true;
+    used_up_.push_back(cell.bucket);
+  }
+
+  // Takes what has been used out of the buckets.
+  void DropUsed() {
+    for (const int k : used_up_) {
+      std::vector<Bucket::Entry>& entries = buckets_[k].entries;
+      entries.erase(std::remove_if(entries.begin(), entries.end(),
+                                   [this](const Bucket::Entry& entry) {
+                                     return cells_[entry.index].used;
+                                   }),
+                    entries.end());
+    }
+    used_up_.clear();
   }
 
   void FitDirections() {
@@ -303,10 +349,11 @@ class Completion {
       Fit fit;
       int count = 0;
       const Eigen::Vector2d origin = cell.mean;
-      ForNeighbors(origin, options_.normal_radius, [&](int index) {
-        fit.Add(cells_[index].mean - origin, 1.0);
-        ++count;
-      });
+      ForNeighbors(origin, buckets_[cell.bucket].around, options_.normal_radius,
+                   [&](int index) {
+                     fit.Add(cells_[index].mean - origin, 1.0);
+                     ++count;
+                   });
       if (count < 4) continue;
       Eigen::Vector2d mean, direction;
       double across, along;
@@ -319,7 +366,6 @@ class Completion {
 
   void Grow(int seed) {
     std::vector<int> members = {seed};
-    std::vector<int> marked = {seed};
     std::vector<char>& in = in_;
     in.resize(cells_.size(), 0);
     in[seed] = 1;
@@ -331,30 +377,47 @@ class Completion {
     double across = 0.0, along = 0.0;
     const double cos_turn = std::cos(options_.max_turn);
     const double reach_across = 2.5 * scatter_;
+    const double squared_gap = options_.max_gap * options_.max_gap;
     for (std::size_t k = 0; k < members.size(); ++k) {
-      const Eigen::Vector2d center = cells_[members[k]].mean;
-      ForNeighbors(center, options_.max_gap, [&](int index) {
-        Cell& other = cells_[index];
-        if (in[index] || other.used) return;
-        // Seen from the same side.
-        if (other.view.dot(cells_[seed].view) < 0.0) return;
-        if (other.direction.squaredNorm() > 0.0 &&
-            std::abs(other.direction.dot(direction)) < cos_turn) {
-          return;
+      const Cell& cell = cells_[members[k]];
+      const std::size_t size = members.size();
+      const Eigen::Vector2d point = origin + mean;
+      const auto distance = [&](const Eigen::Vector2d& place) {
+        const Eigen::Vector2d d = place - point;
+        return std::abs(direction.x() * d.y() - direction.y() * d.x());
+      };
+      for (const int bucket : buckets_[cell.bucket].around) {
+        if (bucket < 0 ||
+            distance(buckets_[bucket].middle) > reach_across + bucket_size_) {
+          continue;
         }
-        const Eigen::Vector2d d = other.mean - origin - mean;
-        if (std::abs(direction.x() * d.y() - direction.y() * d.x()) >
-            reach_across) {
-          return;
+        for (const Bucket::Entry& entry : buckets_[bucket].entries) {
+          if ((entry.mean - cell.mean).squaredNorm() > squared_gap ||
+              in[entry.index]) {
+            continue;
+          }
+          const Eigen::Vector2d d = entry.mean - origin - mean;
+          if (std::abs(direction.x() * d.y() - direction.y() * d.x()) >
+              reach_across) {
+            continue;
+          }
+          const Cell& other = cells_[entry.index];
+          // Seen from the same side.
+          if (other.view.dot(cells_[seed].view) < 0.0) continue;
+          if (other.direction.squaredNorm() > 0.0 &&
+              std::abs(other.direction.dot(direction)) < cos_turn) {
+            continue;
+          }
+          in[entry.index] = 1;
+          members.push_back(entry.index);
+          fit.Add(entry.mean - origin, 1.0);
         }
-        in[index] = 1;
-        marked.push_back(index);
-        members.push_back(index);
-        fit.Add(other.mean - origin, 1.0);
-      });
-      if (members.size() >= 6) fit.Solve(&mean, &direction, &across, &along);
+      }
+      if (members.size() >= 6 && members.size() > size) {
+        fit.Solve(&mean, &direction, &across, &along);
+      }
     }
-    for (int index : marked) in[index] = 0;
+    for (const int index : members) in[index] = 0;
     if (members.size() < 6) return;
 
     // Once more with what lies on the line that was found.
@@ -404,8 +467,9 @@ class Completion {
     if (end_variance > options_.max_end_sigma * options_.max_end_sigma *
                            (scatter_ / options_.max_scatter))
       return;
-    for (int index : on) cells_[index].used = true;
+    for (const int index : on) Use(index);
     UseUp(origin + mean, direction, places.front(), places.back());
+    DropUsed();
 
     if (Eigen::Vector2d(-direction.y(), direction.x()).dot(view) < 0.0) {
       direction = -direction;
@@ -494,14 +558,14 @@ class Completion {
     for (int k = 0; k <= steps; ++k) {
       const Eigen::Vector2d center =
           point + (begin + std::min(end - begin, k * step)) * direction;
-      ForNeighbors(center, bucket_size_, [&](int index) {
+      ForNeighbors(center, BucketsAround(center), bucket_size_, [&](int index) {
         const Eigen::Vector2d d = cells_[index].mean - point;
         const double along = direction.dot(d);
         if (std::abs(direction.x() * d.y() - direction.y() * d.x()) <=
                 options_.explained_offset &&
             along >= begin - options_.explained_gap &&
             along <= end + options_.explained_gap) {
-          cells_[index].used = true;
+          Use(index);
         }
       });
     }
@@ -554,9 +618,21 @@ class Completion {
   std::unordered_map<std::int64_t, int> cell_of_;
   double scatter_ = 0.0;
   double bucket_size_ = 0.0;
-  // Means of cells and their indices.
-  std::unordered_map<std::int64_t, std::vector<std::pair<Eigen::Vector2d, int>>>
-      buckets_;
+  // Cells that have not been used up, by place.
+  struct Bucket {
+    struct Entry {
+      Eigen::Vector2d mean;
+      int index;
+    };
+    std::vector<Entry> entries;
+    Eigen::Vector2d middle;
+    // Itself and those beside it, -1 for none.
+    std::array<int, 9> around;
+  };
+  std::vector<Bucket> buckets_;
+  std::unordered_map<std::int64_t, int> bucket_of_;
+  // Buckets that hold cells which have been used.
+  std::vector<int> used_up_;
   std::vector<char> in_;
   Transaction transaction_;
 };

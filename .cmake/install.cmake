@@ -59,8 +59,10 @@ plumbline_pkg_config(plumbline-pipeline "From scans or a graph to a map"
   "plumbline-detectors plumbline-frontend" "-L\${libdir} -lplumbline_pipeline")
 set(all plumbline-pipeline)
 if(PLUMBLINE_BUILD_OUTPUTS)
+  plumbline_pkg_config(plumbline-plan "Rooms, doors and walls of what a robot saw"
+    "plumbline-core" "-L\${libdir} -lplumbline_plan -lgeos_c")
   plumbline_pkg_config(plumbline-outputs "Floor plans, grids, pictures and reports of a map"
-    "plumbline-detectors plumbline-frontend cairo" "-L\${libdir} -lplumbline_outputs")
+    "plumbline-detectors plumbline-frontend plumbline-plan cairo" "-L\${libdir} -lplumbline_outputs")
   string(APPEND all " plumbline-outputs")
 endif()
 plumbline_pkg_config(plumbline "All libraries of plumbline" "${all}" "")

@@ -46,12 +46,13 @@ DEFINE_string(
     "it). They agree where x and y are equally well known");
 PLUMBLINE_FLAG_CHOICES(information_frame, "first", "second");
 
-DEFINE_string(outputs, "default",
-              "Files to write beside summary.json: all, default (all but "
-              "floorplan.geojson), none, or names separated by commas; a minus "
-              "in front takes one out: -report.html,-occupancy.pgm. Files that "
-              "an earlier run wrote into the folder and this one does not are "
-              "removed");
+DEFINE_string(
+    outputs, "default",
+    "Files to write beside summary.json: all, default (those that are "
+    "written without this flag), none, or names separated by commas; "
+    "a minus in front takes one out: -report.html,-occupancy.pgm. "
+    "Files that an earlier run wrote into the folder and this one "
+    "does not are removed");
 DEFINE_string(marginals, "none",
               "Features whose covariance goes into map.json: types, numbers of "
               "features, all, separated by commas; none: no covariances");

@@ -402,6 +402,30 @@ FloorPlan MakeFloorPlan(const Graph& graph, const std::vector<Pose2>& path,
   return plan;
 }
 
+void AddRooms(const OccupancyGrid& grid, const std::vector<Pose2>& path,
+              FloorPlan* plan) {
+  SpaceGrid space;
+  space.resolution = grid.resolution();
+  space.origin = grid.origin();
+  space.width = grid.width();
+  space.height = grid.height();
+  space.cells.reserve(static_cast<std::size_t>(space.width) * space.height);
+  for (int row = 0; row < space.height; ++row) {
+    for (int column = 0; column < space.width; ++column) {
+      const std::uint8_t pixel = grid.Pixel(column, row);
+      space.cells.push_back(pixel == OccupancyGrid::kFree ? Space::kFree
+                            : pixel == OccupancyGrid::kOccupied
+                                ? Space::kOccupied
+                                : Space::kUnknown);
+    }
+  }
+  std::vector<KnownWall> walls;
+  for (const FloorPlanWall& wall : plan->walls) {
+    walls.push_back({wall.begin, wall.end});
+  }
+  plan->building = MakeBuildingPlan(walls, plan->directions, space, path);
+}
+
 std::string FloorPlanLayerName(const FloorPlan& plan, int direction) {
   if (direction < 0) return "WALLS-OTHER";
   // Rounded first, so that 179.97 degrees reads as 0.0.

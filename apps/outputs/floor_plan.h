@@ -5,6 +5,8 @@
 #include <plumbline/factors/angle.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/outputs/map_drawing.h>
+#include <plumbline/outputs/occupancy_grid.h>
+#include <plumbline/plan/building_plan.h>
 
 #include <Eigen/Core>
 #include <array>
@@ -51,6 +53,8 @@ struct FloorPlanWall {
 /// A plan drawn from a map: clean lines and what stands between them.
 struct FloorPlan {
   std::vector<FloorPlanWall> walls;
+  /// Rooms, doors and walls; empty without scans (AddRooms).
+  BuildingPlan building;
   /// Between two faces of one wall: corners in order, m, map frame.
   std::vector<std::array<Eigen::Vector2d, 4>> solids;
   /// Columns and other round things.
@@ -74,6 +78,12 @@ struct FloorPlan {
 /// 10 km, is passed over.
 FloorPlan MakeFloorPlan(const Graph& graph, const std::vector<Pose2>& path,
                         const FloorPlanOptions& options = {});
+
+/// Finds the rooms, doors and walls of a plan on the grid of the scans that it
+/// was made of; `path`: poses of the robot. What is found depends little on the
+/// resolution of the grid up to 0.1 m.
+void AddRooms(const OccupancyGrid& grid, const std::vector<Pose2>& path,
+              FloorPlan* plan);
 
 /// Name of a direction's layer, the same in every file: "WALLS-1-62.1DEG"
 /// (number of the direction from 1, degrees), and "WALLS-OTHER" for -1.

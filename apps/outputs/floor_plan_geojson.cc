@@ -25,9 +25,64 @@ std::string Feature(const std::string& properties, const std::string& type,
          "\", \"coordinates\": " + coordinates + "}}";
 }
 
+std::string RingText(const Ring& ring) {
+  std::string text = "[";
+  for (std::size_t i = 0; i <= ring.size(); ++i) {
+    if (i > 0) text += ", ";
+    text += Position(ring[i % ring.size()]);
+  }
+  return text + "]";
+}
+
+std::string PolygonText(const Polygon& polygon) {
+  std::string text = "[" + RingText(polygon.shell);
+  for (const Ring& hole : polygon.holes) text += ", " + RingText(hole);
+  return text + "]";
+}
+
+// Numbers of rooms in the files begin with 1.
+std::string RoomId(int index) {
+  return index < 0 ? "null" : std::to_string(index + 1);
+}
+
+std::string RoomFeature(const PlanRoom& room, int index) {
+  std::string properties = "\"kind\": \"" +
+                           std::string(RoomKindName(room.kind)) +
+                           "\", \"id\": " + RoomId(index) + ", \"area_m2\": ";
+  AppendFixed(room.area, 3, &properties);
+  properties += ", \"entered\": ";
+  properties += room.is_entered ? "true" : "false";
+  properties += ", \"neighbors\": [";
+  for (std::size_t i = 0; i < room.neighbors.size(); ++i) {
+    if (i > 0) properties += ", ";
+    properties += RoomId(room.neighbors[i]);
+  }
+  return Feature(properties + "]", "Polygon", PolygonText(room.outline));
+}
+
+std::string DoorFeature(const PlanDoor& door) {
+  std::string properties = "\"kind\": \"door\", \"width_m\": ";
+  AppendFixed(door.width(), 3, &properties);
+  properties += ", \"rooms\": [" + RoomId(door.rooms[0]) + ", " +
+                RoomId(door.rooms[1]) + "], \"driven\": ";
+  properties += door.is_driven ? "true" : "false";
+  return Feature(properties, "LineString",
+                 "[" + Position(door.begin) + ", " + Position(door.end) + "]");
+}
+
+std::string BodyFeature(const PlanWall& wall) {
+  std::string properties = "\"kind\": \"wall\", \"length_m\": ";
+  AppendFixed((wall.end - wall.begin).norm(), 3, &properties);
+  properties += ", \"thickness_m\": ";
+  AppendFixed(wall.left + wall.right, 3, &properties);
+  Polygon body;
+  body.shell = BodyOf(wall);
+  return Feature(properties, "Polygon", PolygonText(body));
+}
+
 std::string WallFeature(const FloorPlan& plan, const FloorPlanWall& wall) {
-  std::string properties =
-      "\"layer\": \"" + FloorPlanLayerName(plan, wall.direction) + "\"";
+  std::string properties = "\"kind\": \"face\", \"layer\": \"" +
+                           FloorPlanLayerName(plan, wall.direction) + "\"";
   const Vector2d along = wall.end - wall.begin;
   properties += ", \"direction_deg\": ";
   double degrees = RadToDeg(NormalizeAxial(std::atan2(along[1], along[0])));
@@ -60,11 +115,13 @@ std::string SolidFeature(const std::array<Vector2d, 4>& solid) {
     if (i > 0) positions += ", ";
     positions += Position(ring[i % 4]);
   }
-  return Feature("\"layer\": \"WALL-SOLID\"", "Polygon", positions + "]]");
+  return Feature("\"kind\": \"solid\", \"layer\": \"WALL-SOLID\"", "Polygon",
+                 positions + "]]");
 }
 
 std::string CircleFeature(const DrawnCircle& circle) {
-  std::string properties = "\"layer\": \"COLUMNS\", \"radius_m\": ";
+  std::string properties =
+      "\"kind\": \"column\", \"layer\": \"COLUMNS\", \"radius_m\": ";
   AppendFixed(circle.radius, 4, &properties);
   return Feature(properties, "Point", Position({circle.x, circle.y}));
 }
@@ -85,6 +142,12 @@ void WriteFloorPlanGeoJson(const FloorPlan& plan, std::ostream& output) {
     output << separator << feature;
     separator = ",\n";
   };
+  const BuildingPlan& building = plan.building;
+  for (std::size_t i = 0; i < building.rooms.size(); ++i) {
+    write(RoomFeature(building.rooms[i], static_cast<int>(i)));
+  }
+  for (const PlanDoor& door : building.doors) write(DoorFeature(door));
+  for (const PlanWall& wall : building.walls) write(BodyFeature(wall));
   for (const FloorPlanWall& wall : plan.walls) write(WallFeature(plan, wall));
   for (const auto& solid : plan.solids) write(SolidFeature(solid));
   for (const DrawnCircle& circle : plan.circles) write(CircleFeature(circle));

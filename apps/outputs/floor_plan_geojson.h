@@ -8,9 +8,17 @@
 
 namespace plumbline {
 
-/// Writes a plan as a GeoJSON FeatureCollection: LineString a wall (layer,
-/// direction_deg, length_m, features), Polygon what stands between two faces
-/// (layer), Point a round thing (layer, radius_m).
+/// Writes a plan as a GeoJSON FeatureCollection. The property `kind` says what
+/// a feature is:
+///
+///     room, corridor  Polygon: id (from 1), area_m2, entered, neighbors (ids)
+///     door            LineString from jamb to jamb: width_m, rooms (two ids,
+///                     null for what is no room), driven
+///     wall            Polygon: length_m, thickness_m
+///     face            LineString, a face of a wall as the map has it: layer,
+///                     direction_deg, length_m, features
+///     solid           Polygon between two of these faces: layer
+///     column          Point: layer, radius_m
 ///
 /// Coordinates are metres of the map, while RFC 7946 wants degrees on the
 /// globe: the member "coordinate_reference" says so ("type": "local"), and a

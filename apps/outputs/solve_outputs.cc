@@ -12,11 +12,13 @@
 #include <plumbline/outputs/map_drawing.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/report.h>
+#include <plumbline/outputs/rooms_csv.h>
 #include <plumbline/outputs/solve_outputs.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <sstream>
@@ -27,12 +29,71 @@ namespace {
 
 using std::filesystem::path;
 
+// Of a grid on which rooms are found, m.
+constexpr double kPlanResolution = 0.05;
+constexpr double kCoarsestPlanResolution = 0.1;
+
 std::vector<Pose2> Poses(const SolveOutcome& outcome) {
   std::vector<Pose2> poses;
   poses.reserve(outcome.trajectory.size());
   for (const TimedPose& timed : outcome.trajectory) poses.push_back(timed.pose);
   return poses;
 }
+
+}  // namespace
+
+// Writers run side by side.
+class SharedParts {
+ public:
+  // The grid; null, and why, when it cannot be made.
+  const OccupancyGrid* Grid(const SolveOutcome& outcome, std::string* reason) {
+    std::call_once(grid_once_, [&] {
+      try {
+        grid_ = MakeOccupancyGrid(*outcome.scans, Poses(outcome),
+                                  outcome.occupancy);
+      } catch (const Error& error) {
+        no_grid_ = error.what();
+      }
+    });
+    *reason = no_grid_;
+    return grid_ ? &*grid_ : nullptr;
+  }
+
+  const FloorPlan& Plan(const SolveOutcome& outcome) {
+    std::call_once(plan_once_, [&] {
+      plan_ = MakeFloorPlan(*outcome.graph, Poses(outcome));
+      plan_.title = outcome.title;
+      if (outcome.scans == nullptr || outcome.trajectory.empty()) return;
+      // Too fine a grid has holes, too coarse a one no doors.
+      OccupancyOptions options = outcome.occupancy;
+      if (options.resolution >= 0.5 * kPlanResolution &&
+          options.resolution <= kCoarsestPlanResolution) {
+        std::string reason;
+        const OccupancyGrid* const grid = Grid(outcome, &reason);
+        if (grid != nullptr) AddRooms(*grid, Poses(outcome), &plan_);
+        return;
+      }
+      options.resolution = kPlanResolution;
+      std::optional<OccupancyGrid> grid;
+      try {
+        grid = MakeOccupancyGrid(*outcome.scans, Poses(outcome), options);
+      } catch (const Error&) {
+        return;  // too large: a plan without rooms
+      }
+      AddRooms(*grid, Poses(outcome), &plan_);
+    });
+    return plan_;
+  }
+
+ private:
+  std::once_flag grid_once_;
+  std::optional<OccupancyGrid> grid_;
+  std::string no_grid_;
+  std::once_flag plan_once_;
+  FloorPlan plan_;
+};
+
+namespace {
 
 MapDrawing Drawing(const SolveOutcome& outcome) {
   MapDrawing drawing = DrawingFromGraph(*outcome.graph, Poses(outcome));
@@ -48,10 +109,8 @@ MapDrawing Drawing(const SolveOutcome& outcome) {
   return drawing;
 }
 
-FloorPlan Plan(const SolveOutcome& outcome) {
-  FloorPlan plan = MakeFloorPlan(*outcome.graph, Poses(outcome));
-  plan.title = outcome.title;
-  return plan;
+const FloorPlan& Plan(const SolveOutcome& outcome) {
+  return outcome.parts->Plan(outcome);
 }
 
 Report MakeReport(const SolveOutcome& outcome) {
@@ -69,12 +128,9 @@ Report MakeReport(const SolveOutcome& outcome) {
 }
 
 std::string WriteOccupancy(const SolveOutcome& outcome, const path& folder) {
-  std::optional<OccupancyGrid> grid;
-  try {
-    grid = MakeOccupancyGrid(*outcome.scans, Poses(outcome), outcome.occupancy);
-  } catch (const Error& error) {
-    return error.what();
-  }
+  std::string reason;
+  const OccupancyGrid* const grid = outcome.parts->Grid(outcome, &reason);
+  if (grid == nullptr) return reason;
   WriteOccupancyMap(*grid, folder / "occupancy");
   return "";
 }
@@ -120,6 +176,8 @@ WriteResult RunWriter(const OutputWriterType& writer,
 }
 
 }  // namespace
+
+SolveOutcome::SolveOutcome() : parts(std::make_shared<SharedParts>()) {}
 
 void RegisterBuiltinOutputWriters(Registry* registry) {
   const auto add = [&](const char* name, const char* description,
@@ -182,9 +240,14 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
       Always([](const SolveOutcome& outcome, const path& folder) {
         WriteFloorPlanSvg(Plan(outcome), folder / "floorplan.svg");
       }));
-  add("floorplan.geojson", "the plan as GeoJSON in metres of the map", false,
-      false, Always([](const SolveOutcome& outcome, const path& folder) {
+  add("floorplan.geojson",
+      "rooms, doors and walls as GeoJSON in metres of the map", true, false,
+      Always([](const SolveOutcome& outcome, const path& folder) {
         WriteFloorPlanGeoJson(Plan(outcome), folder / "floorplan.geojson");
+      }));
+  add("rooms.csv", "number, kind, area and neighbors of every room", true, true,
+      Always([](const SolveOutcome& outcome, const path& folder) {
+        WriteRoomsCsv(Plan(outcome).building, folder / "rooms.csv");
       }));
   add("occupancy.pgm", "a grid for ROS map_server and Nav2, and its .yaml",
       true, true, WriteOccupancy, {"occupancy.yaml"});

@@ -11,11 +11,14 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
 namespace plumbline {
+
+class SharedParts;
 
 /// All that the files of plumbline_solve are made of.
 struct SolveOutcome : SolvedRun {
@@ -31,6 +34,10 @@ struct SolveOutcome : SolvedRun {
   std::function<MapWithoutStructure()> without_structure;
   /// Complete but for the times and memory of writing.
   Summary summary;
+  /// What several files show, made by the first that does: for the writers.
+  std::shared_ptr<SharedParts> parts;
+
+  SolveOutcome();
 };
 
 /// Registers the output writers of this folder. They take a SolveOutcome and no

@@ -24,7 +24,7 @@ foreach(file ${exported})
 endforeach()
 
 # Every public header, and no other.
-foreach(component factors core detectors frontend pipeline outputs)
+foreach(component factors core detectors frontend pipeline plan outputs)
   set(folder ${component})
   if(NOT EXISTS ${SOURCE}/${component})
     set(folder apps/${component})

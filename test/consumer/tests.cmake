@@ -36,10 +36,10 @@ function(says_why name message)
   set_tests_properties(find_package.${name} PROPERTIES
     FIXTURES_REQUIRED prefix PASS_REGULAR_EXPRESSION "${pattern}")
 endfunction()
-says_why(finds_all "found all of factors;core;detectors;frontend;pipeline;outputs;plumbline"
-  "-DCOMPONENTS=factors\;core\;detectors\;frontend\;pipeline\;outputs\;plumbline" -DCMAKE_PREFIX_PATH=${prefix})
+says_why(finds_all "found all of factors;core;detectors;frontend;pipeline;plan;outputs;plumbline"
+  "-DCOMPONENTS=factors\;core\;detectors\;frontend\;pipeline\;plan\;outputs\;plumbline" -DCMAKE_PREFIX_PATH=${prefix})
 says_why(unknown_component
-  "there is no component 'walls': expected one of factors, core, detectors, frontend, pipeline, outputs, plumbline"
+  "there is no component 'walls': expected one of factors, core, detectors, frontend, pipeline, plan, outputs, plumbline"
   "-DCOMPONENTS=factors\;walls" -DCMAKE_PREFIX_PATH=${prefix})
 says_why(missing_dependency "component 'frontend' needs BZip2, which was not found"
   -DCOMPONENTS=frontend -DCMAKE_DISABLE_FIND_PACKAGE_BZip2=ON -DCMAKE_PREFIX_PATH=${prefix})

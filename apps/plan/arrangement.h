@@ -1,0 +1,66 @@
+#ifndef PLUMBLINE_PLAN_ARRANGEMENT_H_
+#define PLUMBLINE_PLAN_ARRANGEMENT_H_
+
+#include <plumbline/plan/drawn_lines.h>
+#include <plumbline/plan/polygon.h>
+#include <plumbline/plan/space_grid.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace plumbline {
+
+/// What lies along a border, m.
+struct BorderLengths {
+  /// By Mark.
+  std::array<double, 4> metres = {0.0, 0.0, 0.0, 0.0};
+  /// Sum of metres times what they hold (WallProfile::holds).
+  double holds = 0.0;
+
+  double Of(Mark mark) const { return metres[static_cast<std::size_t>(mark)]; }
+  double length() const {
+    return metres[0] + metres[1] + metres[2] + metres[3];
+  }
+  void Add(const BorderLengths& other) {
+    for (std::size_t i = 0; i < 4; ++i) metres[i] += other.metres[i];
+    holds += other.holds;
+  }
+};
+
+/// A piece of a line between two faces.
+struct ArrangementEdge {
+  /// m, map frame.
+  Eigen::Vector2d begin = Eigen::Vector2d::Zero();
+  Eigen::Vector2d end = Eigen::Vector2d::Zero();
+  /// The faces to the left and to the right of begin to end; -1 for the
+  /// unbounded one.
+  int left = -1;
+  int right = -1;
+  /// The drawn line that it lies on, or -1.
+  int line = -1;
+  BorderLengths lengths;
+
+  double length() const { return (end - begin).norm(); }
+};
+
+/// The faces into which drawn lines cut the plane.
+struct Arrangement {
+  std::vector<Polygon> faces;
+  /// What was seen of each, m^2.
+  std::vector<double> free;
+  std::vector<double> unknown;
+  std::vector<ArrangementEdge> edges;
+};
+
+/// Cuts the plane. The same lines give the same faces in the same order.
+Arrangement Arrange(const std::vector<DrawnLine>& drawn,
+                    const SpaceGrid& space);
+
+/// The drawn line that a straight piece lies on, or -1.
+int LineOf(const std::vector<DrawnLine>& drawn, const Eigen::Vector2d& begin,
+           const Eigen::Vector2d& end);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PLAN_ARRANGEMENT_H_

@@ -1,0 +1,418 @@
+#include <plumbline/plan/arrangement.h>
+#include <plumbline/plan/building_plan.h>
+#include <plumbline/plan/drawn_lines.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+// A corridor is longer than so many times its width, and no wider than this, m.
+constexpr double kCorridorRatio = 3.5;
+constexpr double kCorridorWidth = 4.0;
+// A wall of which only one face was seen is drawn this thick, m.
+constexpr double kThinnestWall = 0.1;
+// Narrower openings are flaws of a wall, m.
+constexpr double kFlaw = 0.3;
+// Doors between the same rooms nearer to each other than this are one, m.
+constexpr double kSameDoor = 0.8;
+
+// How far the face of a line's wall lies to the left of a piece of it, m: where
+// most of the wall is seen from there.
+double FaceOf(const DrawnLine& on, const Vector2d& begin, const Vector2d& end,
+              const SpaceGrid& space) {
+  const WallLine& line = on.line;
+  double from = line.Along(begin);
+  double to = line.Along(end);
+  const bool is_forward = from < to;
+  if (!is_forward) std::swap(from, to);
+  const double low = is_forward ? line.low : -line.high;
+  const double high = is_forward ? line.high : -line.low;
+  const Vector2d left = is_forward ? line.normal() : Vector2d(-line.normal());
+  const WallProfile& profile = on.profile;
+  std::vector<double> faces;
+  for (int i = std::max(0, profile.IndexOf(from));
+       i <= std::min(profile.size() - 1, profile.IndexOf(to)); ++i) {
+    if (profile.marks[static_cast<std::size_t>(i)] != Mark::kWall) continue;
+    const Vector2d here = line.At(profile.MiddleOf(i));
+    for (double v = high + kBesideWall; v >= low - kBesideWall;
+         v -= 0.5 * space.resolution) {
+      if (space.At(Vector2d(here + v * left)) != Space::kOccupied) continue;
+      // The cell's middle.
+      faces.push_back(v - 0.25 * space.resolution);
+      break;
+    }
+  }
+  if (faces.size() < 4) return high;
+  const auto middle =
+      faces.begin() + static_cast<std::ptrdiff_t>(faces.size() / 2);
+  std::nth_element(faces.begin(), middle, faces.end());
+  return *middle;
+}
+
+// A ring with each edge moved to the left, from the middle of its wall to the
+// face.
+Ring FacesOfRing(const std::vector<DrawnLine>& drawn, const SpaceGrid& space,
+                 const Ring& ring) {
+  struct Side {
+    Vector2d point, along;
+  };
+  std::vector<Side> sides;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Vector2d& a = ring[i];
+    const Vector2d& b = ring[(i + 1) % ring.size()];
+    const Vector2d along = (b - a).normalized();
+    const int on = LineOf(drawn, a, b);
+    double shift = 0.0;
+    if (on >= 0) {
+      shift = FaceOf(drawn[static_cast<std::size_t>(on)], a, b, space);
+    }
+    sides.push_back({a + shift * Vector2d(-along[1], along[0]), along});
+  }
+  Ring moved;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Side& before = sides[(i + ring.size() - 1) % ring.size()];
+    const Side& after = sides[i];
+    const double sine =
+        before.along[0] * after.along[1] - before.along[1] * after.along[0];
+    if (std::abs(sine) > 0.2) {
+      const Vector2d between = after.point - before.point;
+      const double t =
+          (between[0] * after.along[1] - between[1] * after.along[0]) / sine;
+      moved.push_back(before.point + t * before.along);
+    } else {
+      // Nearly in line: a step where the faces are not.
+      moved.push_back(before.point +
+                      before.along.dot(ring[i] - before.point) * before.along);
+      if ((after.point - moved.back()).norm() > 1e-3) {
+        moved.push_back(after.point);
+      }
+    }
+  }
+  return moved;
+}
+
+// The outline between the faces of the walls.
+Polygon Within(const std::vector<DrawnLine>& drawn, const SpaceGrid& space,
+               const Polygon& outline) {
+  Polygon polygon;
+  polygon.shell = FacesOfRing(drawn, space, outline.shell);
+  for (const Ring& hole : outline.holes) {
+    polygon.holes.push_back(FacesOfRing(drawn, space, hole));
+  }
+  return Mended(polygon);
+}
+
+// Regions that are rooms, the largest first.
+std::vector<PlanRoom> RoomsOf(const Arrangement& arrangement,
+                              const std::vector<int>& region,
+                              const std::vector<DrawnLine>& drawn,
+                              const SpaceGrid& space,
+                              const BuildingPlanOptions& options,
+                              std::vector<int>* room_of_face) {
+  std::map<int, std::vector<Polygon>> parts;
+  std::map<int, double> free;
+  std::map<int, BorderLengths> borders;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    if (region[i] < 0) continue;
+    parts[region[i]].push_back(arrangement.faces[i]);
+    free[region[i]] += arrangement.free[i];
+  }
+  const auto region_of = [&](int face) {
+    return face < 0 ? -1 : region[static_cast<std::size_t>(face)];
+  };
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    const int left = region_of(edge.left);
+    const int right = region_of(edge.right);
+    if (left == right) continue;
+    if (left >= 0) borders[left].Add(edge.lengths);
+    if (right >= 0) borders[right].Add(edge.lengths);
+  }
+  std::vector<std::pair<int, PlanRoom>> rooms;
+  for (const auto& [id, polygons] : parts) {
+    const BorderLengths& border = borders[id];
+    if (border.Of(Mark::kWall) + border.Of(Mark::kDoor) <
+        options.min_closed * border.length()) {
+      continue;
+    }
+    // Parts that touch in a corner only are left to the largest.
+    PlanRoom room;
+    room.outline = Within(drawn, space, UnionOf(polygons).front());
+    room.area = room.outline.Area();
+    if (room.area < options.regions.min_area ||
+        free[id] < options.min_free * room.area ||
+        Offset(room.outline, -0.5 * options.regions.min_width).empty()) {
+      continue;
+    }
+    rooms.emplace_back(id, std::move(room));
+  }
+  std::stable_sort(rooms.begin(), rooms.end(),
+                   [](const auto& a, const auto& b) {
+                     return a.second.area > b.second.area;
+                   });
+  std::map<int, int> index;
+  std::vector<PlanRoom> sorted;
+  for (auto& [id, room] : rooms) {
+    index[id] = static_cast<int>(sorted.size());
+    sorted.push_back(std::move(room));
+  }
+  room_of_face->assign(region.size(), -1);
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    const auto found = index.find(region[i]);
+    if (found != index.end()) (*room_of_face)[i] = found->second;
+  }
+  return sorted;
+}
+
+// Long and narrow, as a rectangle of the same area and perimeter would be.
+PlanRoom::Kind KindOf(const Polygon& outline) {
+  const double half = 0.25 * outline.Perimeter();
+  const double area = outline.Area();
+  const double root = std::sqrt(std::max(0.0, half * half - area));
+  const double width = half - root;
+  return half + root >= kCorridorRatio * width && width <= kCorridorWidth
+             ? PlanRoom::Kind::kCorridor
+             : PlanRoom::Kind::kRoom;
+}
+
+// What lies along a drawn line: rooms to the left and to the right of each of
+// its samples.
+struct Sides {
+  static constexpr int kNone = -2;  // no border of a room
+  std::vector<int> left, right;
+};
+
+std::vector<Sides> SidesOf(const Arrangement& arrangement,
+                           const std::vector<int>& room_of_face,
+                           const std::vector<DrawnLine>& drawn) {
+  std::vector<Sides> sides(drawn.size());
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    const auto size = static_cast<std::size_t>(drawn[i].profile.size());
+    sides[i].left.assign(size, Sides::kNone);
+    sides[i].right.assign(size, Sides::kNone);
+  }
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    if (edge.line < 0) continue;
+    const auto room = [&](int face) {
+      return face < 0 ? -1 : room_of_face[static_cast<std::size_t>(face)];
+    };
+    int left = room(edge.left);
+    int right = room(edge.right);
+    if (left == right) continue;
+    const auto line = static_cast<std::size_t>(edge.line);
+    const WallProfile& profile = drawn[line].profile;
+    double from = drawn[line].line.Along(edge.begin);
+    double to = drawn[line].line.Along(edge.end);
+    if (from > to) {
+      std::swap(from, to);
+      std::swap(left, right);
+    }
+    for (int i = std::max(0, profile.IndexOf(from)); i < profile.size(); ++i) {
+      const double middle = profile.MiddleOf(i);
+      if (middle > to) break;
+      if (middle < from) continue;
+      sides[line].left[static_cast<std::size_t>(i)] = left;
+      sides[line].right[static_cast<std::size_t>(i)] = right;
+    }
+  }
+  return sides;
+}
+
+// A straight wall from sample `first` to `last` (not included) of a line.
+PlanWall WallBetween(const DrawnLine& on, const Sides& sides, int first,
+                     int last, const SpaceGrid& space) {
+  const double from = on.profile.begin + first * WallProfile::kStep;
+  const double to = on.profile.begin + last * WallProfile::kStep;
+  PlanWall wall;
+  wall.begin = on.line.At(from);
+  wall.end = on.line.At(to);
+  wall.left = FaceOf(on, wall.begin, wall.end, space);
+  wall.right = FaceOf(on, wall.end, wall.begin, space);
+  // Round the corner at an end where there is no opening.
+  const double half = 0.5 * (wall.left + wall.right);
+  const auto is_corner = [&](int outside) {
+    return outside < 0 || outside >= on.profile.size() ||
+           sides.left[static_cast<std::size_t>(outside)] == Sides::kNone;
+  };
+  if (is_corner(first - 1)) wall.begin -= half * on.line.along;
+  if (is_corner(last)) wall.end += half * on.line.along;
+  const double missing = kThinnestWall - (wall.left + wall.right);
+  if (missing > 0.0) {
+    // Nobody saw the other face: it lies away from the room.
+    const auto middle = static_cast<std::size_t>((first + last) / 2);
+    const bool has_left = sides.left[middle] >= 0;
+    const bool has_right = sides.right[middle] >= 0;
+    wall.left += has_left == has_right ? 0.5 * missing : !has_left * missing;
+    wall.right += has_left == has_right ? 0.5 * missing : !has_right * missing;
+  }
+  return wall;
+}
+
+bool Cross(const Vector2d& a, const Vector2d& b, const Vector2d& c,
+           const Vector2d& d) {
+  const auto side = [](const Vector2d& p, const Vector2d& q,
+                       const Vector2d& r) {
+    return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) > 0.0;
+  };
+  return side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b);
+}
+
+// Walls and doors along a line.
+void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
+              const BuildingPlanOptions& options, BuildingPlan* plan) {
+  const int count = on.profile.size();
+  const auto is_border = [&](int i) {
+    return sides.left[static_cast<std::size_t>(i)] != Sides::kNone;
+  };
+  // Runs that are open; short ones are flaws of the wall.
+  std::vector<bool> is_open(static_cast<std::size_t>(count), false);
+  for (int i = 0; i < count;) {
+    const auto open = [&](int k) {
+      return on.profile.At(k) == Mark::kOpen || on.profile.At(k) == Mark::kDoor;
+    };
+    int j = i;
+    while (j < count && open(j)) ++j;
+    if ((j - i) * WallProfile::kStep >= kFlaw) {
+      std::fill(is_open.begin() + i, is_open.begin() + j, true);
+    }
+    i = std::max(j, i + 1);
+  }
+  for (int i = 0; i < count;) {
+    if (!is_border(i)) {
+      ++i;
+      continue;
+    }
+    const bool open = is_open[static_cast<std::size_t>(i)];
+    int j = i;
+    while (j < count && is_border(j) &&
+           is_open[static_cast<std::size_t>(j)] == open) {
+      ++j;
+    }
+    if (!open) {
+      if (on.line.is_wall) {
+        plan->walls.push_back(WallBetween(on, sides, i, j, space));
+      }
+      i = j;
+      continue;
+    }
+    const auto middle = static_cast<std::size_t>((i + j) / 2);
+    PlanDoor door;
+    // Jambs lie in the middle of their cells.
+    const double margin = 0.5 * space.resolution;
+    door.begin = on.line.At(on.profile.begin + i * WallProfile::kStep - margin);
+    door.end = on.line.At(on.profile.begin + j * WallProfile::kStep + margin);
+    door.thickness = on.line.high - on.line.low;
+    door.rooms = {std::max(-1, sides.left[middle]),
+                  std::max(-1, sides.right[middle])};
+    const bool is_between = i > 0 && j < count && on.line.is_wall;
+    const bool has_both = door.rooms[0] >= 0 && door.rooms[1] >= 0;
+    if (is_between && door.width() >= options.min_door &&
+        door.width() <=
+            (has_both ? options.doors.wide : options.doors.narrow)) {
+      plan->doors.push_back(door);
+    }
+    i = j;
+  }
+}
+
+// Doors that two lines close together found twice.
+void DropDoubleDoors(std::vector<PlanDoor>* doors) {
+  std::vector<PlanDoor> kept;
+  for (const PlanDoor& door : *doors) {
+    const Vector2d middle = 0.5 * (door.begin + door.end);
+    const bool is_double =
+        std::any_of(kept.begin(), kept.end(), [&](const PlanDoor& other) {
+          const Vector2d there = 0.5 * (other.begin + other.end);
+          const bool is_same_pair = std::minmax(door.rooms[0], door.rooms[1]) ==
+                                    std::minmax(other.rooms[0], other.rooms[1]);
+          return is_same_pair && (middle - there).norm() < kSameDoor;
+        });
+    if (!is_double) kept.push_back(door);
+  }
+  *doors = std::move(kept);
+}
+
+// Which rooms and doors the robot drove through, and which rooms are
+// neighbors.
+void TakePath(const std::vector<Pose2>& path, BuildingPlan* plan) {
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Vector2d here = path[i].head<2>();
+    if (!here.allFinite()) continue;
+    for (PlanRoom& room : plan->rooms) {
+      if (!room.is_entered) room.is_entered = room.outline.Contains(here);
+    }
+    if (i == 0) continue;
+    const Vector2d before = path[i - 1].head<2>();
+    for (PlanDoor& door : plan->doors) {
+      if (!door.is_driven) {
+        door.is_driven = Cross(before, here, door.begin, door.end);
+      }
+    }
+  }
+  for (const PlanDoor& door : plan->doors) {
+    if (door.rooms[0] < 0 || door.rooms[1] < 0) continue;
+    for (const int k : {0, 1}) {
+      std::vector<int>& neighbors =
+          plan->rooms[static_cast<std::size_t>(door.rooms[k])].neighbors;
+      neighbors.push_back(door.rooms[1 - k]);
+    }
+  }
+  for (PlanRoom& room : plan->rooms) {
+    std::sort(room.neighbors.begin(), room.neighbors.end());
+    room.neighbors.erase(
+        std::unique(room.neighbors.begin(), room.neighbors.end()),
+        room.neighbors.end());
+  }
+}
+
+}  // namespace
+
+Ring BodyOf(const PlanWall& wall) {
+  const Vector2d along = (wall.end - wall.begin).normalized();
+  const Vector2d left(-along[1], along[0]);
+  return {wall.begin - wall.right * left, wall.end - wall.right * left,
+          wall.end + wall.left * left, wall.begin + wall.left * left};
+}
+
+const char* RoomKindName(PlanRoom::Kind kind) {
+  return kind == PlanRoom::Kind::kCorridor ? "corridor" : "room";
+}
+
+BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
+                              const std::vector<double>& directions,
+                              const SpaceGrid& space,
+                              const std::vector<Pose2>& path,
+                              const BuildingPlanOptions& options) {
+  std::vector<WallLine> lines =
+      FindWallLines(walls, directions, space, options.lines);
+  // The edges of furniture are no walls.
+  lines.erase(std::remove_if(lines.begin(), lines.end(),
+                             [&](const WallLine& line) {
+                               return line.weight < options.min_wall;
+                             }),
+              lines.end());
+  std::vector<DrawnLine> drawn = DrawLines(lines, options.reach);
+  MeasureLines(space, options.doors, &drawn);
+  const Arrangement arrangement = Arrange(drawn, space);
+  const std::vector<int> region = FindRegions(arrangement, options.regions);
+
+  BuildingPlan plan;
+  std::vector<int> room_of_face;
+  plan.rooms =
+      RoomsOf(arrangement, region, drawn, space, options, &room_of_face);
+  for (PlanRoom& room : plan.rooms) room.kind = KindOf(room.outline);
+  const std::vector<Sides> sides = SidesOf(arrangement, room_of_face, drawn);
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    ReadLine(drawn[i], sides[i], space, options, &plan);
+  }
+  DropDoubleDoors(&plan.doors);
+  TakePath(path, &plan);
+  return plan;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,381 @@
+#include <plumbline/plan/drawn_lines.h>
+
+#include <algorithm>
+#include <iterator>
+#include <tuple>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double kStep = WallProfile::kStep;
+constexpr double kBeside = kBesideWall;
+// Wall that goes on behind an opening is in line to this, m.
+constexpr double kInLineOffset = 0.6;
+// Samples of a row, and gaps in it.
+constexpr int kLeastRow = 6;
+constexpr int kRowGap = 2;
+// How far around a place wall in line with it speaks for it, m.
+constexpr double kAround = 5.0;
+// So many metres of it are enough.
+constexpr double kFullWall = 4.0;
+// What a lone piece of wall holds, an unknown place, and what a door lets
+// through: alone, and how much less in a long wall.
+constexpr double kLeastWallHolds = 0.4;
+constexpr double kUnknownHolds = 0.2;
+constexpr double kDoorHolds = 0.2;
+constexpr double kImportantDoor = 0.6;
+// Share of wall around an opening from which on it counts as a door, and from
+// which on fully.
+constexpr double kBareFlanks = 0.3;
+constexpr double kFullFlanks = 0.6;
+
+// Where two lines meet: along each.
+bool Crossing(const WallLine& a, const WallLine& b, double* t_a, double* t_b) {
+  const double sine = a.along[0] * b.along[1] - a.along[1] * b.along[0];
+  if (std::abs(sine) < std::sin(DegToRad(10.0))) return false;
+  const Vector2d between = b.origin - a.origin;
+  *t_a = (between[0] * b.along[1] - between[1] * b.along[0]) / sine;
+  *t_b = (between[0] * a.along[1] - between[1] * a.along[0]) / sine;
+  return true;
+}
+
+// Draws lines on to those that they would meet.
+void DrawOn(double reach, std::vector<DrawnLine>* drawn) {
+  constexpr double kBeyond = 1.5;
+  constexpr int kMeetings = 2;
+  struct Meeting {
+    double distance;
+    std::size_t other;
+    double t, t_other;
+  };
+  const std::size_t size = drawn->size();
+  std::vector<std::pair<double, double>> ends(size);
+  for (std::size_t i = 0; i < size; ++i) {
+    ends[i] = {(*drawn)[i].line.begin, (*drawn)[i].line.end};
+  }
+  const auto stretch = [&](std::size_t i, double t) {
+    ends[i].first = std::min(ends[i].first, t);
+    ends[i].second = std::max(ends[i].second, t);
+  };
+  for (std::size_t i = 0; i < size; ++i) {
+    const WallLine& line = (*drawn)[i].line;
+    std::vector<Meeting> before, after;
+    for (std::size_t j = 0; j < size; ++j) {
+      if (j == i) continue;
+      const WallLine& other = (*drawn)[j].line;
+      double t, t_other;
+      if (!Crossing(line, other, &t, &t_other)) {
+        // The wall that goes on behind an opening.
+        const double begin = std::min(line.Along(other.At(other.begin)),
+                                      line.Along(other.At(other.end)));
+        const double end = std::max(line.Along(other.At(other.begin)),
+                                    line.Along(other.At(other.end)));
+        const double across = std::abs(
+            line.Across(other.At(begin > line.end ? other.begin : other.end)));
+        if (across > kInLineOffset) continue;
+        if (begin > line.end && begin - line.end <= reach) stretch(i, begin);
+        if (end < line.begin && line.begin - end <= reach) stretch(i, end);
+        continue;
+      }
+      const double beyond =
+          std::max({0.0, other.begin - t_other, t_other - other.end});
+      if (beyond > kBeyond) continue;
+      const double low = line.begin - t;
+      const double high = t - line.end;
+      // What a line meets within itself may still have to be drawn up to it.
+      if (low <= 0.0 && high <= 0.0) {
+        if (beyond <= kBeyond) stretch(j, t_other);
+      } else if (low > 0.0 && low <= reach) {
+        before.push_back({low, j, t, t_other});
+      } else if (high > 0.0 && high <= reach) {
+        after.push_back({high, j, t, t_other});
+      }
+    }
+    for (std::vector<Meeting>* meetings : {&before, &after}) {
+      std::sort(meetings->begin(), meetings->end(),
+                [](const Meeting& a, const Meeting& b) {
+                  return std::make_tuple(a.distance, a.other) <
+                         std::make_tuple(b.distance, b.other);
+                });
+      double last = -1.0;
+      int count = 0;
+      for (const Meeting& meeting : *meetings) {
+        // Lines close together count as one.
+        if (last >= 0.0 && meeting.distance > last + 0.5 &&
+            count >= kMeetings) {
+          break;
+        }
+        if (last < 0.0 || meeting.distance > last + 0.5) ++count;
+        last = meeting.distance;
+        stretch(i, meeting.t);
+        stretch(meeting.other, meeting.t_other);
+      }
+    }
+  }
+  // A little more, so that rounding leaves no gap.
+  for (std::size_t i = 0; i < size; ++i) {
+    (*drawn)[i].from = ends[i].first - 0.01;
+    (*drawn)[i].to = ends[i].second + 0.01;
+  }
+}
+
+// Lines across the ends of others: without them a space whose end was not seen
+// would not be closed.
+std::vector<DrawnLine> Caps(const std::vector<DrawnLine>& drawn, double reach) {
+  std::vector<DrawnLine> caps;
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    const WallLine& line = drawn[i].line;
+    for (const double end : {line.begin, line.end}) {
+      bool is_met = false;
+      for (std::size_t j = 0; j < drawn.size() && !is_met; ++j) {
+        double t, t_other;
+        if (j == i || !Crossing(line, drawn[j].line, &t, &t_other)) continue;
+        is_met = std::abs(t - end) < 0.4 && t_other >= drawn[j].from &&
+                 t_other <= drawn[j].to;
+      }
+      if (is_met) continue;
+      DrawnLine cap;
+      cap.line.is_wall = false;
+      cap.line.origin = line.At(end);
+      cap.line.along = line.normal();
+      double before = -reach, after = reach;
+      bool has_before = false, has_after = false;
+      for (std::size_t j = 0; j < drawn.size(); ++j) {
+        double t, t_other;
+        if (j == i || !Crossing(cap.line, drawn[j].line, &t, &t_other))
+          continue;
+        if (t_other < drawn[j].from || t_other > drawn[j].to) continue;
+        if (t > 0.2 && t < after) {
+          after = t;
+          has_after = true;
+        } else if (t < -0.2 && t > before) {
+          before = t;
+          has_before = true;
+        }
+      }
+      cap.from = has_before ? before - 0.01 : 0.0;
+      cap.to = has_after ? after + 0.01 : 0.0;
+      cap.line.begin = cap.from;
+      cap.line.end = cap.to;
+      if (cap.to > cap.from) caps.push_back(cap);
+    }
+  }
+  return caps;
+}
+
+Mark MarkAt(const WallLine& line, double t, const SpaceGrid& space) {
+  const double step = space.resolution;
+  const Vector2d here = line.At(t);
+  int free = 0;
+  int all = 0;
+  for (double v = line.low - kBeside; v <= line.high + kBeside + 1e-9;
+       v += step) {
+    switch (space.At(Vector2d(here + v * line.normal()))) {
+      case Space::kOccupied:
+        return Mark::kWall;
+      case Space::kFree:
+        ++free;
+        break;
+      case Space::kUnknown:
+        break;
+    }
+    ++all;
+  }
+  return free >= 0.7 * all ? Mark::kOpen : Mark::kUnknown;
+}
+
+// Which samples are in rows of occupied cells along the line, not only beside
+// some furniture.
+void FindRows(const SpaceGrid& space, DrawnLine* drawn) {
+  const WallLine& line = drawn->line;
+  WallProfile& profile = drawn->profile;
+  const int count = profile.size();
+  profile.in_row.assign(profile.marks.size(), false);
+  std::vector<bool> before(profile.marks.size(), false);
+  for (double v = line.low - kBeside; v <= line.high + kBeside + 1e-9;
+       v += space.resolution) {
+    std::vector<bool> here(profile.marks.size(), false);
+    for (int i = 0; i < count; ++i) {
+      if (profile.marks[static_cast<std::size_t>(i)] != Mark::kWall) continue;
+      here[static_cast<std::size_t>(i)] =
+          space.At(Vector2d(line.At(profile.MiddleOf(i)) +
+                            v * line.normal())) == Space::kOccupied;
+    }
+    int begin = -1;
+    int last = -1;
+    const auto finish = [&] {
+      if (begin >= 0 && last - begin + 1 >= kLeastRow) {
+        std::fill(profile.in_row.begin() + begin,
+                  profile.in_row.begin() + last + 1, true);
+      }
+    };
+    for (int i = 0; i < count; ++i) {
+      if (!here[static_cast<std::size_t>(i)] &&
+          !before[static_cast<std::size_t>(i)]) {
+        continue;
+      }
+      if (begin < 0 || i - last - 1 > kRowGap) {
+        finish();
+        begin = i;
+      }
+      last = i;
+    }
+    finish();
+    before = std::move(here);
+  }
+}
+
+// What lies along a line as the raster has it.
+void Measure(const SpaceGrid& space, DrawnLine* drawn) {
+  WallProfile& profile = drawn->profile;
+  profile.begin = drawn->from;
+  const int count = std::max(
+      1, static_cast<int>(std::ceil((drawn->to - drawn->from) / kStep)));
+  profile.marks.resize(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    profile.marks[static_cast<std::size_t>(i)] =
+        MarkAt(drawn->line, profile.MiddleOf(i), space);
+  }
+  FindRows(space, drawn);
+}
+
+// Share of wall within `reach` of a place on a line.
+double WallShare(const WallProfile& profile, double t, double reach) {
+  const int first = std::max(0, profile.IndexOf(t - reach));
+  const int last = std::min(profile.size() - 1, profile.IndexOf(t + reach));
+  if (last < first) return 0.0;
+  const auto begin = profile.marks.begin();
+  return static_cast<double>(
+             std::count(begin + first, begin + last + 1, Mark::kWall)) /
+         (last - first + 1);
+}
+
+// Where walls cross a line, along it.
+std::vector<double> WallCrossings(const std::vector<DrawnLine>& drawn,
+                                  std::size_t line) {
+  std::vector<double> crossings;
+  for (std::size_t j = 0; j < drawn.size(); ++j) {
+    double t, t_other;
+    if (j == line || !drawn[j].line.is_wall ||
+        !Crossing(drawn[line].line, drawn[j].line, &t, &t_other) ||
+        t < drawn[line].from || t > drawn[line].to || t_other < drawn[j].from ||
+        t_other > drawn[j].to) {
+      continue;
+    }
+    if (std::max(WallShare(drawn[j].profile, t_other - 0.3, 0.3),
+                 WallShare(drawn[j].profile, t_other + 0.3, 0.3)) >= 0.6) {
+      crossings.push_back(t);
+    }
+  }
+  return crossings;
+}
+
+// What is in no row of cells is furniture, unless another wall crosses there.
+void DropSpecks(const std::vector<double>& crossings, WallProfile* profile) {
+  for (int i = 0; i < profile->size(); ++i) {
+    Mark& mark = profile->marks[static_cast<std::size_t>(i)];
+    if (profile->in_row[static_cast<std::size_t>(i)]) {
+      mark = Mark::kWall;
+    } else if (mark == Mark::kWall) {
+      const double t = profile->MiddleOf(i);
+      const bool is_crossed = std::any_of(
+          crossings.begin(), crossings.end(),
+          [&](double crossing) { return std::abs(crossing - t) <= 0.2; });
+      if (!is_crossed) mark = Mark::kOpen;
+    }
+  }
+}
+
+// Finds doors, openings with wall on both sides, and what each place holds.
+void Weigh(const DoorOptions& options, bool is_wall, WallProfile* profile) {
+  std::vector<Mark>& marks = profile->marks;
+  const int count = profile->size();
+  profile->holds.assign(marks.size(), -1.0);
+  const int around = static_cast<int>(kAround / kStep);
+  std::vector<int> walls_before(marks.size() + 1, 0);
+  for (std::size_t i = 0; i < marks.size(); ++i) {
+    walls_before[i + 1] = walls_before[i] + (marks[i] == Mark::kWall);
+  }
+  const auto walls = [&](int first, int last) {
+    return walls_before[static_cast<std::size_t>(std::min(last, count))] -
+           walls_before[static_cast<std::size_t>(std::max(first, 0))];
+  };
+  for (int i = 0; i < count;) {
+    const bool is_here = marks[static_cast<std::size_t>(i)] == Mark::kWall;
+    if (is_here) {
+      const double near = walls(i - around, i + around + 1) * kStep;
+      profile->holds[static_cast<std::size_t>(i)] =
+          is_wall ? kLeastWallHolds + (1.0 - kLeastWallHolds) *
+                                          std::min(1.0, near / kFullWall)
+                  : 0.0;
+      ++i;
+      continue;
+    }
+    int j = i;
+    int open = 0;
+    while (j < count && marks[static_cast<std::size_t>(j)] != Mark::kWall) {
+      open += marks[static_cast<std::size_t>(j)] == Mark::kOpen;
+      ++j;
+    }
+    const double width = (j - i) * kStep;
+    const int first = std::max(0, i - around);
+    const int last = std::min(count, j + around);
+    const int length = std::max(1, last - first - (j - i));
+    const double covered = static_cast<double>(walls(first, last)) / length;
+    const bool is_between = is_wall && i > 0 && j < count;
+    const double narrow = std::clamp(
+        (options.wide - width) / (options.wide - options.narrow), 0.0, 1.0);
+    const double flanked = std::clamp(
+        (covered - kBareFlanks) / (kFullFlanks - kBareFlanks), 0.0, 1.0);
+    const double important =
+        std::min(1.0, walls(first, last) * kStep / kFullWall);
+    const double as_door = is_between ? narrow * flanked : 0.0;
+    for (int k = i; k < j; ++k) {
+      const bool is_open = marks[static_cast<std::size_t>(k)] == Mark::kOpen;
+      profile->holds[static_cast<std::size_t>(k)] =
+          is_open
+              ? -1.0 + as_door * (1.0 - kDoorHolds + kImportantDoor * important)
+              : (is_wall ? kUnknownHolds : 0.0);
+    }
+    if (is_between && width <= options.wide && open * 2 >= j - i &&
+        covered >= 0.4) {
+      std::fill(marks.begin() + i, marks.begin() + j, Mark::kDoor);
+    }
+    i = j;
+  }
+}
+
+}  // namespace
+
+std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
+                                 double reach) {
+  std::vector<DrawnLine> drawn;
+  for (const WallLine& line : lines) {
+    DrawnLine entry;
+    entry.line = line;
+    drawn.push_back(std::move(entry));
+  }
+  DrawOn(reach, &drawn);
+  std::vector<DrawnLine> caps = Caps(drawn, reach);
+  drawn.insert(drawn.end(), std::make_move_iterator(caps.begin()),
+               std::make_move_iterator(caps.end()));
+  return drawn;
+}
+
+void MeasureLines(const SpaceGrid& space, const DoorOptions& options,
+                  std::vector<DrawnLine>* drawn) {
+  for (DrawnLine& line : *drawn) Measure(space, &line);
+  std::vector<std::vector<double>> crossings(drawn->size());
+  for (std::size_t i = 0; i < drawn->size(); ++i) {
+    crossings[i] = WallCrossings(*drawn, i);
+  }
+  for (std::size_t i = 0; i < drawn->size(); ++i) {
+    DropSpecks(crossings[i], &(*drawn)[i].profile);
+    Weigh(options, (*drawn)[i].line.is_wall, &(*drawn)[i].profile);
+  }
+}
+
+}  // namespace plumbline

@@ -1,0 +1,75 @@
+#ifndef PLUMBLINE_PLAN_DRAWN_LINES_H_
+#define PLUMBLINE_PLAN_DRAWN_LINES_H_
+
+#include <plumbline/plan/space_grid.h>
+#include <plumbline/plan/wall_lines.h>
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace plumbline {
+
+/// What a place on a line of walls is.
+enum class Mark : std::uint8_t { kUnknown, kOpen, kWall, kDoor };
+
+/// What is known along a line, a sample every few centimetres.
+struct WallProfile {
+  /// Between samples, m.
+  static constexpr double kStep = 0.05;
+
+  /// Where the first sample begins, along the line, m.
+  double begin = 0.0;
+  std::vector<Mark> marks;
+  /// How much each sample keeps apart what lies on its sides: 1 for a wall, -1
+  /// for nothing at all.
+  std::vector<double> holds;
+  /// Samples that lie in a row of occupied cells along the line.
+  std::vector<bool> in_row;
+
+  int size() const { return static_cast<int>(marks.size()); }
+  Mark At(int i) const { return marks[static_cast<std::size_t>(i)]; }
+  /// The sample at `t`, m; may lie outside.
+  int IndexOf(double t) const {
+    return static_cast<int>(std::floor((t - begin) / kStep));
+  }
+  double MiddleOf(int i) const { return begin + (i + 0.5) * kStep; }
+};
+
+/// A line of walls as far as it is drawn, m along it.
+struct DrawnLine {
+  WallLine line;
+  double from = 0.0;
+  double to = 0.0;
+  WallProfile profile;
+};
+
+/// What is a door.
+struct DoorOptions {
+  /// Openings up to this width in a wall are doors, m, ...
+  double narrow = 1.2;
+  /// ... from this width on they are none, and in between more or less.
+  double wide = 2.2;
+};
+
+/// Occupied cells this far beside the faces of a wall still belong to it, m.
+constexpr double kBesideWall = 0.1;
+
+/// Draws lines on to others that they meet within `reach`, m, and closes spaces
+/// whose ends were not seen with further lines, across the ends of walls, which
+/// have WallLine::is_wall false.
+std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
+                                 double reach);
+
+/// Fills the profiles of all lines.
+///
+/// A sample is wall where a row of occupied cells runs along the line (legs of
+/// chairs and the edges of other walls make no row). An opening with wall on
+/// both sides is a door, the more so the narrower it is and the more wall there
+/// is in line with it.
+void MeasureLines(const SpaceGrid& space, const DoorOptions& options,
+                  std::vector<DrawnLine>* drawn);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PLAN_DRAWN_LINES_H_

@@ -1,0 +1,213 @@
+#include <plumbline/plan/min_cut.h>
+#include <plumbline/plan/regions.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Space that was not seen is filled up to this, m^2.
+constexpr double kMaxPocket = 4.0;
+// Share of a pocket's border that a room must have, and that may lie open to
+// what is no room.
+constexpr double kLeastPocketBorder = 0.2;
+constexpr double kMaxExposed = 0.2;
+// An opening, m.
+constexpr double kLeastOpening = 0.5;
+
+std::vector<bool> InsideOf(const Arrangement& arrangement,
+                           const RegionOptions& options) {
+  MinCut cut(arrangement.faces.size());
+  for (std::size_t i = 0; i < arrangement.faces.size(); ++i) {
+    cut.AddNodeCost(i, arrangement.free[i], arrangement.unknown[i]);
+  }
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    const double cost =
+        options.border_cost *
+        (edge.lengths.Of(Mark::kOpen) + edge.lengths.Of(Mark::kUnknown) +
+         0.1 * (edge.lengths.Of(Mark::kWall) + edge.lengths.Of(Mark::kDoor)));
+    if (edge.right < 0) {
+      cut.AddNodeCost(static_cast<std::size_t>(edge.left), 0.0, cost);
+    } else {
+      cut.AddEdgeCost(static_cast<std::size_t>(edge.left),
+                      static_cast<std::size_t>(edge.right), cost);
+    }
+  }
+  return cut.Solve();
+}
+
+// Over -holds_apart: nothing keeps two regions apart.
+double Openness(const BorderLengths& border) {
+  const double length = border.length();
+  return length < 1e-6 ? -1.0 : -border.holds / length;
+}
+
+// Over 0: nothing but an opening as wide as the space itself, while a door has
+// a wall beside it.
+double Through(const BorderLengths& border, const RegionOptions& options) {
+  const double open = border.Of(Mark::kOpen) + border.Of(Mark::kDoor);
+  if (open <= kLeastOpening) return -1.0;
+  return options.least_wall_share - border.Of(Mark::kWall) / border.length();
+}
+
+// Joins faces across borders that are open, the most open first; the region of
+// each face, -1 for those outside.
+std::vector<int> Merge(const Arrangement& arrangement,
+                       const std::vector<bool>& is_inside,
+                       const RegionOptions& options) {
+  std::vector<int> region(arrangement.faces.size(), -1);
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    if (is_inside[i]) region[i] = static_cast<int>(i);
+  }
+  std::vector<std::map<int, BorderLengths>> borders(region.size());
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    if (edge.right < 0 || edge.left == edge.right) continue;
+    if (region[static_cast<std::size_t>(edge.left)] < 0 ||
+        region[static_cast<std::size_t>(edge.right)] < 0) {
+      continue;
+    }
+    for (const auto& [a, b] : {std::make_pair(edge.left, edge.right),
+                               std::make_pair(edge.right, edge.left)}) {
+      borders[static_cast<std::size_t>(a)][b].Add(edge.lengths);
+    }
+  }
+  // The most open first; then by number.
+  using Pair = std::tuple<double, int, int>;
+  std::set<Pair> queue;
+  for (const bool is_last : {false, true}) {
+    queue.clear();
+    const auto key = [&, is_last](const BorderLengths& border, int a, int b) {
+      return Pair(is_last ? -Through(border, options) : -Openness(border),
+                  std::min(a, b), std::max(a, b));
+    };
+    for (std::size_t a = 0; a < borders.size(); ++a) {
+      for (const auto& [b, border] : borders[a]) {
+        queue.insert(key(border, static_cast<int>(a), b));
+      }
+    }
+    while (!queue.empty()) {
+      const auto [closed, a, b] = *queue.begin();
+      if (closed >= (is_last ? 0.0 : options.holds_apart)) break;
+      queue.erase(queue.begin());
+      // b goes into a.
+      auto& of_a = borders[static_cast<std::size_t>(a)];
+      auto& of_b = borders[static_cast<std::size_t>(b)];
+      of_a.erase(b);
+      of_b.erase(a);
+      for (const auto& [c, border] : of_b) {
+        auto& of_c = borders[static_cast<std::size_t>(c)];
+        queue.erase(key(border, b, c));
+        of_c.erase(b);
+        BorderLengths& joined = of_a[c];
+        queue.erase(key(joined, a, c));
+        joined.Add(border);
+        of_c[a] = joined;
+        queue.insert(key(joined, a, c));
+      }
+      of_b.clear();
+      for (int& r : region) {
+        if (r == b) r = a;
+      }
+    }
+  }
+  return region;
+}
+
+bool IsNarrow(const Polygon& polygon, double width) {
+  return Offset(polygon, -0.5 * width).empty();
+}
+
+// What is too small for a room goes to the neighbor from which least keeps it
+// apart: space in front of and behind furniture, seen or not.
+void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
+                 std::vector<int>* region) {
+  const std::size_t size = arrangement.faces.size();
+  // Pockets: regions that are no rooms, and narrow faces that were not seen.
+  std::map<int, std::vector<Polygon>> parts;
+  for (std::size_t i = 0; i < size; ++i) {
+    if ((*region)[i] < 0) continue;
+    parts[(*region)[i]].push_back(arrangement.faces[i]);
+  }
+  std::set<int> rooms;
+  for (const auto& [id, polygons] : parts) {
+    const std::vector<Polygon> outlines = UnionOf(polygons);
+    if (outlines[0].Area() >= options.min_area &&
+        !IsNarrow(outlines[0], options.min_width)) {
+      rooms.insert(id);
+    }
+  }
+  // Pockets have numbers of their own: the region's, or that of the face.
+  std::vector<int> pocket(size, -1);
+  for (std::size_t i = 0; i < size; ++i) {
+    if ((*region)[i] >= 0) {
+      if (rooms.count((*region)[i]) == 0) pocket[i] = (*region)[i];
+    } else if (arrangement.faces[i].Area() <= kMaxPocket &&
+               IsNarrow(arrangement.faces[i], options.pocket_width)) {
+      pocket[i] = static_cast<int>(i);
+    }
+  }
+  for (;;) {
+    // Borders of pockets with rooms.
+    std::map<std::pair<int, int>, BorderLengths> borders;
+    std::map<int, double> around;
+    std::map<int, double> exposed;
+    for (const ArrangementEdge& edge : arrangement.edges) {
+      for (const auto& [a, b] : {std::make_pair(edge.left, edge.right),
+                                 std::make_pair(edge.right, edge.left)}) {
+        if (a < 0) continue;
+        const int from = pocket[static_cast<std::size_t>(a)];
+        if (from < 0) continue;
+        if (b >= 0 && pocket[static_cast<std::size_t>(b)] == from) continue;
+        around[from] += edge.length();
+        if (b < 0 || (pocket[static_cast<std::size_t>(b)] < 0 &&
+                      (*region)[static_cast<std::size_t>(b)] < 0)) {
+          exposed[from] +=
+              std::max(0.0, edge.length() - std::max(0.0, edge.lengths.holds));
+        }
+        if (b < 0 || pocket[static_cast<std::size_t>(b)] >= 0 ||
+            (*region)[static_cast<std::size_t>(b)] < 0) {
+          continue;
+        }
+        borders[{from, (*region)[static_cast<std::size_t>(b)]}].Add(
+            edge.lengths);
+      }
+    }
+    double best = 0.0;
+    std::pair<int, int> which(-1, -1);
+    for (const auto& [pair, border] : borders) {
+      // Long and open borders before short and closed ones.
+      const double length = border.length();
+      if (length < kLeastPocketBorder * around[pair.first]) continue;
+      // Space beyond a wall is no part of what lies before it.
+      if (exposed[pair.first] > kMaxExposed * around[pair.first]) continue;
+      const double score = (2.0 * length - border.holds) / around[pair.first];
+      if (score > best) {
+        best = score;
+        which = pair;
+      }
+    }
+    if (which.first < 0) return;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (pocket[i] != which.first) continue;
+      pocket[i] = -1;
+      (*region)[i] = which.second;
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<int> FindRegions(const Arrangement& arrangement,
+                             const RegionOptions& options) {
+  std::vector<int> region =
+      Merge(arrangement, InsideOf(arrangement, options), options);
+  FillPockets(arrangement, options, &region);
+  return region;
+}
+
+}  // namespace plumbline

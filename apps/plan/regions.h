@@ -1,0 +1,40 @@
+#ifndef PLUMBLINE_PLAN_REGIONS_H_
+#define PLUMBLINE_PLAN_REGIONS_H_
+
+#include <plumbline/plan/arrangement.h>
+
+#include <vector>
+
+namespace plumbline {
+
+/// What a region of a building is.
+struct RegionOptions {
+  /// What the border of the building costs for each metre without a wall, in
+  /// m^2 of unknown or free space on the wrong side of it.
+  double border_cost = 0.3;
+  /// Regions are joined when what lies between them holds less than this
+  /// (WallProfile::holds, mean over the border).
+  double holds_apart = 0.3;
+  /// Regions with a lower share of wall than this between them are one: an
+  /// opening as wide as a corridor is no door.
+  double least_wall_share = 0.2;
+  /// What is smaller, m^2, or narrower, m, is no region of its own and goes to
+  /// the neighbor from which least keeps it apart.
+  double min_area = 2.0;
+  double min_width = 0.8;
+  /// So are spaces that were not seen, behind furniture, narrower than this, m.
+  double pocket_width = 0.9;
+};
+
+/// The region of each face of an arrangement: the number of one of its faces;
+/// -1 outside of the building.
+///
+/// A minimum cut says which faces are inside: free and unknown space against
+/// borders where there is no wall. Then faces join across the most open borders
+/// first.
+std::vector<int> FindRegions(const Arrangement& arrangement,
+                             const RegionOptions& options = {});
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PLAN_REGIONS_H_

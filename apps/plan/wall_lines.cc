@@ -1,0 +1,337 @@
+#include <plumbline/plan/wall_lines.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <queue>
+#include <tuple>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+// Share of a piece's length that must be occupied.
+constexpr double kLeastCovered = 0.5;
+
+// A face in one straight piece.
+struct Face {
+  // Index into the directions; -1: its own.
+  int direction = -1;
+  Vector2d begin, end;
+  double length() const { return (end - begin).norm(); }
+};
+
+Vector2d Direction(double angle) { return {std::cos(angle), std::sin(angle)}; }
+
+// The directions and those across them, each once.
+std::vector<Vector2d> AllDirections(const std::vector<double>& directions,
+                                    double same) {
+  std::vector<double> angles;
+  for (const double direction : directions) {
+    for (const double angle : {direction, direction + 0.5 * kPi}) {
+      const bool is_new =
+          std::none_of(angles.begin(), angles.end(), [&](double other) {
+            return std::abs(NormalizeAxial(angle - other)) < same;
+          });
+      if (is_new) angles.push_back(NormalizeAxial(angle));
+    }
+  }
+  std::vector<Vector2d> vectors;
+  for (const double angle : angles) vectors.push_back(Direction(angle));
+  return vectors;
+}
+
+// Occupied cells of a raster, some of which are explained already.
+class Returns {
+ public:
+  Returns(const SpaceGrid& space, const WallLineOptions& options)
+      : space_(space), options_(options) {
+    for (int row = 0; row < space.height; ++row) {
+      for (int column = 0; column < space.width; ++column) {
+        if (space.At(column, row) != Space::kOccupied) continue;
+        points_.push_back(space.Middle(column, row));
+      }
+    }
+    is_explained_.assign(points_.size(), false);
+  }
+
+  // Share of the piece's length beside which there are occupied cells.
+  double Covered(const Vector2d& begin, const Vector2d& end) const {
+    const double length = (end - begin).norm();
+    const double step = space_.resolution;
+    const int steps = std::max(1, static_cast<int>(length / step));
+    const Vector2d along = (end - begin) / length;
+    const Vector2d normal(-along[1], along[0]);
+    const int reach = static_cast<int>(options_.cell_distance / step);
+    int covered = 0;
+    for (int i = 0; i < steps; ++i) {
+      const Vector2d here = begin + (i + 0.5) * length / steps * along;
+      bool is_occupied = false;
+      for (int k = -reach; k <= reach && !is_occupied; ++k) {
+        is_occupied =
+            space_.At(Vector2d(here + k * step * normal)) == Space::kOccupied;
+      }
+      covered += is_occupied;
+    }
+    return static_cast<double>(covered) / steps;
+  }
+
+  void Explain(const std::vector<Face>& faces) {
+    // By strips of the raster: a lookup from cell to index.
+    if (index_.empty()) {
+      index_.assign(space_.cells.size(), -1);
+      for (std::size_t i = 0; i < points_.size(); ++i) {
+        index_[CellOf(points_[i])] = static_cast<std::int32_t>(i);
+      }
+    }
+    const double step = 0.5 * space_.resolution;
+    const int reach = static_cast<int>(options_.cell_distance / step);
+    for (const Face& face : faces) {
+      const double length = face.length();
+      const Vector2d along = (face.end - face.begin) / length;
+      const Vector2d normal(-along[1], along[0]);
+      for (double t = 0.0; t <= length; t += step) {
+        for (int k = -reach; k <= reach; ++k) {
+          const Vector2d p = face.begin + t * along + k * step * normal;
+          if (space_.At(p) != Space::kOccupied) continue;
+          is_explained_[static_cast<std::size_t>(index_[CellOf(p)])] = true;
+        }
+      }
+    }
+  }
+
+  // Straight rows of cells that nothing explains in a direction, the longest
+  // first; they are explained then.
+  std::vector<Face> TakeRows(const Vector2d& along, int direction) {
+    const Vector2d normal(-along[1], along[0]);
+    const double step = space_.resolution;
+    // Cells by rows of half a cell across.
+    struct Cell {
+      double t, v;
+      std::size_t index;
+    };
+    std::vector<Cell> cells;
+    double least = 0.0;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (is_explained_[i]) continue;
+      const Vector2d relative = points_[i] - space_.origin;
+      cells.push_back({along.dot(relative), normal.dot(relative), i});
+      least = std::min(least, cells.back().v);
+    }
+    double most = least;
+    for (const Cell& cell : cells) most = std::max(most, cell.v);
+    std::vector<std::vector<Cell>> rows(
+        static_cast<std::size_t>((most - least) / step) + 2);
+    for (const Cell& cell : cells) {
+      rows[static_cast<std::size_t>((cell.v - least) / step)].push_back(cell);
+    }
+    struct Run {
+      double covered;
+      std::size_t row;
+      double begin, end, offset;
+      bool operator<(const Run& other) const {
+        return std::make_tuple(covered, -static_cast<double>(row), -begin) <
+               std::make_tuple(other.covered, -static_cast<double>(other.row),
+                               -other.begin);
+      }
+    };
+    // The runs of a row and the next one together.
+    const auto runs_of = [&](std::size_t row) {
+      std::vector<Cell> both;
+      for (std::size_t k = row; k < std::min(row + 2, rows.size()); ++k) {
+        for (const Cell& cell : rows[k]) {
+          if (!is_explained_[cell.index]) both.push_back(cell);
+        }
+      }
+      std::sort(both.begin(), both.end(), [](const Cell& a, const Cell& b) {
+        return std::make_tuple(a.t, a.index) < std::make_tuple(b.t, b.index);
+      });
+      std::vector<Run> runs;
+      for (std::size_t i = 0; i < both.size();) {
+        std::size_t j = i;
+        double covered = 0.0;
+        double sum = both[i].v;
+        while (j + 1 < both.size() &&
+               both[j + 1].t - both[j].t <= options_.max_gap) {
+          ++j;
+          covered += std::min(step, both[j].t - both[j - 1].t);
+          sum += both[j].v;
+        }
+        const double length = both[j].t - both[i].t;
+        if (length >= options_.min_length &&
+            covered >= kLeastCovered * length) {
+          runs.push_back({covered, row, both[i].t, both[j].t,
+                          sum / static_cast<double>(j - i + 1)});
+        }
+        i = j + 1;
+      }
+      return runs;
+    };
+    std::priority_queue<Run> queue;
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      for (const Run& run : runs_of(row)) queue.push(run);
+    }
+    std::vector<Face> faces;
+    while (!queue.empty()) {
+      const Run best = queue.top();
+      queue.pop();
+      // Cells may have gone to others since.
+      const std::vector<Run> now = runs_of(best.row);
+      const auto same =
+          std::find_if(now.begin(), now.end(), [&](const Run& run) {
+            return run.begin == best.begin && run.end == best.end &&
+                   run.covered == best.covered;
+          });
+      if (same == now.end()) {
+        // What is left of it, each part once: those that were not queued.
+        for (const Run& run : now) {
+          if (run.begin >= best.begin && run.end <= best.end &&
+              run.covered < best.covered) {
+            queue.push(run);
+          }
+        }
+        continue;
+      }
+      Face face;
+      face.direction = direction;
+      face.begin = space_.origin + best.begin * along + best.offset * normal;
+      face.end = space_.origin + best.end * along + best.offset * normal;
+      faces.push_back(face);
+      Explain({face});
+    }
+    return faces;
+  }
+
+ private:
+  std::size_t CellOf(const Vector2d& p) const {
+    const Vector2d cell = (p - space_.origin) / space_.resolution;
+    return static_cast<std::size_t>(std::floor(cell[1])) * space_.width +
+           static_cast<std::size_t>(std::floor(cell[0]));
+  }
+
+  const SpaceGrid& space_;
+  const WallLineOptions& options_;
+  std::vector<Vector2d> points_;
+  std::vector<bool> is_explained_;
+  std::vector<std::int32_t> index_;
+};
+
+// Faces that make one line.
+struct Group {
+  WallLine line;
+  int direction = -1;
+};
+
+// Adds a face to a group when it is a part of the same wall; how far it is off,
+// or -1 when it is not.
+double Fits(const Group& group, const Face& face,
+            const WallLineOptions& options) {
+  const WallLine& line = group.line;
+  if (group.direction != face.direction) return -1.0;
+  const Vector2d along = (face.end - face.begin).normalized();
+  if (face.direction < 0 &&
+      std::abs(line.along.dot(along)) < std::cos(options.same_direction)) {
+    return -1.0;
+  }
+  const double a = line.Across(face.begin);
+  const double b = line.Across(face.end);
+  const double low = std::min({line.low, a, b});
+  const double high = std::max({line.high, a, b});
+  if (high - low > options.max_thickness) return -1.0;
+  const double begin = std::min(line.Along(face.begin), line.Along(face.end));
+  const double end = std::max(line.Along(face.begin), line.Along(face.end));
+  const double gap = std::max(begin - line.end, line.begin - end);
+  if (gap > options.in_line_gap) return -1.0;
+  // In line before near.
+  return std::max(0.0, high - low - (line.high - line.low)) +
+         0.02 * std::max(0.0, gap);
+}
+
+void Add(const Face& face, Group* group) {
+  WallLine& line = group->line;
+  const double a = line.Along(face.begin);
+  const double b = line.Along(face.end);
+  line.begin = std::min({line.begin, a, b});
+  line.end = std::max({line.end, a, b});
+  const double across = 0.5 * (line.Across(face.begin) + line.Across(face.end));
+  line.low = std::min(line.low, across);
+  line.high = std::max(line.high, across);
+  line.weight += face.length();
+  const double middle = 0.5 * (line.low + line.high);
+  line.origin += middle * line.normal();
+  line.low -= middle;
+  line.high -= middle;
+}
+
+}  // namespace
+
+std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
+                                    const std::vector<double>& directions,
+                                    const SpaceGrid& space,
+                                    const WallLineOptions& options) {
+  const std::vector<Vector2d> all =
+      AllDirections(directions, options.same_direction);
+  Returns returns(space, options);
+  std::vector<Face> faces;
+  for (const KnownWall& piece : pieces) {
+    Face face;
+    face.begin = piece.begin;
+    face.end = piece.end;
+    const double length = face.length();
+    if (!(length >= options.min_length)) continue;
+    if (returns.Covered(face.begin, face.end) < kLeastCovered) continue;
+    Vector2d along = (face.end - face.begin) / length;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const double cosine = along.dot(all[i]);
+      if (std::abs(cosine) < std::cos(options.same_direction)) continue;
+      const Vector2d middle = 0.5 * (face.begin + face.end);
+      along = cosine < 0.0 ? Vector2d(-all[i]) : all[i];
+      face.begin = middle - 0.5 * length * along;
+      face.end = middle + 0.5 * length * along;
+      face.direction = static_cast<int>(i);
+      break;
+    }
+    faces.push_back(face);
+  }
+  returns.Explain(faces);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::vector<Face> rows =
+        returns.TakeRows(all[i], static_cast<int>(i));
+    faces.insert(faces.end(), rows.begin(), rows.end());
+  }
+  std::stable_sort(
+      faces.begin(), faces.end(),
+      [](const Face& a, const Face& b) { return a.length() > b.length(); });
+  std::vector<Group> groups;
+  for (const Face& face : faces) {
+    int best = -1;
+    double best_misfit = 0.0;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      const double misfit = Fits(groups[i], face, options);
+      if (misfit < 0.0 || (best >= 0 && misfit >= best_misfit)) continue;
+      best = static_cast<int>(i);
+      best_misfit = misfit;
+    }
+    if (best < 0) {
+      Group group;
+      group.direction = face.direction;
+      group.line.origin = face.begin;
+      group.line.along = face.direction >= 0
+                             ? all[static_cast<std::size_t>(face.direction)]
+                             : (face.end - face.begin).normalized();
+      best = static_cast<int>(groups.size());
+      groups.push_back(group);
+      // Not from the origin that it was made with.
+      groups.back().line.begin = groups.back().line.Along(face.begin);
+      groups.back().line.end = groups.back().line.begin;
+    }
+    Add(face, &groups[static_cast<std::size_t>(best)]);
+  }
+  std::vector<WallLine> lines;
+  lines.reserve(groups.size());
+  for (const Group& group : groups) lines.push_back(group.line);
+  return lines;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,72 @@
+#ifndef PLUMBLINE_PLAN_WALL_LINES_H_
+#define PLUMBLINE_PLAN_WALL_LINES_H_
+
+#include <plumbline/core/wall.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/plan/polygon.h>
+#include <plumbline/plan/space_grid.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace plumbline {
+
+/// A face of a wall that is known from elsewhere, m, map frame.
+struct KnownWall {
+  Eigen::Vector2d begin = Eigen::Vector2d::Zero();
+  Eigen::Vector2d end = Eigen::Vector2d::Zero();
+};
+
+/// What makes a line of walls.
+struct WallLineOptions {
+  /// Directions that differ by less are one, rad.
+  double same_direction = DegToRad(3.0);
+  /// A row of occupied cells is a piece of wall from this length on, m, ...
+  double min_length = 0.5;
+  /// ... with no longer gaps than this, m.
+  double max_gap = 0.3;
+  /// Cells this near to a piece, m, are explained by it.
+  double cell_distance = 0.1;
+  /// Faces of one wall are no farther apart, m: the thickest wall.
+  double max_thickness = 0.3;
+  /// Pieces in line with a longer gap than this, m, are on lines of their own.
+  double in_line_gap = 3.0;
+};
+
+/// Pieces of wall in one straight line, both faces of it, plan frame, m.
+struct WallLine {
+  /// In the middle of the wall.
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();
+  Eigen::Vector2d along = Eigen::Vector2d::UnitX();
+  /// First and last wall, along the line from the origin.
+  double begin = 0.0;
+  double end = 0.0;
+  /// Where the faces lie to the left of the line: low <= 0 <= high.
+  double low = 0.0;
+  double high = 0.0;
+  /// Metres of wall.
+  double weight = 0.0;
+  /// False: drawn from the end of another line to close a space, without
+  /// anything that speaks for a wall.
+  bool is_wall = true;
+
+  Eigen::Vector2d normal() const { return {-along[1], along[0]}; }
+  Eigen::Vector2d At(double t) const { return origin + t * along; }
+  double Along(const Eigen::Vector2d& p) const { return along.dot(p - origin); }
+  double Across(const Eigen::Vector2d& p) const {
+    return normal().dot(p - origin);
+  }
+};
+
+/// Lines of walls from pieces that are known and from rows of occupied cells
+/// along `directions` (rad, modulo pi, the most important first) and across
+/// them. Pieces within WallLineOptions::same_direction of one of these get
+/// exactly that direction.
+std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
+                                    const std::vector<double>& directions,
+                                    const SpaceGrid& space,
+                                    const WallLineOptions& options = {});
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PLAN_WALL_LINES_H_

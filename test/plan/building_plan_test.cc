@@ -1,0 +1,173 @@
+#include <gtest/gtest.h>
+#include <plumbline/plan/building_plan.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+// A raster drawn by rectangles, m.
+class Drawing {
+ public:
+  Drawing(double width, double height) {
+    space_.width = static_cast<int>(width / space_.resolution);
+    space_.height = static_cast<int>(height / space_.resolution);
+    space_.cells.assign(static_cast<std::size_t>(space_.width) * space_.height,
+                        Space::kUnknown);
+  }
+
+  Drawing& Fill(double x1, double y1, double x2, double y2, Space what) {
+    const auto cell = [&](double v) {
+      return static_cast<int>(std::lround(v / space_.resolution));
+    };
+    for (int row = cell(y1); row < cell(y2); ++row) {
+      for (int column = cell(x1); column < cell(x2); ++column) {
+        space_.cells[static_cast<std::size_t>(row) * space_.width + column] =
+            what;
+      }
+    }
+    return *this;
+  }
+  Drawing& Free(double x1, double y1, double x2, double y2) {
+    return Fill(x1, y1, x2, y2, Space::kFree);
+  }
+  // A room whose faces lie on the rectangle: its rim is occupied.
+  Drawing& Room(double x1, double y1, double x2, double y2) {
+    Fill(x1 - 0.05, y1 - 0.05, x2 + 0.05, y2 + 0.05, Space::kOccupied);
+    return Free(x1, y1, x2, y2);
+  }
+  const SpaceGrid& space() const { return space_; }
+
+ private:
+  SpaceGrid space_;
+};
+
+// A corridor below, two rooms above it with a door each, walls of 20 cm.
+Drawing TwoRooms() {
+  Drawing drawing(14.0, 12.0);
+  drawing.Room(1.0, 1.0, 13.0, 3.0);
+  drawing.Room(1.0, 3.2, 6.0, 8.0).Room(6.2, 3.2, 13.0, 8.0);
+  drawing.Free(2.0, 2.9, 2.9, 3.3).Free(8.0, 2.9, 8.9, 3.3);
+  return drawing;
+}
+
+BuildingPlan PlanOf(const Drawing& drawing,
+                    const std::vector<Pose2>& path = {}) {
+  return MakeBuildingPlan({}, {0.0}, drawing.space(), path);
+}
+
+TEST(BuildingPlanTest, RoomsAndDoorsOfACorridor) {
+  const std::vector<Pose2> path = {Pose2(2.4, 2.0, 0.0), Pose2(2.4, 4.0, 0.0)};
+  const BuildingPlan plan = PlanOf(TwoRooms(), path);
+  ASSERT_EQ(plan.rooms.size(), 3u);
+  EXPECT_NEAR(plan.rooms[0].area, 6.8 * 4.8, 1.0);
+  EXPECT_NEAR(plan.rooms[1].area, 24.0, 0.8);
+  EXPECT_NEAR(plan.rooms[2].area, 24.0, 0.8);
+  const auto corridor = std::find_if(
+      plan.rooms.begin(), plan.rooms.end(), [](const PlanRoom& room) {
+        return room.kind == PlanRoom::Kind::kCorridor;
+      });
+  ASSERT_NE(corridor, plan.rooms.end());
+  EXPECT_TRUE(corridor->outline.Contains({7.0, 2.0}));
+  EXPECT_EQ(corridor->neighbors.size(), 2u);
+  ASSERT_EQ(plan.doors.size(), 2u);
+  int driven = 0;
+  for (const PlanDoor& door : plan.doors) {
+    EXPECT_NEAR(door.width(), 0.9, 0.11);
+    EXPECT_NEAR(door.begin[1], 3.1, 0.05);
+    EXPECT_GE(std::min(door.rooms[0], door.rooms[1]), 0);
+    driven += door.is_driven;
+  }
+  EXPECT_EQ(driven, 1);
+  const auto entered =
+      std::count_if(plan.rooms.begin(), plan.rooms.end(),
+                    [](const PlanRoom& room) { return room.is_entered; });
+  EXPECT_EQ(entered, 2);
+}
+
+// No wall stands in a door, and each is joined to others at its ends.
+TEST(BuildingPlanTest, WallsCloseTheRooms) {
+  const BuildingPlan plan = PlanOf(TwoRooms());
+  double length = 0.0;
+  for (const PlanWall& wall : plan.walls) {
+    length += (wall.end - wall.begin).norm();
+    EXPECT_GE(wall.left + wall.right, 0.09);
+    EXPECT_LT(wall.left + wall.right, 0.4);
+    for (const PlanDoor& door : plan.doors) {
+      Polygon body;
+      body.shell = BodyOf(wall);
+      EXPECT_FALSE(body.Contains(0.5 * (door.begin + door.end)));
+    }
+  }
+  // Around, between the rooms, and to the corridor without the doors.
+  EXPECT_NEAR(length, 2 * (12.2 + 7.2) + 5.0 + 12.2 - 1.8, 2.5);
+}
+
+TEST(BuildingPlanTest, TurnedBuildingIsTheSame) {
+  const Drawing drawing = TwoRooms();
+  const BuildingPlan straight = PlanOf(drawing);
+  // Every cell of a larger raster looks up its place in the drawing.
+  SpaceGrid turned;
+  turned.origin = Vector2d(-12.0, -3.0);
+  turned.width = 500;
+  turned.height = 500;
+  const double angle = 0.5;
+  for (int row = 0; row < turned.height; ++row) {
+    for (int column = 0; column < turned.width; ++column) {
+      const Vector2d p = turned.Middle(column, row);
+      turned.cells.push_back(drawing.space().At(
+          Vector2d(std::cos(angle) * p[0] + std::sin(angle) * p[1],
+                   -std::sin(angle) * p[0] + std::cos(angle) * p[1])));
+    }
+  }
+  const BuildingPlan plan = MakeBuildingPlan({}, {angle}, turned, {});
+  ASSERT_EQ(plan.rooms.size(), straight.rooms.size());
+  for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
+    EXPECT_NEAR(plan.rooms[i].area, straight.rooms[i].area, 1.0);
+  }
+  EXPECT_EQ(plan.doors.size(), straight.doors.size());
+}
+
+TEST(BuildingPlanTest, FurnitureIsNoWall) {
+  Drawing drawing = TwoRooms();
+  drawing.Fill(8.0, 5.0, 9.2, 5.6, Space::kOccupied);
+  drawing.Fill(10.0, 6.0, 10.1, 6.1, Space::kOccupied);
+  EXPECT_EQ(PlanOf(drawing).rooms.size(), 3u);
+}
+
+TEST(BuildingPlanTest, AWideOpeningJoins) {
+  Drawing drawing = TwoRooms();
+  drawing.Free(5.9, 4.0, 6.3, 8.0);
+  EXPECT_EQ(PlanOf(drawing).rooms.size(), 2u);
+}
+
+TEST(BuildingPlanTest, OneRoomAndOneCorridor) {
+  const BuildingPlan room = PlanOf(Drawing(8.0, 8.0).Room(1, 1, 6, 5));
+  ASSERT_EQ(room.rooms.size(), 1u);
+  EXPECT_NEAR(room.rooms[0].area, 20.0, 0.7);
+  EXPECT_EQ(room.rooms[0].kind, PlanRoom::Kind::kRoom);
+  EXPECT_TRUE(room.doors.empty());
+  const BuildingPlan corridor = PlanOf(Drawing(32.0, 5.0).Room(1, 1, 31, 3));
+  ASSERT_EQ(corridor.rooms.size(), 1u);
+  EXPECT_EQ(corridor.rooms[0].kind, PlanRoom::Kind::kCorridor);
+}
+
+TEST(BuildingPlanTest, NoWallsNoRooms) {
+  EXPECT_TRUE(PlanOf(Drawing(20.0, 20.0).Free(1, 1, 19, 19)).rooms.empty());
+  EXPECT_TRUE(PlanOf(Drawing(20.0, 20.0)).rooms.empty());
+  EXPECT_TRUE(MakeBuildingPlan({}, {}, SpaceGrid(), {}).rooms.empty());
+  // A lone wall in the open, and trees.
+  Drawing open(20.0, 20.0);
+  open.Free(1, 1, 19, 19).Fill(3, 10, 9, 10.1, Space::kOccupied);
+  for (double x = 4.0; x < 18.0; x += 3.0) {
+    open.Fill(x, 15.0, x + 0.3, 15.3, Space::kOccupied);
+  }
+  EXPECT_TRUE(PlanOf(open).rooms.empty());
+}
+
+}  // namespace
+}  // namespace plumbline

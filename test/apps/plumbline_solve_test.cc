@@ -585,7 +585,7 @@ TEST_F(SolveTest, FilesOfAnEarlierRun) {
                                  "map.svg", "notes.txt", "summary.json"}));
   EXPECT_EQ(Files("out/elsewhere"), Names{"map.png"});
   EXPECT_THAT(output, HasSubstr("map.svg (no regular file)\n"));
-  EXPECT_THAT(output, HasSubstr(", report.html, trajectory.tum\n"));
+  EXPECT_THAT(output, HasSubstr(", report.html, rooms.csv, trajectory.tum\n"));
   EXPECT_THAT(output, Not(HasSubstr("map.json")));
 
   // A graph has no path of scans.

@@ -119,6 +119,43 @@ void OdometryRefiner::RebuildReference(Track* track) {
   track->matcher.SetReference(std::move(reference), std::move(viewpoints));
 }
 
+MatchResult OdometryRefiner::MatchPoints(const std::vector<ScanPoint>& points,
+                                         const MatchPrior& prior,
+                                         double distance, double turn) {
+  const ScanMatcher& matcher = track_.matcher;
+  MatchResult match = matcher.Refine(points, prior.pose, prior);
+  if (match.inlier_ratio < options_.good_inlier_ratio ||
+      turn > options_.search_turn) {
+    ++wide_searches_;
+    // Twice the distance: some odometry gives the way travelled backwards
+    // as if it were forwards.
+    const Pose2 found = matcher.Search(
+        points, prior.pose,
+        std::min(options_.search_translation + 2.0 * (distance + track_.way),
+                 options_.max_search_translation),
+        std::min(kPi, options_.search_rotation + turn + track_.turn), nullptr);
+    MatchPrior overruled = prior;
+    overruled.information.row(2).setZero();
+    overruled.information.col(2).setZero();
+    const MatchResult wide = matcher.Refine(points, found, overruled);
+    // The scan has to speak clearly for another pose than odometry's.
+    if (wide.cost < match.cost - 0.02) match = wide;
+  }
+  return match;
+}
+
+std::vector<ScanPoint> OdometryRefiner::WithoutClutter(const Scan& scan) const {
+  std::vector<ScanPoint> standing;
+  std::vector<bool> clutter;
+  const int marked = MarkClutter(scan, points_, options_.clutter, &clutter);
+  if (marked > options_.max_clutter * static_cast<double>(points_.size())) {
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (!clutter[i]) standing.push_back(points_[i]);
+    }
+  }
+  return standing;
+}
+
 OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
                                                 const Pose2& motion) {
   const TrackingOptions& tracking = options_.tracking;
@@ -147,23 +184,28 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
                                                      turn + track.turn),
                                                options_.noise)
                                 .inverse();
-  MatchResult match = track.matcher.Refine(points_, result.pose, prior);
-  if (match.inlier_ratio < options_.good_inlier_ratio ||
-      turn > options_.search_turn) {
-    ++wide_searches_;
-    // Twice the distance: some odometry gives the way travelled backwards
-    // as if it were forwards.
-    const Pose2 found = track.matcher.Search(
-        points_, result.pose,
-        std::min(options_.search_translation + 2.0 * (distance + track.way),
-                 options_.max_search_translation),
-        std::min(kPi, options_.search_rotation + turn + track.turn), nullptr);
-    MatchPrior overruled = prior;
-    overruled.information.row(2).setZero();
-    overruled.information.col(2).setZero();
-    const MatchResult wide = track.matcher.Refine(points_, found, overruled);
-    // The scan has to speak clearly for another pose than odometry's.
-    if (wide.cost < match.cost - 0.02) match = wide;
+  MatchResult match = MatchPoints(points_, prior, distance, turn);
+  if (track.moving > 0) --track.moving;
+  Eigen::Vector3d left = match.pose - prior.pose;
+  left[2] = NormalizeAngle(left[2]);
+  if (track.moving > 0 || match.inlier_ratio < options_.good_inlier_ratio ||
+      left.dot(prior.information * left) > options_.clutter_innovation) {
+    // What may move is not what stands: where it speaks for another pose than
+    // the rest, the rest counts.
+    std::vector<ScanPoint> standing = WithoutClutter(scan);
+    if (!standing.empty()) {
+      const MatchResult other = MatchPoints(standing, prior, distance, turn);
+      const Pose2 apart = Between(match.pose, other.pose);
+      if (other.inlier_ratio >= options_.minimum_inlier_ratio &&
+          other.inliers >= options_.minimum_points &&
+          (apart.head<2>().norm() > options_.clutter_distance ||
+           std::abs(apart[2]) > options_.clutter_rotation)) {
+        match = other;
+        points_ = std::move(standing);
+        track.moving = options_.clutter_memory;
+        if (trace_) trace_("without clutter");
+      }
+    }
   }
   bool believed = match.inlier_ratio >= options_.good_inlier_ratio;
   if (!believed || track.after_gap) {
@@ -395,13 +437,18 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
   // A scan that was refused anchors nothing.
   if (moved && (!result.odometry_only || !options_.match_scans)) {
     result.is_key = true;
+    done.points = points_;
+    // Where things move, what may move enters no reference.
+    if (track_.moving > 0) {
+      std::vector<ScanPoint> standing = WithoutClutter(scan);
+      if (!standing.empty()) points_ = std::move(standing);
+    }
     track_.keys.push_back({index, result.pose, points_, laser});
     while (static_cast<int>(track_.keys.size()) > options_.window) {
       track_.keys.pop_front();
     }
     RebuildReference(&track_);
     track_.since_key = UncertainPose2();
-    done.points = points_;
   }
   if (open_ == nullptr) {
     if (result.is_key) Archive(track_.keys.back());

@@ -107,6 +107,18 @@ struct OdometryRefinementOptions {
   /// odometry's (the paper's method).
   bool match_scans = true;
   ScanPointsOptions points;
+  ClutterOptions clutter;
+  /// A match that is not good, or whose chi-square against odometry is larger
+  /// than this, is asked for without the returns on clutter, too, when they
+  /// have more than this share. What the rest says stands when the two lie
+  /// farther apart than this, m and rad: something moves.
+  double clutter_innovation = 4.0;
+  double max_clutter = 0.1;
+  double clutter_distance = 0.05;
+  double clutter_rotation = DegToRad(1.5);
+  /// Scans after that in which clutter is doubted and stays out of the
+  /// reference.
+  int clutter_memory = 20;
   ScanMatcherOptions matcher;
   OdometryNoise noise;
   MatchDrift drift;
@@ -245,6 +257,8 @@ class OdometryRefiner {
     double way = 0.0;
     double turn = 0.0;
     int refused = 0;
+    // Scans for which it is known that something moves.
+    int moving = 0;
     bool after_gap = false;
     // Returns of the last scan.
     std::vector<ScanPoint> last_points;
@@ -275,6 +289,13 @@ class OdometryRefiner {
 
   void RebuildReference(Track* track);
   Outcome Match(const Scan& scan, const Pose2& motion);
+  // Returns of the last scan that do not lie on clutter; none when there is
+  // little of it.
+  std::vector<ScanPoint> WithoutClutter(const Scan& scan) const;
+  // The best pose of `points` near the prior's.
+  MatchResult MatchPoints(const std::vector<ScanPoint>& points,
+                          const MatchPrior& prior, double distance,
+                          double turn);
   void Lose(const Scan& scan, const std::string& why, bool odometry_holds);
   // Looks for the tie; settles the track when it is found or `last`.
   void Tie(bool last);

@@ -6,10 +6,13 @@
 namespace plumbline {
 namespace {
 
+// Beams that are next to each other though some between them have no return.
+constexpr int kNeighborBeams = 3;
+
 bool SameSurface(const ScanPoint& a, const ScanPoint& b, double angle_step,
                  const ScanPointsOptions& options) {
   const int beams = b.beam - a.beam;
-  if (beams > 3) return false;
+  if (beams > kNeighborBeams) return false;
   const double spread = std::sqrt(2.0) * std::max(a.range, b.range) *
                         std::abs(angle_step) * beams;
   const double limit = std::max(options.gap, options.gap_factor * spread);
@@ -91,6 +94,72 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
     if (normal.dot(laser - point.position) < 0.0) normal = -normal;
     point.normal = normal;
   }
+}
+
+int MarkClutter(const Scan& scan, const std::vector<ScanPoint>& points,
+                const ClutterOptions& options, std::vector<bool>* clutter) {
+  clutter->assign(points.size(), false);
+  // Things end where the range jumps.
+  struct Thing {
+    std::size_t begin;
+    std::size_t end;
+    bool is_narrow;
+    bool is_marked = false;
+  };
+  std::vector<Thing> things;
+  const auto are_neighbors = [&](std::size_t a, std::size_t b) {
+    return points[b].beam - points[a].beam <= kNeighborBeams;
+  };
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i == 0 || !are_neighbors(i - 1, i) ||
+        std::abs(points[i].range - points[i - 1].range) > options.min_jump) {
+      things.push_back({i, i, false});
+    }
+    things.back().end = i + 1;
+  }
+  for (Thing& thing : things) {
+    const ScanPoint& first = points[thing.begin];
+    const ScanPoint& last = points[thing.end - 1];
+    thing.is_narrow = std::max(first.range, last.range) <= options.max_range &&
+                      (last.position - first.position).norm() +
+                              first.range * std::abs(scan.angle_step) <=
+                          options.max_width;
+  }
+  int marked = 0;
+  // Things in front of things: what is marked does not hide what is beside it.
+  for (bool again = true; again;) {
+    again = false;
+    for (std::size_t k = 0; k < things.size(); ++k) {
+      Thing& thing = things[k];
+      if (!thing.is_narrow || thing.is_marked) continue;
+      const auto stands_free = [&](std::size_t edge, int step) {
+        std::size_t beside = edge;
+        for (std::size_t j = k + step; j < things.size(); j += step) {
+          const std::size_t next =
+              step > 0 ? things[j].begin : things[j].end - 1;
+          if (!are_neighbors(std::min(beside, next), std::max(beside, next))) {
+            break;
+          }
+          if (!things[j].is_marked) {
+            return points[next].range > points[edge].range + options.min_depth;
+          }
+          beside = step > 0 ? things[j].end - 1 : things[j].begin;
+        }
+        // At the end of the field of view, unless something else stands there.
+        return beside == edge;
+      };
+      if (!stands_free(thing.begin, -1) || !stands_free(thing.end - 1, 1)) {
+        continue;
+      }
+      thing.is_marked = true;
+      again = true;
+      for (std::size_t i = thing.begin; i < thing.end; ++i) {
+        (*clutter)[i] = true;
+        ++marked;
+      }
+    }
+  }
+  return marked;
 }
 
 }  // namespace plumbline

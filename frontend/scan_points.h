@@ -55,6 +55,24 @@ inline ScanPoint Moved(const ScanPoint& point, const PoseTransform& transform) {
 void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
                        std::vector<ScanPoint>* points);
 
+/// What stands by itself in front of the rest: a leg, a person, a chair.
+struct ClutterOptions {
+  /// Widest, m, and so far at least what is beside it lies behind it, m.
+  double max_width = 0.6;
+  double min_depth = 0.15;
+  /// Ranges of neighbouring returns differ by more than this where one thing
+  /// ends, m.
+  double min_jump = 0.1;
+  /// Farthest from the laser, m: beyond it few returns are on such things.
+  double max_range = 4.0;
+};
+
+/// Marks the returns on narrow things that stand free of what is beside them on
+/// both sides, and may move: one entry for each of `points` (ExtractScanPoints
+/// of `scan`). Returns how many there are.
+int MarkClutter(const Scan& scan, const std::vector<ScanPoint>& points,
+                const ClutterOptions& options, std::vector<bool>* clutter);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_FRONTEND_SCAN_POINTS_H_

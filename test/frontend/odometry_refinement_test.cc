@@ -580,5 +580,54 @@ TEST(OdometryRefinerTest, AGapWithoutMotion) {
   EXPECT_TRUE(refiner.loose().empty());
 }
 
+// Three people go along with the robot through a corridor with niches. Near as
+// they are they have more returns than all that tells how far the robot went.
+TEST(OdometryRefinerTest, PeopleWhoWalkAlong) {
+  std::vector<Wall> walls;
+  for (int k = -4; k < 20; ++k) {
+    const double x = 2.0 * k;
+    walls.push_back({{x, -1.0}, {x + 1.3, -1.0}});
+    walls.push_back({{x + 1.3, -1.0}, {x + 1.3, -1.4}});
+    walls.push_back({{x + 1.3, -1.4}, {x + 2.0, -1.4}});
+    walls.push_back({{x + 2.0, -1.4}, {x + 2.0, -1.0}});
+  }
+  walls.push_back({{-8.0, 1.0}, {40.0, 1.0}});
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(9);
+  OdometryRefiner refiner(Options());
+  struct Person {
+    int beam;
+    double distance;
+    double drift;
+  };
+  const std::vector<Person> people = {
+      {70, 0.55, 0.05}, {92, 0.8, 0.02}, {115, 0.6, -0.03}};
+  for (int i = 0; i < 120; ++i) {
+    const Pose2 truth(0.1 * i, 0.0, 0.0);
+    Scan scan = MakeScan(walls, truth, laser, &noise);
+    if (i > 20) {
+      for (const Person& person : people) {
+        const double half = RadToDeg(0.125 / person.distance);
+        const double middle = person.beam + person.drift * (i - 20);
+        for (int b = static_cast<int>(middle - half); b <= middle + half; ++b) {
+          if (scan.ranges[b] > person.distance) {
+            scan.ranges[b] =
+                static_cast<float>(person.distance + noise.Normal(0.02));
+          }
+        }
+      }
+    }
+    scan.timestamp = 100.0 + 0.2 * i;
+    // Odometry is 2 % short.
+    scan.odometry = Pose2(0.098 * i, 0.0, 0.0);
+    const RefinedScan refined = refiner.Process(scan);
+    EXPECT_LT(PositionError(refined.pose, truth), 0.5) << i;
+    EXPECT_LT(HeadingError(refined.pose, truth), DegToRad(3.0)) << i;
+  }
+  refiner.Finish();
+  EXPECT_TRUE(refiner.loose().empty());
+}
+
 }  // namespace
 }  // namespace plumbline

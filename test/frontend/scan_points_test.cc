@@ -191,5 +191,46 @@ TEST(ScanPointsTest, OneLostBeamDoesNotCostItsNeighboursTheirNormals) {
   }
 }
 
+std::vector<int> Clutter(const std::vector<float>& ranges) {
+  Scan scan = Beams(ranges);
+  scan.angle_step = DegToRad(2.0);
+  std::vector<ScanPoint> points;
+  ExtractScanPoints(scan, Options(), &points);
+  std::vector<bool> clutter;
+  const int marked = MarkClutter(scan, points, ClutterOptions(), &clutter);
+  EXPECT_EQ(clutter.size(), points.size());
+  std::vector<int> beams;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (clutter[i]) beams.push_back(points[i].beam);
+  }
+  EXPECT_EQ(marked, static_cast<int>(beams.size()));
+  return beams;
+}
+
+TEST(ClutterTest, StandsFreeOnBothSides) {
+  EXPECT_EQ(Clutter({3, 3, 3, 1, 1, 1, 3, 3, 3}), (std::vector<int>{3, 4, 5}));
+  // The end of the field of view, and beams without a return, hide nothing.
+  EXPECT_EQ(Clutter({1, 1, 3, 3, 3, 3}), (std::vector<int>{0, 1}));
+  EXPECT_EQ(Clutter({3, 3, 0, 0, 0, 0, 1, 1, 3, 3}), (std::vector<int>{6, 7}));
+  // A corner that stands out, a niche, a step of a wall.
+  EXPECT_TRUE(Clutter({3, 3, 3, 3, 2, 2, 2, 1, 1, 1}).size() == 3);
+  EXPECT_TRUE(
+      Clutter({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 3, 3,
+               3, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1})
+          .empty());
+}
+
+TEST(ClutterTest, OneBehindTheOther) {
+  // The one in front hides nothing of the other's being free.
+  EXPECT_EQ(Clutter({3, 3, 2, 2, 1, 1, 3, 3}), (std::vector<int>{2, 3, 4, 5}));
+}
+
+TEST(ClutterTest, NeitherWideNorFar) {
+  // 0.1 m a beam at 3 m.
+  EXPECT_TRUE(Clutter({9, 9, 3, 3, 3, 3, 3, 3, 3, 9, 9}).empty());
+  EXPECT_TRUE(Clutter({9, 9, 5, 5, 9, 9}).empty());
+  EXPECT_TRUE(Clutter({}).empty());
+}
+
 }  // namespace
 }  // namespace plumbline

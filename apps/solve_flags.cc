@@ -349,6 +349,8 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
                                            : Refinement::kFull;
   options.adjustment.points = options.odometry.points;
   options.adjustment.num_threads = NumThreadsFromFlags();
+  options.check.points = options.odometry.points;
+  options.check.num_threads = NumThreadsFromFlags();
   return options;
 }
 

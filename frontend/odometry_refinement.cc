@@ -208,7 +208,13 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
     }
   }
   bool believed = match.inlier_ratio >= options_.good_inlier_ratio;
-  if (!believed || track.after_gap) {
+  Eigen::Vector3d innovation = match.pose - prior.pose;
+  innovation[2] = NormalizeAngle(innovation[2]);
+  const double squared = innovation.dot(prior.information * innovation);
+  const bool agrees = squared <= tracking.max_innovation;
+  // Few returns fit in many places.
+  const bool sees_little = 2 * points_.size() < scan.ranges.size();
+  if (!believed || track.after_gap || (sees_little && !agrees)) {
     const Eigen::Vector2d laser = scan.laser_offset.head<2>();
     std::vector<bool> intruders;
     ScanAgreement there =
@@ -248,15 +254,12 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
     };
     const double ratio =
         match.inlier_ratio / std::max(kLeastKnown, KnownShare(here));
-    Eigen::Vector3d innovation = match.pose - prior.pose;
-    innovation[2] = NormalizeAngle(innovation[2]);
-    const double squared = innovation.dot(prior.information * innovation);
-    const bool agrees = squared <= tracking.max_innovation;
     // After a gap a match must be better.
     const double least = !track.after_gap ? options_.minimum_inlier_ratio
                          : agrees         ? tracking.min_ratio_after_gap
                                           : options_.good_inlier_ratio;
     believed = ratio >= least && match.inliers >= options_.minimum_points &&
+               (agrees || here.hits >= tracking.min_hits) &&
                !((track.after_gap || !agrees) && contradicts(here));
     if (!believed && (track.after_gap || contradicts(there))) {
       outcome.verdict = Outcome::Verdict::kContradicted;

@@ -62,6 +62,9 @@ struct TrackingOptions {
   /// Chi-square of a match against odometry from which on contradictions count
   /// without a gap, too: people contradict, but odometry agrees.
   double max_innovation = 15.0;
+  /// Returns that lie 0.15 m apart or more that a match which leaves odometry
+  /// by more than that has to have on what the reference has seen.
+  int min_hits = 15;
   /// A time between scans that is longer than this, s, and so many times the
   /// usual one is a gap.
   double gap_seconds = 1.0;

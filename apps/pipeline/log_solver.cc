@@ -3,6 +3,7 @@
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/pipeline/log_solver.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -208,6 +209,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
   FindScansAgain(&context);
   CompleteWalls(&context);
   AdjustJointly(&context);
+  CheckMap(&context);
 
   LogSolverResult& result = context.result;
   result.detect_seconds =
@@ -219,7 +221,6 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
   result.wide_searches = refiner_.wide_searches();
   result.refused_matches = refiner_.refusals();
   result.lost_tracks = refiner_.losses();
-  result.loose = refiner_.loose();
   result.feature_matches = builder_->num_matches();
   result.features_created = builder_->num_created();
   result.records = builder_->records();
@@ -318,6 +319,37 @@ void LogSolver::AdjustJointly(Context* context) {
   take_trajectory();
   result.scan_relations = adjustment.num_relations();
   result.wall_votes = adjustment.num_votes();
+}
+
+void LogSolver::CheckMap(Context* context) const {
+  LogSolverResult& result = context->result;
+  result.loose = refiner_.loose();
+  if (!options_.check_map || options_.refine == Refinement::kNone ||
+      context->IsStopped()) {
+    return;
+  }
+  context->Begin("check of the map");
+  const ScopedTimer timer(&result.relocalization_seconds);
+  std::vector<int> keys;
+  std::vector<Pose2> poses;
+  for (const KeyScanRecord& record : builder_->records()) {
+    keys.push_back(record.scan);
+    poses.push_back(result.trajectory[static_cast<std::size_t>(record.scan)]);
+  }
+  for (const MapContradiction& part :
+       FindContradictions(context->scans, keys, poses, options_.check)) {
+    LooseTrack loose;
+    loose.begin = part.begin;
+    loose.end = part.end;
+    loose.found = true;
+    loose.why =
+        "what the robot saw here contradicts what it saw on other visits";
+    result.loose.push_back(std::move(loose));
+  }
+  std::stable_sort(result.loose.begin(), result.loose.end(),
+                   [](const LooseTrack& a, const LooseTrack& b) {
+                     return a.begin < b.begin;
+                   });
 }
 
 void LogSolver::ClearGraph() {

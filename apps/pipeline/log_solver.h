@@ -9,6 +9,7 @@
 #include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/joint_adjustment.h>
 #include <plumbline/frontend/map_builder.h>
+#include <plumbline/frontend/map_check.h>
 #include <plumbline/frontend/odometry_refinement.h>
 #include <plumbline/frontend/point_map_builder.h>
 #include <plumbline/frontend/relocalization.h>
@@ -70,6 +71,10 @@ struct LogSolverOptions {
   WallCompletionOptions completion;
   Refinement refine = Refinement::kFull;
   JointAdjustmentOptions adjustment;
+  /// Compare each part of the final trajectory with what was seen on other
+  /// visits, and report those that contradict it.
+  bool check_map = true;
+  MapCheckOptions check;
   /// Scans between EM steps while replaying; 0: only at the end.
   int em_every = 20;
   /// Constraints from the robot that an EM step while replaying reaches.
@@ -106,7 +111,7 @@ struct LogSolverResult {
   std::int64_t wide_searches = 0;
   std::int64_t refused_matches = 0;
   /// How often the robot was lost, and the parts of the track that hang loosely
-  /// on the rest of the map.
+  /// on the rest of the map or contradict it, in the order of scans.
   std::int64_t lost_tracks = 0;
   std::vector<LooseTrack> loose;
   /// Observations recognized as a raw feature, and raw features made.
@@ -184,6 +189,8 @@ class LogSolver {
   void FindScansAgain(Context* context);
   void CompleteWalls(Context* context);
   void AdjustJointly(Context* context);
+  // Tells what hangs loosely, or contradicts the rest of the map.
+  void CheckMap(Context* context) const;
 
   void RunEm(Context* context);
   // Loosens the relations between features and lets closures be proposed.

@@ -211,7 +211,8 @@ TEST(ClutterTest, StandsFreeOnBothSides) {
   EXPECT_EQ(Clutter({3, 3, 3, 1, 1, 1, 3, 3, 3}), (std::vector<int>{3, 4, 5}));
   // The end of the field of view, and beams without a return, hide nothing.
   EXPECT_EQ(Clutter({1, 1, 3, 3, 3, 3}), (std::vector<int>{0, 1}));
-  EXPECT_EQ(Clutter({3, 3, 0, 0, 0, 0, 1, 1, 3, 3}), (std::vector<int>{6, 7}));
+  EXPECT_EQ(Clutter({3, 3, 3, 3, 3, 3, 3, 3, 0, 0, 0, 0, 1, 1, 3, 3}),
+            (std::vector<int>{12, 13}));
   // A corner that stands out, a niche, a step of a wall.
   EXPECT_TRUE(Clutter({3, 3, 3, 3, 2, 2, 2, 1, 1, 1}).size() == 3);
   EXPECT_TRUE(

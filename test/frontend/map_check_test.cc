@@ -1,0 +1,105 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/map_check.h>
+
+#include <cmath>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::Laser;
+using testing::MakeScan;
+using testing::Noise;
+using testing::Room;
+using testing::Wall;
+
+// Two rounds through a hall of 12 m x 9 m with pillars, 0.3 m a key scan.
+struct Rounds {
+  std::vector<Scan> scans;
+  std::vector<int> keys;
+  std::vector<Pose2> poses;
+  // Of the second round.
+  int second = 0;
+};
+
+Rounds TwoRounds() {
+  std::vector<Wall> walls = Room(12.0, 9.0);
+  for (const Pose2& place : {Pose2(0.5, 0.3, 0.4), Pose2(-5.2, 1.0, 0.0),
+                             Pose2(3.5, -3.9, 0.0), Pose2(1.0, 4.0, 0.2)}) {
+    for (const Wall& side : testing::Moved(Room(1.2, 0.8), place)) {
+      walls.push_back(side);
+    }
+  }
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(3);
+  Rounds rounds;
+  for (int round = 0; round < 2; ++round) {
+    if (round == 1) rounds.second = static_cast<int>(rounds.scans.size());
+    for (int i = 0; i < 63; ++i) {
+      const double angle = 2.0 * kPi * i / 63;
+      const Pose2 pose(3.0 * std::cos(angle), 3.0 * std::sin(angle),
+                       NormalizeAngle(angle + 0.5 * kPi));
+      rounds.keys.push_back(static_cast<int>(rounds.scans.size()));
+      rounds.scans.push_back(MakeScan(walls, pose, laser, &noise));
+      rounds.poses.push_back(pose);
+    }
+  }
+  return rounds;
+}
+
+TEST(FindContradictionsTest, NoneInATrueMap) {
+  const Rounds rounds = TwoRounds();
+  EXPECT_TRUE(
+      FindContradictions(rounds.scans, rounds.keys, rounds.poses, {}).empty());
+}
+
+TEST(FindContradictionsTest, ARoundThatIsTurned) {
+  Rounds rounds = TwoRounds();
+  for (std::size_t k = static_cast<std::size_t>(rounds.second);
+       k < rounds.poses.size(); ++k) {
+    rounds.poses[k] =
+        Compose(Pose2(0.5, -0.8, DegToRad(35.0)), rounds.poses[k]);
+  }
+  const std::vector<MapContradiction> found =
+      FindContradictions(rounds.scans, rounds.keys, rounds.poses, {});
+  ASSERT_FALSE(found.empty());
+  int scans = 0;
+  for (const MapContradiction& part : found) {
+    EXPECT_LT(part.begin, part.end);
+    scans += part.end - part.begin;
+  }
+  EXPECT_GT(scans, rounds.second / 2);
+  // The same for any number of threads.
+  MapCheckOptions one;
+  one.num_threads = 1;
+  const std::vector<MapContradiction> again =
+      FindContradictions(rounds.scans, rounds.keys, rounds.poses, one);
+  ASSERT_EQ(again.size(), found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(again[i].begin, found[i].begin);
+    EXPECT_EQ(again[i].end, found[i].end);
+  }
+}
+
+// What was seen once only cannot contradict anything.
+TEST(FindContradictionsTest, NothingToCompareWith) {
+  Rounds rounds = TwoRounds();
+  rounds.keys.resize(static_cast<std::size_t>(rounds.second) / 2);
+  rounds.poses.resize(rounds.keys.size());
+  for (Pose2& pose : rounds.poses) pose[2] += pose[0];
+  EXPECT_TRUE(
+      FindContradictions(rounds.scans, rounds.keys, rounds.poses, {}).empty());
+  EXPECT_TRUE(FindContradictions(rounds.scans, {}, {}, {}).empty());
+}
+
+TEST(FindContradictionsTest, RefusesPosesThatDoNotFit) {
+  const Rounds rounds = TwoRounds();
+  EXPECT_THROW(FindContradictions(rounds.scans, rounds.keys, {}, {}), Error);
+}
+
+}  // namespace
+}  // namespace plumbline

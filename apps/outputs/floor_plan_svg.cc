@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -55,6 +56,14 @@ Box BoundsOf(const FloorPlan& plan, const Matrix2d& rotation) {
     box.Add(center - Vector2d::Constant(circle.radius));
     box.Add(center + Vector2d::Constant(circle.radius));
   }
+  for (const PlanRoom& room : plan.building.rooms) {
+    for (const Vector2d& corner : room.outline.shell) {
+      box.Add(rotation * corner);
+    }
+  }
+  for (const PlanWall& wall : plan.building.walls) {
+    for (const Vector2d& corner : BodyOf(wall)) box.Add(rotation * corner);
+  }
   for (const Pose2& pose : plan.path) box.Add(rotation * pose.head<2>());
   if (!(box.low[0] <= box.high[0])) {
     box.Add(Vector2d::Zero());
@@ -77,6 +86,11 @@ struct Sheet {
   double PerMetre() const { return 1000.0 / scale; }  // mm
   double WallStroke() const {
     return std::clamp(0.07 * PerMetre(), 1.4 * kThinStroke, kThickStroke);
+  }
+  Vector2d OnPaper(const Vector2d& point) const {
+    const Vector2d turned = rotation * point;
+    return {left + PerMetre() * (turned[0] - bounds.low[0]),
+            top + PerMetre() * (bounds.high[1] - turned[1])};
   }
   double plan_width() const { return bounds.size()[0] * PerMetre(); }
   double plan_height() const { return bounds.size()[1] * PerMetre(); }
@@ -152,6 +166,101 @@ std::string Dimension(double x1, double x2, double y, const std::string& text) {
                     " stroke=\"none\"");
 }
 
+// A polygon of the plan as data of a path, m.
+std::string PathData(const Ring& ring) {
+  std::string data;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    data +=
+        (i == 0 ? "M" : " L") + Metres(ring[i][0]) + " " + Metres(ring[i][1]);
+  }
+  return data + " Z";
+}
+
+// Tints that neighbors in the list do not share.
+constexpr const char* kRoomTints[] = {"#dbe9f6", "#e6f2dc", "#fbeed5",
+                                      "#f3e1ec", "#e2e4f5", "#ddf0ee",
+                                      "#f5efd8"};
+constexpr char kCorridorTint[] = "#f0f0f0";
+
+// Rooms under the walls, then the walls and the doors between them.
+std::string BuildingGroups(const FloorPlan& plan, double thin) {
+  const BuildingPlan& building = plan.building;
+  if (building.rooms.empty()) return "";
+  std::string svg = "<g id=\"ROOMS\" stroke=\"none\" fill-rule=\"evenodd\">\n";
+  constexpr std::size_t kTints = sizeof(kRoomTints) / sizeof(kRoomTints[0]);
+  for (std::size_t i = 0; i < building.rooms.size(); ++i) {
+    const PlanRoom& room = building.rooms[i];
+    const bool is_corridor = room.kind == PlanRoom::Kind::kCorridor;
+    svg += "<path data-room=\"" + std::to_string(i + 1) + "\" fill=\"" +
+           (is_corridor ? kCorridorTint : kRoomTints[i % kTints]) + "\" d=\"" +
+           PathData(room.outline.shell);
+    for (const Ring& hole : room.outline.holes) svg += " " + PathData(hole);
+    svg += "\"/>\n";
+  }
+  svg += "</g>\n<g id=\"WALLS\" fill=\"#222222\" stroke=\"none\">\n";
+  for (const PlanWall& wall : building.walls) {
+    svg += "<path d=\"" + PathData(BodyOf(wall)) + "\"/>\n";
+  }
+  svg += "</g>\n<g id=\"DOORS\" stroke=\"#8a5a2b\" stroke-width=\"" +
+         Number(thin, 6) + "\">\n";
+  for (const PlanDoor& door : building.doors) {
+    // The leaf stands open, hinged at the first jamb, on the side of a room
+    // rather than of a corridor.
+    const Vector2d across = door.end - door.begin;
+    const int left = door.rooms[0];
+    const bool opens_left =
+        left >= 0 && building.rooms[static_cast<std::size_t>(left)].kind ==
+                         PlanRoom::Kind::kRoom;
+    const Vector2d leaf = door.begin + (opens_left ? 1.0 : -1.0) *
+                                           Vector2d(-across[1], across[0]);
+    const std::string width = Metres(door.width());
+    svg += "<path d=\"M" + Metres(leaf[0]) + " " + Metres(leaf[1]) + " L" +
+           Metres(door.begin[0]) + " " + Metres(door.begin[1]) + " M" +
+           Metres(leaf[0]) + " " + Metres(leaf[1]) + " A" + width + " " +
+           width + " 0 0 " + (opens_left ? "0 " : "1 ") + Metres(door.end[0]) +
+           " " + Metres(door.end[1]) + "\"/>\n";
+  }
+  return svg + "</g>\n";
+}
+
+// Numbers and areas of rooms, upright on the paper.
+std::string RoomLabels(const FloorPlan& plan, const Sheet& sheet) {
+  if (plan.building.rooms.empty()) return "";
+  std::string svg = "<g id=\"labels\" fill=\"#222222\">\n";
+  for (std::size_t i = 0; i < plan.building.rooms.size(); ++i) {
+    const PlanRoom& room = plan.building.rooms[i];
+    const Vector2d place = sheet.OnPaper(InnerPoint(room.outline));
+    // What a small room has space for.
+    const double size =
+        std::clamp(0.16 * std::sqrt(room.area) * sheet.PerMetre(), 1.0, 3.2);
+    svg += Text(place[0], place[1] - 0.1 * size, size, "middle",
+                std::to_string(i + 1), " font-weight=\"bold\"");
+    svg += Text(place[0], place[1] + 0.95 * size, 0.85 * size, "middle",
+                Number(room.area, 1) + " m\u00b2");
+  }
+  return svg + "</g>\n";
+}
+
+// Whether a face is shown by the walls of rooms.
+bool IsShown(const BuildingPlan& building, const FloorPlanWall& face) {
+  constexpr double kNear = 0.3;  // m
+  const Vector2d middle = 0.5 * (face.begin + face.end);
+  for (const PlanRoom& room : building.rooms) {
+    if (room.outline.Contains(middle)) return true;
+  }
+  for (const PlanWall& wall : building.walls) {
+    const Vector2d along = (wall.end - wall.begin).normalized();
+    const Vector2d relative = middle - wall.begin;
+    const double t = along.dot(relative);
+    const double across = along[0] * relative[1] - along[1] * relative[0];
+    if (t > -kNear && t < (wall.end - wall.begin).norm() + kNear &&
+        std::abs(across) < kNear) {
+      return true;
+    }
+  }
+  return false;
+}
+
 std::string PlanGroup(const FloorPlan& plan, const Sheet& sheet) {
   // Metres of the map to mm of paper: turned, y up.
   const double k = sheet.PerMetre();
@@ -170,7 +279,9 @@ std::string PlanGroup(const FloorPlan& plan, const Sheet& sheet) {
     return "stroke-width=\"" + Number(mm / k, 6) + "\"";
   };
 
-  if (!plan.solids.empty()) {
+  svg += BuildingGroups(plan, kThinStroke / k);
+  const bool has_rooms = !plan.building.rooms.empty();
+  if (!plan.solids.empty() && !has_rooms) {
     svg += "<g id=\"WALL-SOLID\" fill=\"#b8b8b8\" stroke=\"none\">\n";
     for (const auto& solid : plan.solids) {
       svg += "<polygon points=\"";
@@ -187,6 +298,7 @@ std::string PlanGroup(const FloorPlan& plan, const Sheet& sheet) {
     std::string walls;
     for (const FloorPlanWall& wall : plan.walls) {
       if (wall.direction != direction) continue;
+      if (has_rooms && IsShown(plan.building, wall)) continue;
       walls += "<line x1=\"" + Metres(wall.begin[0]) + "\" y1=\"" +
                Metres(wall.begin[1]) + "\" x2=\"" + Metres(wall.end[0]) +
                "\" y2=\"" + Metres(wall.end[1]) + "\" data-features=\"";
@@ -238,6 +350,44 @@ std::string Dimensions(const Sheet& sheet) {
   return svg;
 }
 
+// Widths of the rooms along the lower side, between them and the whole.
+std::string RoomChain(const FloorPlan& plan, const Sheet& sheet) {
+  constexpr double kSide = 1.5;  // m
+  constexpr double kOffset = 1.4;
+  std::vector<std::pair<double, double>> spans;
+  for (const PlanRoom& room : plan.building.rooms) {
+    Box box;
+    for (const Vector2d& corner : room.outline.shell) {
+      box.Add(sheet.rotation * corner);
+    }
+    if (box.low[1] < sheet.bounds.low[1] + kSide) {
+      spans.emplace_back(box.low[0], box.high[0]);
+    }
+  }
+  std::sort(spans.begin(), spans.end());
+  const double y = sheet.top + sheet.plan_height() + kOffset;
+  std::string svg;
+  double end = -std::numeric_limits<double>::infinity();
+  for (const auto& [from, to] : spans) {
+    // Rooms one above the other have one width on paper.
+    if (from < end) continue;
+    end = to;
+    const double k = sheet.PerMetre();
+    const double x1 = sheet.left + k * (from - sheet.bounds.low[0]);
+    const double x2 = sheet.left + k * (to - sheet.bounds.low[0]);
+    svg += Line(x1, y, x2, y);
+    for (const double x : {x1, x2}) {
+      svg += Line(x - 0.6, y + 0.6, x + 0.6, y - 0.6);
+    }
+    svg += Text(0.5 * (x1 + x2), y + 1.9, 1.7, "middle", Number(to - from, 2),
+                " stroke=\"none\"");
+  }
+  if (svg.empty()) return "";
+  return "<g id=\"room-dimensions\" stroke=\"#444444\" stroke-width=\"0.1\" "
+         "fill=\"#444444\">\n" +
+         svg + "</g>\n";
+}
+
 std::string TitleBlock(const FloorPlan& plan, const Sheet& sheet) {
   const double top = sheet.height - kMargin - kTitleRoom + 6.0;
   std::string svg = "<g id=\"title\" fill=\"#222222\">\n";
@@ -245,9 +395,15 @@ std::string TitleBlock(const FloorPlan& plan, const Sheet& sheet) {
          Line(kMargin, top, sheet.width - kMargin, top) + "</g>\n";
   svg += Text(kMargin, top + 6.5, 4.5, "start",
               plan.title.empty() ? "Floor plan" : "Floor plan: " + plan.title);
-  svg += Text(kMargin, top + 12.0, 2.8, "start",
-              "Faces of walls as a robot's laser saw them, in metres. A gap is "
-              "an opening or was not seen. Thin lines: no common direction.");
+  svg +=
+      Text(kMargin, top + 12.0, 2.8, "start",
+           plan.building.rooms.empty()
+               ? "Faces of walls as a robot's laser saw them, in metres. A "
+                 "gap is an opening or was not seen. Thin lines: no common "
+                 "direction."
+               : "Rooms and walls as a robot's laser saw them: numbers, areas "
+                 "between the faces of walls, doors that were open (which "
+                 "way they open is not known). Lines: walls of no room.");
   svg += Text(sheet.width - kMargin, top + 6.5, 4.5, "end",
               "1 : " + Number(sheet.scale, 0) + " (A3)");
 
@@ -289,7 +445,8 @@ void WriteFloorPlanSvg(const FloorPlan& plan, std::ostream& output) {
          << " degrees; coordinates of the group plan are metres of the map."
          << "</desc>\n"
          << "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
-         << PlanGroup(plan, sheet) << Dimensions(sheet)
+         << PlanGroup(plan, sheet) << RoomLabels(plan, sheet)
+         << Dimensions(sheet) << RoomChain(plan, sheet)
          << TitleBlock(plan, sheet) << "</svg>\n";
 }
 

@@ -2,6 +2,8 @@
 #include <plumbline/core/number_text.h>
 #include <plumbline/outputs/floor_plan_dxf.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <utility>
@@ -27,6 +29,18 @@ constexpr int kThinWeight = 13;
 constexpr char kSolidLayer[] = "WALL-SOLID";
 constexpr char kColumnLayer[] = "COLUMNS";
 constexpr char kPathLayer[] = "ROBOT-PATH";
+constexpr char kRoomLayer[] = "ROOMS";
+constexpr char kWallLayer[] = "WALLS";
+constexpr char kDoorLayer[] = "DOORS";
+constexpr char kDimensionLayer[] = "DIMENSIONS";
+constexpr int kRoomColor = 140;
+constexpr int kBodyColor = 7;
+constexpr int kDoorColor = 30;
+constexpr int kDimensionColor = 8;
+// m.
+constexpr double kTextHeight = 0.25;
+constexpr double kDimensionText = 0.15;
+constexpr double kTick = 0.1;
 
 // Writes groups (a code and a value, a line each) and hands out handles.
 class Writer {
@@ -133,11 +147,65 @@ void Extents(const FloorPlan& plan, Vector2d* low, Vector2d* high) {
     add(Vector2d(circle.x - circle.radius, circle.y - circle.radius));
     add(Vector2d(circle.x + circle.radius, circle.y + circle.radius));
   }
+  for (const PlanRoom& room : plan.building.rooms) {
+    for (const Vector2d& corner : room.outline.shell) add(corner);
+  }
+  for (const PlanWall& wall : plan.building.walls) {
+    for (const Vector2d& corner : BodyOf(wall)) add(corner);
+  }
   for (const Pose2& pose : plan.path) add(pose.head<2>());
   if (!((*low)[0] <= (*high)[0])) {
     add(Vector2d::Zero());
     add(Vector2d::Ones());
   }
+}
+
+// A length inside of a room from wall to wall.
+struct RoomDimension {
+  Vector2d from, to;
+  // Of the block that draws it.
+  std::string block;
+  int record = 0;
+};
+
+// Two for each room, through its middle.
+std::vector<RoomDimension> RoomDimensions(const FloorPlan& plan,
+                                          Writer* writer) {
+  std::vector<RoomDimension> dimensions;
+  const double level = plan.directions.empty() ? 0.0 : plan.directions[0];
+  for (const PlanRoom& room : plan.building.rooms) {
+    const Vector2d middle = InnerPoint(room.outline);
+    for (const double angle : {level, level + 0.5 * kPi}) {
+      const Vector2d along(std::cos(angle), std::sin(angle));
+      double before = -std::numeric_limits<double>::infinity();
+      double after = std::numeric_limits<double>::infinity();
+      const auto cut = [&](const Ring& ring) {
+        for (std::size_t i = 0; i < ring.size(); ++i) {
+          const Vector2d a = ring[i] - middle;
+          const Vector2d b = ring[(i + 1) % ring.size()] - middle;
+          const double side_a = along[0] * a[1] - along[1] * a[0];
+          const double side_b = along[0] * b[1] - along[1] * b[0];
+          if ((side_a > 0.0) == (side_b > 0.0)) continue;
+          const double share = side_a / (side_a - side_b);
+          const double t = along.dot(Vector2d(a + share * (b - a)));
+          (t < 0.0 ? before : after) =
+              t < 0.0 ? std::max(before, t) : std::min(after, t);
+        }
+      };
+      cut(room.outline.shell);
+      for (const Ring& hole : room.outline.holes) cut(hole);
+      if (!std::isfinite(before) || !std::isfinite(after)) continue;
+      RoomDimension dimension;
+      // Beside the room's number.
+      const Vector2d aside = 2.0 * kTextHeight * Vector2d(along[1], -along[0]);
+      dimension.from = middle + before * along + aside;
+      dimension.to = middle + after * along + aside;
+      dimension.block = "*D" + std::to_string(dimensions.size() + 1);
+      dimension.record = writer->NewHandle();
+      dimensions.push_back(dimension);
+    }
+  }
+  return dimensions;
 }
 
 struct Layer {
@@ -149,14 +217,22 @@ struct Layer {
 
 std::vector<Layer> Layers(const FloorPlan& plan) {
   std::vector<Layer> layers = {{"0", 7, kThinWeight, false}};
+  // Faces as the map has them would lie on the walls of rooms.
+  const bool has_rooms = !plan.building.rooms.empty();
+  if (has_rooms) {
+    layers.push_back({kWallLayer, kBodyColor, kWallWeight, false});
+    layers.push_back({kDoorLayer, kDoorColor, kThinWeight, false});
+    layers.push_back({kRoomLayer, kRoomColor, kThinWeight, false});
+    layers.push_back({kDimensionLayer, kDimensionColor, kThinWeight, false});
+  }
   constexpr int kColors = sizeof(kDirectionColors) / sizeof(int);
   for (int i = 0; i < static_cast<int>(plan.directions.size()); ++i) {
     layers.push_back({FloorPlanLayerName(plan, i),
-                      kDirectionColors[i % kColors], kWallWeight, false});
+                      kDirectionColors[i % kColors], kWallWeight, has_rooms});
   }
   layers.push_back(
-      {FloorPlanLayerName(plan, -1), kOtherColor, kThinWeight, false});
-  layers.push_back({kSolidLayer, kSolidColor, kThinWeight, false});
+      {FloorPlanLayerName(plan, -1), kOtherColor, kThinWeight, has_rooms});
+  layers.push_back({kSolidLayer, kSolidColor, kThinWeight, has_rooms});
   layers.push_back({kColumnLayer, kColumnColor, kWallWeight, false});
   layers.push_back({kPathLayer, kPathColor, kThinWeight, true});
   return layers;
@@ -197,7 +273,8 @@ void WriteHeader(const Vector2d& low, const Vector2d& high, Writer* writer) {
 }
 
 void WriteTables(const FloorPlan& plan, const Vector2d& low,
-                 const Vector2d& high, Writer* writer) {
+                 const Vector2d& high,
+                 const std::vector<RoomDimension>& dimensions, Writer* writer) {
   writer->BeginSection("TABLES");
 
   int table = writer->BeginTable("VPORT", 1, kVportTable);
@@ -269,18 +346,153 @@ void WriteTables(const FloorPlan& plan, const Vector2d& low,
   writer->BeginEntry("DIMSTYLE", table, "AcDbDimStyleTableRecord", "Standard",
                      writer->NewHandle());
   writer->Int(70, 0);
+  writer->Real(41, kTick);
+  writer->Real(140, kDimensionText);
+  writer->Real(147, 0.3 * kDimensionText);
+  writer->Int(271, 2);  // digits after the point
   writer->EndTable();
 
-  table = writer->BeginTable("BLOCK_RECORD", 2, kBlockTable);
+  table = writer->BeginTable(
+      "BLOCK_RECORD", 2 + static_cast<int>(dimensions.size()), kBlockTable);
   writer->BeginEntry("BLOCK_RECORD", table, "AcDbBlockTableRecord",
                      "*Model_Space", kModelSpace);
   writer->BeginEntry("BLOCK_RECORD", table, "AcDbBlockTableRecord",
                      "*Paper_Space", kPaperSpace);
+  for (const RoomDimension& dimension : dimensions) {
+    writer->BeginEntry("BLOCK_RECORD", table, "AcDbBlockTableRecord",
+                       dimension.block, dimension.record);
+  }
   writer->EndTable();
   writer->EndSection();
 }
 
-void WriteBlocks(Writer* writer) {
+void WriteLine(const Vector2d& from, const Vector2d& to,
+               const std::string& layer, int owner, Writer* writer) {
+  writer->BeginEntity("LINE", layer, "AcDbLine", owner);
+  writer->Point3(10, from);
+  writer->Point3(11, to);
+}
+
+// A line of text about a point.
+void WriteText(const Vector2d& middle, double height, double degrees,
+               const std::string& text, const std::string& layer, int owner,
+               Writer* writer) {
+  writer->BeginEntity("TEXT", layer, "AcDbText", owner);
+  writer->Point3(10, middle);
+  writer->Real(40, height);
+  writer->Text(1, text);
+  writer->Real(50, degrees);
+  writer->Int(72, 1);
+  writer->Point3(11, middle);
+  writer->Text(100, "AcDbText");
+  writer->Int(73, 2);
+}
+
+// Of lines that are read from below or from the right, degrees.
+double ReadingAngle(const Vector2d& along) {
+  double degrees = RadToDeg(std::atan2(along[1], along[0]));
+  if (degrees > 90.0) degrees -= 180.0;
+  if (degrees <= -90.0) degrees += 180.0;
+  return degrees;
+}
+
+std::string TwoDigits(double value) {
+  std::string text;
+  AppendFixed(value, 2, &text);
+  return text;
+}
+
+Vector2d TextPlace(const RoomDimension& dimension) {
+  const double angle = DegToRad(ReadingAngle(dimension.to - dimension.from));
+  return 0.75 * dimension.from + 0.25 * dimension.to +
+         0.8 * kDimensionText * Vector2d(-std::sin(angle), std::cos(angle));
+}
+
+// What a program shows that does not draw dimensions itself.
+void WriteDimensionBlock(const RoomDimension& dimension, Writer* writer) {
+  const Vector2d along = (dimension.to - dimension.from).normalized();
+  const Vector2d tick = 0.5 * kTick * (along + Vector2d(-along[1], along[0]));
+  writer->BeginEntity("BLOCK", kDimensionLayer, "AcDbBlockBegin",
+                      dimension.record);
+  writer->Text(2, dimension.block);
+  writer->Int(70, 1);  // anonymous
+  writer->Point3(10, Vector2d::Zero());
+  writer->Text(3, dimension.block);
+  writer->Text(1, "");
+  WriteLine(dimension.from, dimension.to, kDimensionLayer, dimension.record,
+            writer);
+  for (const Vector2d& end : {dimension.from, dimension.to}) {
+    WriteLine(end - tick, end + tick, kDimensionLayer, dimension.record,
+              writer);
+  }
+  WriteText(TextPlace(dimension), kDimensionText, ReadingAngle(along),
+            TwoDigits((dimension.to - dimension.from).norm()), kDimensionLayer,
+            dimension.record, writer);
+  writer->BeginEntity("ENDBLK", kDimensionLayer, "AcDbBlockEnd",
+                      dimension.record);
+}
+
+void WriteDimension(const RoomDimension& dimension, Writer* writer) {
+  writer->BeginEntity("DIMENSION", kDimensionLayer, "AcDbDimension",
+                      kModelSpace);
+  writer->Text(2, dimension.block);
+  writer->Point3(10, dimension.to);
+  writer->Point3(11, TextPlace(dimension));
+  writer->Int(70, 1 + 32);  // aligned, its block is its own
+  writer->Text(1, "");
+  writer->Int(71, 5);
+  writer->Text(3, "Standard");
+  writer->Text(100, "AcDbAlignedDimension");
+  writer->Point3(13, dimension.from);
+  writer->Point3(14, dimension.to);
+}
+
+void WriteRing(const Ring& ring, const char* layer, Writer* writer) {
+  writer->BeginEntity("LWPOLYLINE", layer, "AcDbPolyline", kModelSpace);
+  writer->Int(90, static_cast<int>(ring.size()));
+  writer->Int(70, 1);  // closed
+  for (const Vector2d& corner : ring) writer->Point(10, corner);
+}
+
+// A leaf that stands open, hinged at the first jamb, and the way of its edge.
+void WriteDoor(const PlanDoor& door, Writer* writer) {
+  const Vector2d across = door.end - door.begin;
+  const Vector2d leaf = door.begin + Vector2d(-across[1], across[0]);
+  WriteLine(door.begin, leaf, kDoorLayer, kModelSpace, writer);
+  const double degrees = RadToDeg(std::atan2(across[1], across[0]));
+  writer->BeginEntity("ARC", kDoorLayer, "AcDbCircle", kModelSpace);
+  writer->Point3(10, door.begin);
+  writer->Real(40, door.width());
+  writer->Text(100, "AcDbArc");
+  writer->Real(50, degrees < 0.0 ? degrees + 360.0 : degrees);
+  writer->Real(51, degrees < -90.0 ? degrees + 450.0 : degrees + 90.0);
+}
+
+void WriteBuilding(const FloorPlan& plan,
+                   const std::vector<RoomDimension>& dimensions,
+                   Writer* writer) {
+  for (std::size_t i = 0; i < plan.building.rooms.size(); ++i) {
+    const PlanRoom& room = plan.building.rooms[i];
+    WriteRing(room.outline.shell, kRoomLayer, writer);
+    for (const Ring& hole : room.outline.holes) {
+      WriteRing(hole, kRoomLayer, writer);
+    }
+    const Vector2d middle = InnerPoint(room.outline);
+    WriteText(middle + Vector2d(0.0, 0.7 * kTextHeight), kTextHeight, 0.0,
+              std::to_string(i + 1), kRoomLayer, kModelSpace, writer);
+    WriteText(middle - Vector2d(0.0, 0.7 * kTextHeight), 0.8 * kTextHeight, 0.0,
+              TwoDigits(room.area) + " m2", kRoomLayer, kModelSpace, writer);
+  }
+  for (const PlanWall& wall : plan.building.walls) {
+    WriteRing(BodyOf(wall), kWallLayer, writer);
+  }
+  for (const PlanDoor& door : plan.building.doors) WriteDoor(door, writer);
+  for (const RoomDimension& dimension : dimensions) {
+    WriteDimension(dimension, writer);
+  }
+}
+
+void WriteBlocks(const std::vector<RoomDimension>& dimensions, Writer* writer) {
   writer->BeginSection("BLOCKS");
   for (const int space : {kModelSpace, kPaperSpace}) {
     const std::string name =
@@ -293,11 +505,17 @@ void WriteBlocks(Writer* writer) {
     writer->Text(1, "");
     writer->BeginEntity("ENDBLK", "0", "AcDbBlockEnd", space);
   }
+  for (const RoomDimension& dimension : dimensions) {
+    WriteDimensionBlock(dimension, writer);
+  }
   writer->EndSection();
 }
 
-void WriteEntities(const FloorPlan& plan, Writer* writer) {
+void WriteEntities(const FloorPlan& plan,
+                   const std::vector<RoomDimension>& dimensions,
+                   Writer* writer) {
   writer->BeginSection("ENTITIES");
+  WriteBuilding(plan, dimensions, writer);
   // First what lies under the walls.
   for (const auto& solid : plan.solids) {
     writer->BeginEntity("SOLID", kSolidLayer, "AcDbTrace", kModelSpace);
@@ -351,10 +569,11 @@ void WriteFloorPlanDxf(const FloorPlan& plan, std::ostream& output) {
   Extents(plan, &low, &high);
   Writer writer(output);
   writer.Text(999, "Floor plan by plumbline, metres");
+  const std::vector<RoomDimension> dimensions = RoomDimensions(plan, &writer);
   WriteHeader(low, high, &writer);
-  WriteTables(plan, low, high, &writer);
-  WriteBlocks(&writer);
-  WriteEntities(plan, &writer);
+  WriteTables(plan, low, high, dimensions, &writer);
+  WriteBlocks(dimensions, &writer);
+  WriteEntities(plan, dimensions, &writer);
   WriteObjects(&writer);
   writer.Text(0, "EOF");
 }

@@ -14,6 +14,11 @@ namespace plumbline {
 /// round things as CIRCLE on COLUMNS, the robot's way as LWPOLYLINE on
 /// ROBOT-PATH, which is frozen. The same plan gives the same bytes.
 ///
+/// A plan with rooms has them as closed LWPOLYLINE with their number and area
+/// as TEXT on ROOMS, walls as closed LWPOLYLINE on WALLS, doors as LINE and ARC
+/// on DOORS, and length and width of each room as DIMENSION on DIMENSIONS; the
+/// faces that the map has are frozen then.
+///
 /// Debian's DXF library would do, but is under the GPL, which the binaries
 /// would inherit; the tests read the drawing with it.
 void WriteFloorPlanDxf(const FloorPlan& plan, std::ostream& output);

@@ -7,6 +7,7 @@
 #include <plumbline/outputs/floor_plan_dxf.h>
 #include <plumbline/outputs/floor_plan_geojson.h>
 #include <plumbline/outputs/floor_plan_svg.h>
+#include <plumbline/outputs/rooms_csv.h>
 
 #include <cmath>
 #include <limits>
@@ -284,6 +285,44 @@ TEST_F(FloorPlanTest, WhatIsNoPlaceIsPassedOver) {
 
 // -- Files --------------------------------------------------------------------
 
+// A room and a corridor with a door between them.
+FloorPlan PlanWithRooms() {
+  FloorPlan plan;
+  plan.directions = {0.0};
+  plan.walls.resize(2);
+  plan.walls[0].end = {4.0, 0.0};
+  plan.walls[0].direction = 0;
+  plan.walls[1].begin = {30.0, 0.0};
+  plan.walls[1].end = {34.0, 0.0};
+  plan.walls[1].direction = 0;
+  plan.building.rooms.resize(2);
+  PlanRoom& corridor = plan.building.rooms[0];
+  corridor.outline.shell = {{0, -2}, {20, -2}, {20, 0}, {0, 0}};
+  corridor.kind = PlanRoom::Kind::kCorridor;
+  corridor.area = 40.0;
+  corridor.is_entered = true;
+  corridor.neighbors = {1};
+  PlanRoom& room = plan.building.rooms[1];
+  room.outline.shell = {{0, 0.2}, {5, 0.2}, {5, 4.2}, {0, 4.2}};
+  room.area = 20.0;
+  room.neighbors = {0};
+  PlanDoor door;
+  door.begin = {1.0, 0.1};
+  door.end = {1.9, 0.1};
+  door.thickness = 0.2;
+  door.rooms = {1, 0};
+  door.is_driven = true;
+  plan.building.doors = {door};
+  door.begin = {18.0, 0.1};
+  door.end = {18.8, 0.1};
+  door.rooms = {-1, 0};
+  door.is_driven = false;
+  plan.building.doors.push_back(door);
+  plan.building.walls = {{{0, 0.1}, {1, 0.1}, 0.1, 0.1},
+                         {{1.9, 0.1}, {18.0, 0.1}, 0.1, 0.1}};
+  return plan;
+}
+
 std::string Dxf(const FloorPlan& plan) {
   std::ostringstream text;
   WriteFloorPlanDxf(plan, text);
@@ -312,8 +351,8 @@ std::vector<std::pair<int, std::string>> Groups(const std::string& dxf) {
   return groups;
 }
 
-TEST_F(FloorPlanTest, DxfHasItsPartsInOrderAndHandlesOnce) {
-  const auto groups = Groups(Dxf(Sample()));
+void ExpectWholeDxf(const FloorPlan& plan) {
+  const auto groups = Groups(Dxf(plan));
   std::vector<std::string> sections;
   std::set<std::string> handles;
   std::set<std::string> owners;
@@ -336,6 +375,61 @@ TEST_F(FloorPlanTest, DxfHasItsPartsInOrderAndHandlesOnce) {
     EXPECT_EQ(handles.count(owner), 1u) << "owner " << owner;
   }
   EXPECT_EQ(groups.back(), std::make_pair(0, std::string("EOF")));
+}
+
+TEST_F(FloorPlanTest, DxfHasItsPartsInOrderAndHandlesOnce) {
+  ExpectWholeDxf(Sample());
+  ExpectWholeDxf(PlanWithRooms());
+}
+
+TEST_F(FloorPlanTest, GeoJsonOfRooms) {
+  const auto json = nlohmann::json::parse(GeoJson(PlanWithRooms()));
+  std::map<std::string, std::vector<nlohmann::json>> of_kind;
+  for (const auto& feature : json["features"]) {
+    of_kind[feature["properties"]["kind"]].push_back(feature);
+  }
+  ASSERT_EQ(of_kind["room"].size(), 1u);
+  ASSERT_EQ(of_kind["corridor"].size(), 1u);
+  ASSERT_EQ(of_kind["door"].size(), 2u);
+  ASSERT_EQ(of_kind["wall"].size(), 2u);
+  EXPECT_EQ(of_kind["face"].size(), 2u);
+  const auto& corridor = of_kind["corridor"][0];
+  EXPECT_EQ(corridor["properties"]["id"], 1);
+  EXPECT_EQ(corridor["properties"]["area_m2"], 40.0);
+  EXPECT_EQ(corridor["properties"]["entered"], true);
+  EXPECT_EQ(corridor["properties"]["neighbors"], nlohmann::json({2}));
+  EXPECT_EQ(corridor["geometry"]["coordinates"][0].size(), 5u);
+  const auto& door = of_kind["door"][0]["properties"];
+  EXPECT_EQ(door["width_m"], 0.9);
+  EXPECT_EQ(door["rooms"], nlohmann::json({2, 1}));
+  EXPECT_EQ(door["driven"], true);
+  EXPECT_EQ(of_kind["door"][1]["properties"]["rooms"],
+            nlohmann::json({nullptr, 1}));
+  const auto& wall = of_kind["wall"][0];
+  EXPECT_EQ(wall["properties"]["thickness_m"], 0.2);
+  EXPECT_EQ(wall["geometry"]["coordinates"][0][0],
+            nlohmann::json::parse("[0.0, 0.0]"));
+}
+
+TEST_F(FloorPlanTest, SvgOfRooms) {
+  const std::string svg = Svg(PlanWithRooms());
+  EXPECT_THAT(svg, HasSubstr("<path data-room=\"2\""));
+  EXPECT_THAT(svg, HasSubstr(">20.0 m\u00b2</text>"));
+  EXPECT_THAT(svg, HasSubstr("<g id=\"WALLS\""));
+  EXPECT_THAT(svg, HasSubstr("<g id=\"room-dimensions\""));
+  // The face at the wall of the corridor is shown by it, the other is not.
+  EXPECT_THAT(svg, HasSubstr("x1=\"30.0000\""));
+  EXPECT_THAT(svg, Not(HasSubstr("x2=\"4.0000\"")));
+}
+
+TEST_F(FloorPlanTest, TableOfRooms) {
+  std::ostringstream text;
+  WriteRoomsCsv(PlanWithRooms().building, text);
+  EXPECT_THAT(
+      text.str(),
+      testing::StartsWith("room,kind,area_m2,x_m,y_m,entered,doors,neighbors\n"
+                          "1,corridor,40.00,"));
+  EXPECT_THAT(text.str(), HasSubstr(",1,2,2\n2,room,20.00,"));
 }
 
 #ifdef PLUMBLINE_TEST_DXFLIB
@@ -361,6 +455,18 @@ class DxfReader : public DL_CreationAdapter {
     ++polylines[attributes.getLayer()];
   }
   void addVertex(const DL_VertexData&) override { ++vertices; }
+  void addArc(const DL_ArcData& data) override {
+    arcs[attributes.getLayer()].push_back(
+        {data.cx, data.cy, data.radius, data.angle1, data.angle2});
+  }
+  void addText(const DL_TextData& data) override {
+    texts[attributes.getLayer()].push_back(data.text);
+  }
+  void addDimAlign(const DL_DimensionData&,
+                   const DL_DimAlignedData& data) override {
+    dimensions[attributes.getLayer()].push_back(
+        std::hypot(data.epx2 - data.epx1, data.epy2 - data.epy1));
+  }
   void setVariableInt(const std::string& key, int value, int) override {
     variables[key] = value;
   }
@@ -374,11 +480,38 @@ class DxfReader : public DL_CreationAdapter {
   std::map<std::string, int> layers;
   std::map<std::string, std::vector<std::vector<double>>> lines, circles,
       solids;
+  std::map<std::string, std::vector<std::vector<double>>> arcs;
+  std::map<std::string, std::vector<std::string>> texts;
+  std::map<std::string, std::vector<double>> dimensions;
   std::map<std::string, int> polylines;
   int vertices = 0;
   std::map<std::string, int> variables;
   std::map<std::string, std::vector<double>> vectors;
 };
+
+TEST_F(FloorPlanTest, DxflibReadsRooms) {
+  std::istringstream text(Dxf(PlanWithRooms()));
+  DxfReader reader;
+  DL_Dxf dxf;
+  ASSERT_TRUE(dxf.in(text, &reader));
+  EXPECT_EQ(reader.polylines["ROOMS"], 2);
+  EXPECT_EQ(reader.polylines["WALLS"], 2);
+  EXPECT_EQ(reader.layers["WALLS"], 0);
+  EXPECT_EQ(reader.layers["WALLS-1-0.0DEG"], 1);  // frozen
+  using Numbers = std::vector<std::vector<double>>;
+  EXPECT_EQ(reader.lines["DOORS"],
+            (Numbers{{1, 0.1, 1, 1}, {18, 0.1, 18, 0.9}}));
+  ASSERT_EQ(reader.arcs["DOORS"].size(), 2u);
+  EXPECT_NEAR(reader.arcs["DOORS"][0][2], 0.9, 1e-9);
+  EXPECT_EQ(reader.texts["ROOMS"],
+            (std::vector<std::string>{"1", "40.00 m2", "2", "20.00 m2"}));
+  const std::vector<double> lengths = reader.dimensions["DIMENSIONS"];
+  ASSERT_EQ(lengths.size(), 4u);
+  EXPECT_NEAR(lengths[0], 20.0, 1e-6);
+  EXPECT_NEAR(lengths[1], 2.0, 1e-6);
+  EXPECT_NEAR(lengths[2], 5.0, 1e-6);
+  EXPECT_NEAR(lengths[3], 4.0, 1e-6);
+}
 
 TEST_F(FloorPlanTest, PaperOfTheDxfStandsAsThePlanDoes) {
   FloorPlan plan;

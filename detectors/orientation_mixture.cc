@@ -304,7 +304,7 @@ Transaction OrientationMixture::Detect(const Graph& graph,
 
   const FeatureType& orientation_type = registry.GetFeature("orientation");
   const auto tie = [&](const Feature& wall, FeatureId orientation,
-                       double expected) {
+                       double expected, double own_sigma) {
     const RelationType* relation = registry.FindRelation(
         RelationRole::kDirection, *wall.type, orientation_type);
     if (relation == nullptr) return;
@@ -312,8 +312,9 @@ Transaction OrientationMixture::Detect(const Graph& graph,
     constraint.type = relation;
     constraint.features = {wall.id, orientation};
     constraint.expected = Eigen::VectorXd::Constant(1, expected);
-    constraint.information = Eigen::MatrixXd::Constant(
-        1, 1, 1.0 / (options_.sigma * options_.sigma));
+    const double variance =
+        options_.sigma * options_.sigma + own_sigma * own_sigma;
+    constraint.information = Eigen::MatrixXd::Constant(1, 1, 1.0 / variance);
     constraint.kind = ConstraintClass::kStructure;
     constraint.source = kName;
     transaction.AddConstraint(std::move(constraint));
@@ -363,14 +364,16 @@ Transaction OrientationMixture::Detect(const Graph& graph,
       refused += orientation == kNoId;
       if (ties[i].orientation == kNoId) {
         if (orientation != kNoId && !IsTied(graph, wall, scope.level)) {
-          tie(wall, orientation, 0.0);
+          tie(wall, orientation, 0.0, judged.walls[i].own_sigma);
         }
       } else if (orientation == kNoId ? assignment_.innovations[i].chi_square >
                                             options_.assignment.breaking_gate
                                       : orientation != ties[i].orientation) {
         transaction.BreakConstraint(ties[i].constraint);
         ++moved;
-        if (orientation != kNoId) tie(wall, orientation, 0.0);
+        if (orientation != kNoId) {
+          tie(wall, orientation, 0.0, judged.walls[i].own_sigma);
+        }
       }
     }
   } else {
@@ -391,7 +394,7 @@ Transaction OrientationMixture::Detect(const Graph& graph,
       ++far;
       continue;
     }
-    tie(*candidate.feature, orientations[nearest], candidate.expected);
+    tie(*candidate.feature, orientations[nearest], candidate.expected, 0.0);
   }
   scope.Count("directions found",
               static_cast<std::int64_t>(transaction.added_features().size()));

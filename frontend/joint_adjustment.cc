@@ -80,6 +80,31 @@ std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
   return places;
 }
 
+// Chi-square of a relative pose at the present state.
+double ChiSquare(const Graph& graph, FeatureId from, FeatureId to,
+                 const Pose2& expected, const Eigen::Matrix3d& information) {
+  Eigen::Vector3d error =
+      Between(PoseOf(graph.GetFeature(from)), PoseOf(graph.GetFeature(to))) -
+      expected;
+  error[2] = NormalizeAngle(error[2]);
+  return error.dot(information * error);
+}
+
+// How much larger than 1 the variance of unit weight of a group of links of
+// three rows is, of which so large a share is redundant.
+double VarianceFactor(std::vector<double> chi_squares, double redundancy,
+                      double prior_links) {
+  if (chi_squares.empty() || redundancy <= 0.0) return 1.0;
+  const auto middle = chi_squares.begin() + chi_squares.size() / 2;
+  std::nth_element(chi_squares.begin(), middle, chi_squares.end());
+  // Median of chi-square with three degrees of freedom.
+  constexpr double kMedian = 2.366;
+  const double factor = *middle / (kMedian * redundancy);
+  const double links = redundancy * static_cast<double>(chi_squares.size());
+  return std::exp(std::log(std::max(factor, 1e-12)) * links /
+                  (links + prior_links));
+}
+
 }  // namespace
 
 JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
@@ -163,6 +188,9 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
   }
   const TransactionResult places = graph_->Apply(std::move(transaction));
   poses_ = places.features;
+  for (const ConstraintId id : places.constraints) {
+    motions_.emplace_back(id, graph_->GetConstraint(id).information);
+  }
   // What stood for the poses goes, where the returns speak themselves.
   Transaction change;
   const std::map<FeatureId, std::size_t> places_of = HoldAlong(poses, &change);
@@ -274,15 +302,54 @@ void JointAdjustment::Reweigh() {
   const double scale = 1.0 / (options_.loss_scale * options_.loss_scale);
   for (std::size_t i = 0; i < relations_.size(); ++i) {
     const ScanRelation& relation = relations_[i];
-    const Pose2 here =
-        Between(PoseOf(graph_->GetFeature(poses_[relation.from])),
-                PoseOf(graph_->GetFeature(poses_[relation.to])));
-    Eigen::Vector3d error = here - relation.mean;
-    error[2] = NormalizeAngle(error[2]);
-    const double squared = error.dot(relation.information * error);
+    const Eigen::Matrix3d information = relation.information / relation_factor_;
+    const double squared =
+        ChiSquare(*graph_, poses_[relation.from], poses_[relation.to],
+                  relation.mean, information);
     graph_->UpdateConstraint(relation_constraints_[i], relation.mean,
-                             relation.information / (1.0 + scale * squared));
+                             information / (1.0 + scale * squared));
   }
+}
+
+void JointAdjustment::Solve() {
+  const SolveReport report = session_->SolveGlobal();
+  if (!report.usable) {
+    throw PLUMBLINE_ERROR("joint adjustment failed: " + report.message,
+                          "a usable solution");
+  }
+}
+
+void JointAdjustment::EstimateVariances() {
+  std::vector<double> of_motions;
+  for (const auto& [id, information] : motions_) {
+    const Constraint& motion = graph_->GetConstraint(id);
+    of_motions.push_back(ChiSquare(*graph_, motion.features[0],
+                                   motion.features[1], motion.expected,
+                                   information));
+  }
+  std::vector<double> of_relations;
+  for (const ScanRelation& relation : relations_) {
+    of_relations.push_back(ChiSquare(*graph_, poses_[relation.from],
+                                     poses_[relation.to], relation.mean,
+                                     relation.information));
+  }
+  // Odometry alone ties the poses; every match is redundant.
+  const std::size_t links = of_motions.size() + of_relations.size();
+  if (links == 0) return;
+  const double redundancy = static_cast<double>(of_relations.size()) / links;
+  const auto factor = [&](std::vector<double> chi_squares) {
+    return std::clamp(
+        VarianceFactor(std::move(chi_squares), redundancy, kPriorLinks),
+        options_.min_variance_factor, options_.max_variance_factor);
+  };
+  motion_factor_ = factor(std::move(of_motions));
+  relation_factor_ = factor(std::move(of_relations));
+  for (const auto& [id, information] : motions_) {
+    const Eigen::VectorXd expected = graph_->GetConstraint(id).expected;
+    graph_->UpdateConstraint(id, expected, information / motion_factor_);
+  }
+  Reweigh();
+  Solve();
 }
 
 void JointAdjustment::Adjust(const std::function<bool()>& stop) {
@@ -293,11 +360,7 @@ void JointAdjustment::Adjust(const std::function<bool()>& stop) {
       if (stop && stop()) return;
       Vote();
       Reweigh();
-      const SolveReport report = session_->SolveGlobal();
-      if (!report.usable) {
-        throw PLUMBLINE_ERROR("joint adjustment failed: " + report.message,
-                              "a usable solution");
-      }
+      Solve();
     }
     const std::vector<Pose2> after = PlacePoses();
     double moved = 0.0;

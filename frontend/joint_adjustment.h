@@ -16,6 +16,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -30,6 +31,9 @@ struct JointAdjustmentOptions {
   WallVoteOptions votes;
   /// Chi-square at which a scan relation counts half (Cauchy).
   double loss_scale = 2.0;
+  /// Bounds of the factors by which EstimateVariances changes variances.
+  double min_variance_factor = 0.1;
+  double max_variance_factor = 4.0;
   /// How often votes and weights are taken anew, each followed by a solve.
   int rounds = 3;
   /// After that places that have come near each other are matched, and all is
@@ -73,6 +77,20 @@ class JointAdjustment {
   /// submap until then.
   void MatchAnew();
 
+  /// Scales the variances of refined odometry and those of the matches of scans
+  /// by one factor each to what their residuals show (variance components,
+  /// Foerstner 1979, by the median, since some matches are wrong), then solves
+  /// once. Scans promise too much or too little by what surfaces and a laser
+  /// are; links that are given too much room let structure bend the map. Few
+  /// links say little: kPriorLinks more with a factor of 1 are counted. Throws
+  /// Error when the solve fails.
+  void EstimateVariances();
+  static constexpr double kPriorLinks = 10.0;
+
+  /// The factors: 1 until they are estimated.
+  double motion_variance_factor() const { return motion_factor_; }
+  double relation_variance_factor() const { return relation_factor_; }
+
   /// Adds walls (segments of level 0 without constraints, as they lie among the
   /// poses at present), each bound to the poses by the votes of its returns;
   /// walls that get none are left out. The graph must not have had walls.
@@ -105,6 +123,7 @@ class JointAdjustment {
   void Match();
   void Vote();
   void Reweigh();
+  void Solve();
 
   Graph* graph_;
   SolverSession* session_;
@@ -120,6 +139,10 @@ class JointAdjustment {
   std::vector<ScanRelation> relations_;
   // By relation.
   std::vector<ConstraintId> relation_constraints_;
+  // Of refined odometry, with what it said of its information.
+  std::vector<std::pair<ConstraintId, Eigen::Matrix3d>> motions_;
+  double motion_factor_ = 1.0;
+  double relation_factor_ = 1.0;
   // Live vote constraints.
   std::vector<ConstraintId> votes_;
 };

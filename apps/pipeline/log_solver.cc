@@ -296,6 +296,7 @@ void LogSolver::AdjustJointly(Context* context) {
   adjustment.Adjust(context->control.stop);
   adjustment.MatchAnew();
   adjustment.Adjust(context->control.stop);
+  adjustment.EstimateVariances();
   const auto take_trajectory = [&] {
     result.trajectory =
         InterpolateScans(refined_, builder_->records(), adjustment.KeyPoses());

@@ -209,6 +209,50 @@ TEST_F(JointAdjustmentTest, PosesFirstThenWalls) {
   EXPECT_EQ(adjustment.KeyPoses()[0], keys_[0]);
 }
 
+// Odometry and matches that promise too little are believed as far as they
+// agree, within bounds; what few links say is not.
+TEST_F(JointAdjustmentTest, VariancesComeFromResiduals) {
+  const auto estimate = [&](double scale, JointAdjustmentOptions options) {
+    for (std::size_t i = 1; i < records_.size(); ++i) {
+      records_[i].motion.covariance =
+          scale *
+          Eigen::Matrix3d(Eigen::Vector3d(1e-4, 1e-4, 1e-5).asDiagonal());
+    }
+    Graph graph;
+    SolverSession session(&graph, registry_, {});
+    JointAdjustment adjustment(&graph, &session, registry_, scans_, refined_,
+                               records_, keys_, kNoId, options);
+    EXPECT_EQ(adjustment.motion_variance_factor(), 1.0);
+    adjustment.Adjust();
+    adjustment.MatchAnew();
+    adjustment.Adjust();
+    // Of the motion between the first two places.
+    const auto information = [&graph] {
+      return std::as_const(graph).Constraints().front()->information(2, 2);
+    };
+    const double before = information();
+    adjustment.EstimateVariances();
+    EXPECT_LT(WorstKey(adjustment.KeyPoses()), 0.02);
+    EXPECT_NEAR(information() * adjustment.motion_variance_factor() / before,
+                1.0, 1e-9);
+    return std::make_pair(adjustment.motion_variance_factor(),
+                          adjustment.relation_variance_factor());
+  };
+  JointAdjustmentOptions open = options_;
+  open.min_variance_factor = 1e-6;
+  open.max_variance_factor = 1e6;
+  const auto [motion, relation] = estimate(1.0, open);
+  // The laser's noise is 0.01 m, a return is given 0.03 m.
+  EXPECT_LT(relation, 0.3);
+  EXPECT_GT(relation, 0.001);
+  const auto [wide_motion, wide_relation] = estimate(100.0, open);
+  EXPECT_LT(wide_motion, 0.1 * motion);
+  EXPECT_NEAR(std::log(wide_relation), std::log(relation), 1.0);
+  const auto [bounded_motion, bounded_relation] = estimate(100.0, options_);
+  EXPECT_EQ(bounded_motion, options_.min_variance_factor);
+  EXPECT_GE(bounded_relation, options_.min_variance_factor);
+}
+
 // A map that is bent between two places does not keep its bend: scans are
 // matched with submaps as odometry has them.
 TEST_F(JointAdjustmentTest, ABentStartComesStraight) {

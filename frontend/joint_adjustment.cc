@@ -358,6 +358,10 @@ void JointAdjustment::Adjust(const std::function<bool()>& stop) {
     const std::vector<Pose2> before = PlacePoses();
     for (int round = 0; round < options_.rounds; ++round) {
       if (stop && stop()) return;
+      // Walls as they were given come first.
+      if (pass > 0 || round > 0) {
+        MoveWallJunctions(options_.junctions, graph_);
+      }
       Vote();
       Reweigh();
       Solve();

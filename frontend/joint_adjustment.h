@@ -9,6 +9,7 @@
 #include <plumbline/frontend/odometry_refinement.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/scan_relations.h>
+#include <plumbline/frontend/wall_junctions.h>
 #include <plumbline/frontend/wall_votes.h>
 
 #include <cstddef>
@@ -29,6 +30,7 @@ struct JointAdjustmentOptions {
   int place_stride = 3;
   ScanRelationOptions relations;
   WallVoteOptions votes;
+  WallJunctionOptions junctions;
   /// Chi-square at which a scan relation counts half (Cauchy).
   double loss_scale = 2.0;
   /// Bounds of the factors by which EstimateVariances changes variances.

@@ -34,7 +34,7 @@ struct WallCompletionOptions {
   /// standard deviations of that turn, it is two walls: corridors that meet at
   /// a small angle.
   double min_kink = DegToRad(0.5);
-  double kink_sigmas = 6.0;
+  double kink_sigmas = 4.0;
   /// Its ends swing by no more across it, as its direction is that uncertain
   /// (standard deviation over the whole length, m).
   double max_end_sigma = 0.0065;

@@ -28,7 +28,7 @@ struct WallVoteOptions {
   /// A return counts as so many independent ones: whatever the number of
   /// returns and visits, they share the wall's own errors (panels, frames,
   /// bends) and those of its poses.
-  double independence = 0.05;
+  double independence = 0.5;
   /// Fewer returns of one place on a wall do not count as a vote.
   int min_points = 3;
   /// The result does not depend on it.

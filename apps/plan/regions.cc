@@ -17,8 +17,11 @@ constexpr double kMaxPocket = 4.0;
 // what is no room.
 constexpr double kLeastPocketBorder = 0.2;
 constexpr double kMaxExposed = 0.2;
-// An opening, m.
+// An opening, m, and its share of a region's width.
 constexpr double kLeastOpening = 0.5;
+constexpr double kWholeWidth = 0.6;
+// Regions that touch in no more than a corner are no neighbors, m.
+constexpr double kLeastBorder = 0.1;
 
 std::vector<bool> InsideOf(const Arrangement& arrangement,
                            const RegionOptions& options) {
@@ -44,79 +47,133 @@ std::vector<bool> InsideOf(const Arrangement& arrangement,
 // Over -holds_apart: nothing keeps two regions apart.
 double Openness(const BorderLengths& border) {
   const double length = border.length();
-  return length < 1e-6 ? -1.0 : -border.holds / length;
+  return length < kLeastBorder ? -1.0 : -border.holds / length;
 }
+
+// How large a region is.
+struct Extent {
+  double area = 0.0;
+  double perimeter = 0.0;
+
+  // Of a rectangle of the same area and perimeter: for corridors that branch,
+  // their width.
+  double Width() const {
+    const double half = 0.25 * perimeter;
+    return half - std::sqrt(std::max(0.0, half * half - area));
+  }
+};
 
 // Over 0: nothing but an opening as wide as the space itself, while a door has
 // a wall beside it.
-double Through(const BorderLengths& border, const RegionOptions& options) {
+double Through(const BorderLengths& border, double width,
+               const RegionOptions& options) {
   const double open = border.Of(Mark::kOpen) + border.Of(Mark::kDoor);
-  if (open <= kLeastOpening) return -1.0;
+  if (open < kLeastOpening || open < kWholeWidth * width) return -1.0;
   return options.least_wall_share - border.Of(Mark::kWall) / border.length();
 }
 
-// Joins faces across borders that are open, the most open first; the region of
-// each face, -1 for those outside.
-std::vector<int> Merge(const Arrangement& arrangement,
-                       const std::vector<bool>& is_inside,
-                       const RegionOptions& options) {
-  std::vector<int> region(arrangement.faces.size(), -1);
-  for (std::size_t i = 0; i < region.size(); ++i) {
-    if (is_inside[i]) region[i] = static_cast<int>(i);
-  }
-  std::vector<std::map<int, BorderLengths>> borders(region.size());
-  for (const ArrangementEdge& edge : arrangement.edges) {
-    if (edge.right < 0 || edge.left == edge.right) continue;
-    if (region[static_cast<std::size_t>(edge.left)] < 0 ||
-        region[static_cast<std::size_t>(edge.right)] < 0) {
-      continue;
+// Regions and what lies between them while they grow.
+class Regions {
+ public:
+  Regions(const Arrangement& arrangement, const std::vector<bool>& is_inside)
+      : region_(arrangement.faces.size(), -1),
+        borders_(region_.size()),
+        extents_(region_.size()) {
+    for (std::size_t i = 0; i < region_.size(); ++i) {
+      if (is_inside[i]) region_[i] = static_cast<int>(i);
+      extents_[i].area = arrangement.faces[i].Area();
+      extents_[i].perimeter = arrangement.faces[i].Perimeter();
     }
-    for (const auto& [a, b] : {std::make_pair(edge.left, edge.right),
-                               std::make_pair(edge.right, edge.left)}) {
-      borders[static_cast<std::size_t>(a)][b].Add(edge.lengths);
+    for (const ArrangementEdge& edge : arrangement.edges) {
+      if (edge.right < 0 || edge.left == edge.right) continue;
+      if (region_[static_cast<std::size_t>(edge.left)] < 0 ||
+          region_[static_cast<std::size_t>(edge.right)] < 0) {
+        continue;
+      }
+      BordersOf(edge.left)[edge.right].Add(edge.lengths);
+      BordersOf(edge.right)[edge.left].Add(edge.lengths);
     }
   }
-  // The most open first; then by number.
-  using Pair = std::tuple<double, int, int>;
-  std::set<Pair> queue;
-  for (const bool is_last : {false, true}) {
-    queue.clear();
-    const auto key = [&, is_last](const BorderLengths& border, int a, int b) {
-      return Pair(is_last ? -Through(border, options) : -Openness(border),
-                  std::min(a, b), std::max(a, b));
+
+  const std::vector<int>& region() const { return region_; }
+
+  // Joins across borders that are open, the most open first.
+  void JoinOpen(const RegionOptions& options) {
+    // Then by number.
+    using Pair = std::tuple<double, int, int>;
+    std::set<Pair> queue;
+    const auto key = [](const BorderLengths& border, int a, int b) {
+      return Pair(-Openness(border), std::min(a, b), std::max(a, b));
     };
-    for (std::size_t a = 0; a < borders.size(); ++a) {
-      for (const auto& [b, border] : borders[a]) {
+    for (std::size_t a = 0; a < borders_.size(); ++a) {
+      for (const auto& [b, border] : borders_[a]) {
         queue.insert(key(border, static_cast<int>(a), b));
       }
     }
     while (!queue.empty()) {
       const auto [closed, a, b] = *queue.begin();
-      if (closed >= (is_last ? 0.0 : options.holds_apart)) break;
-      queue.erase(queue.begin());
-      // b goes into a.
-      auto& of_a = borders[static_cast<std::size_t>(a)];
-      auto& of_b = borders[static_cast<std::size_t>(b)];
-      of_a.erase(b);
-      of_b.erase(a);
-      for (const auto& [c, border] : of_b) {
-        auto& of_c = borders[static_cast<std::size_t>(c)];
-        queue.erase(key(border, b, c));
-        of_c.erase(b);
-        BorderLengths& joined = of_a[c];
-        queue.erase(key(joined, a, c));
-        joined.Add(border);
-        of_c[a] = joined;
-        queue.insert(key(joined, a, c));
+      if (closed >= options.holds_apart) break;
+      for (const int end : {a, b}) {
+        for (const auto& [c, border] : BordersOf(end)) {
+          queue.erase(key(border, end, c));
+        }
       }
-      of_b.clear();
-      for (int& r : region) {
-        if (r == b) r = a;
+      Join(a, b);
+      for (const auto& [c, border] : BordersOf(a)) {
+        queue.insert(key(border, a, c));
       }
     }
   }
-  return region;
-}
+
+  // Joins across openings as wide as the space itself.
+  void JoinThrough(const RegionOptions& options) {
+    for (;;) {
+      double best = 0.0;
+      int best_a = -1;
+      int best_b = -1;
+      for (std::size_t a = 0; a < borders_.size(); ++a) {
+        for (const auto& [b, border] : borders_[a]) {
+          const double width =
+              std::min(extents_[a].Width(),
+                       extents_[static_cast<std::size_t>(b)].Width());
+          const double through = Through(border, width, options);
+          if (through <= best) continue;
+          best = through;
+          best_a = static_cast<int>(a);
+          best_b = b;
+        }
+      }
+      if (best_a < 0) return;
+      Join(best_a, best_b);
+    }
+  }
+
+ private:
+  std::map<int, BorderLengths>& BordersOf(int region) {
+    return borders_[static_cast<std::size_t>(region)];
+  }
+
+  // b goes into a.
+  void Join(int a, int b) {
+    Extent& extent = extents_[static_cast<std::size_t>(a)];
+    const Extent& more = extents_[static_cast<std::size_t>(b)];
+    extent.area += more.area;
+    extent.perimeter += more.perimeter - 2.0 * BordersOf(a)[b].length();
+    BordersOf(a).erase(b);
+    BordersOf(b).erase(a);
+    for (const auto& [c, border] : BordersOf(b)) {
+      BordersOf(c).erase(b);
+      BordersOf(a)[c].Add(border);
+      BordersOf(c)[a].Add(border);
+    }
+    BordersOf(b).clear();
+    std::replace(region_.begin(), region_.end(), b, a);
+  }
+
+  std::vector<int> region_;
+  std::vector<std::map<int, BorderLengths>> borders_;
+  std::vector<Extent> extents_;
+};
 
 bool IsNarrow(const Polygon& polygon, double width) {
   return Offset(polygon, -0.5 * width).empty();
@@ -204,8 +261,10 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
 
 std::vector<int> FindRegions(const Arrangement& arrangement,
                              const RegionOptions& options) {
-  std::vector<int> region =
-      Merge(arrangement, InsideOf(arrangement, options), options);
+  Regions regions(arrangement, InsideOf(arrangement, options));
+  regions.JoinOpen(options);
+  regions.JoinThrough(options);
+  std::vector<int> region = regions.region();
   FillPockets(arrangement, options, &region);
   return region;
 }

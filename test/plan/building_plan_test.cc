@@ -145,6 +145,19 @@ TEST(BuildingPlanTest, AWideOpeningJoins) {
   EXPECT_EQ(PlanOf(drawing).rooms.size(), 2u);
 }
 
+// The space between the jambs of a thick wall belongs to one side: the other
+// must not take its door for the end of a corridor.
+TEST(BuildingPlanTest, DoorsInThickWallsKeepRoomsApart) {
+  for (const double thickness : {0.1, 0.3, 0.4, 0.5}) {
+    Drawing drawing(14.0, 12.0);
+    const double y = 3.0 + thickness;
+    drawing.Room(1.0, 1.0, 13.0, 3.0);
+    drawing.Room(1.0, y, 6.0, 8.0).Room(6.2, y, 13.0, 8.0);
+    drawing.Free(2.0, 2.9, 2.9, y + 0.1).Free(8.0, 2.9, 8.9, y + 0.1);
+    EXPECT_EQ(PlanOf(drawing).rooms.size(), 3u) << thickness;
+  }
+}
+
 TEST(BuildingPlanTest, OneRoomAndOneCorridor) {
   const BuildingPlan room = PlanOf(Drawing(8.0, 8.0).Room(1, 1, 6, 5));
   ASSERT_EQ(room.rooms.size(), 1u);

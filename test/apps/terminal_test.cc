@@ -287,9 +287,10 @@ TEST_F(TerminalTest, VerboseTellsSteps) {
 }
 
 const std::set<std::string> kFilesOfALog = {
-    "em_trace.csv",   "floorplan.dxf", "floorplan.svg", "graph.g2o",
-    "map.json",       "map.png",       "map.svg",       "occupancy.pgm",
-    "occupancy.yaml", "report.html",   "summary.json",  "trajectory.tum"};
+    "em_trace.csv",  "floorplan.dxf",  "floorplan.geojson", "floorplan.svg",
+    "graph.g2o",     "map.json",       "map.png",           "map.svg",
+    "occupancy.pgm", "occupancy.yaml", "report.html",       "rooms.csv",
+    "summary.json",  "trajectory.tum"};
 
 // All scans are there, and the map as far as it is adjusted.
 TEST_F(TerminalTest, InterruptedJointAdjustment) {

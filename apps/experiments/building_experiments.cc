@@ -16,6 +16,8 @@ namespace {
 
 // Of the walls seen on several visits so many shall be one in the map.
 constexpr double kClosedShare = 0.95;
+// Length of walls that a map may have twice, m.
+constexpr double kMostDrawnTwice = 0.5;
 
 // A map with structure may be so much worse than the one without, as a share
 // and m, and may bend the building by so many degrees.
@@ -94,6 +96,7 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
             {"walls", static_cast<double>(run.map.walls.size())},
             {"walls_missed", static_cast<double>(run.map.missed_walls.size())},
             {"walls_false", static_cast<double>(run.map.false_walls.size())},
+            {"drawn_twice", run.map.doubled_length},
             {"offset_error", run.map.offset_error.mean},
             {"direction_error_deg", run.map.direction_error_deg.mean},
             {"position_error", run.mean_position_error}};
@@ -125,12 +128,22 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
     };
     const int revisits = sum("revisits");
     const int closed = sum("revisits_closed");
+    // Walls that were grown from all visits at once need no closure.
+    if (revisits == 0) continue;
     Claim claim;
     claim.text = shape + ": revisits closed (" + std::to_string(closed) +
                  " of " + std::to_string(revisits) + ")";
     claim.required = "at least " + Format("%g", kClosedShare);
     claim.measured = ShareEstimate(closed, revisits);
     claim.holds = closed >= kClosedShare * revisits;
+    result->claims.push_back(std::move(claim));
+  }
+  for (const std::string& shape : BuildingShapes()) {
+    Claim claim;
+    claim.text = shape + ": walls drawn twice, m for each building";
+    claim.required = "at most " + Format("%g", kMostDrawnTwice);
+    claim.measured = MeanEstimate(Column(*result, shape, "drawn_twice"));
+    claim.holds = claim.measured.value <= kMostDrawnTwice;
     result->claims.push_back(std::move(claim));
   }
   result->notes.push_back(

@@ -64,33 +64,42 @@ class SharedParts {
       plan_ = MakeFloorPlan(*outcome.graph, Poses(outcome));
       plan_.title = outcome.title;
       if (outcome.scans == nullptr || outcome.trajectory.empty()) return;
-      // Too fine a grid has holes, too coarse a one no doors.
-      OccupancyOptions options = outcome.occupancy;
-      if (options.resolution >= 0.5 * kPlanResolution &&
-          options.resolution <= kCoarsestPlanResolution) {
-        std::string reason;
-        const OccupancyGrid* const grid = Grid(outcome, &reason);
-        if (grid != nullptr) AddRooms(*grid, Poses(outcome), &plan_);
-        return;
-      }
-      options.resolution = kPlanResolution;
-      std::optional<OccupancyGrid> grid;
+      // A plan without rooms is better than none.
       try {
-        grid = MakeOccupancyGrid(*outcome.scans, Poses(outcome), options);
-      } catch (const Error&) {
-        return;  // too large: a plan without rooms
+        FindRooms(outcome);
+      } catch (const Error& error) {
+        no_rooms_ = error.what();
       }
-      AddRooms(*grid, Poses(outcome), &plan_);
     });
     return plan_;
   }
 
+  // Why the plan of a log has no rooms; empty when they were looked for.
+  const std::string& no_rooms() const { return no_rooms_; }
+
  private:
+  void FindRooms(const SolveOutcome& outcome) {
+    // Too fine a grid has holes, too coarse a one no doors.
+    OccupancyOptions options = outcome.occupancy;
+    if (options.resolution >= 0.5 * kPlanResolution &&
+        options.resolution <= kCoarsestPlanResolution) {
+      std::string reason;
+      const OccupancyGrid* const grid = Grid(outcome, &reason);
+      if (grid != nullptr) AddRooms(*grid, Poses(outcome), &plan_);
+      no_rooms_ = reason;
+      return;
+    }
+    options.resolution = kPlanResolution;
+    AddRooms(MakeOccupancyGrid(*outcome.scans, Poses(outcome), options),
+             Poses(outcome), &plan_);
+  }
+
   std::once_flag grid_once_;
   std::optional<OccupancyGrid> grid_;
   std::string no_grid_;
   std::once_flag plan_once_;
   FloorPlan plan_;
+  std::string no_rooms_;
 };
 
 namespace {
@@ -246,9 +255,14 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
         WriteFloorPlanGeoJson(Plan(outcome), folder / "floorplan.geojson");
       }));
   add("rooms.csv", "number, kind, area and neighbors of every room", true, true,
-      Always([](const SolveOutcome& outcome, const path& folder) {
-        WriteRoomsCsv(Plan(outcome).building, folder / "rooms.csv");
-      }));
+      [](const SolveOutcome& outcome, const path& folder) {
+        const BuildingPlan& building = Plan(outcome).building;
+        if (!outcome.parts->no_rooms().empty()) {
+          return outcome.parts->no_rooms();
+        }
+        WriteRoomsCsv(building, folder / "rooms.csv");
+        return std::string();
+      });
   add("occupancy.pgm", "a grid for ROS map_server and Nav2, and its .yaml",
       true, true, WriteOccupancy, {"occupancy.yaml"});
 }

@@ -123,6 +123,10 @@ DEFINE_string(delta_mode, "frozen",
               "tukey, geman_mcclure, dcs");
 PLUMBLINE_FLAG_CHOICES(delta_mode, "frozen", "continuous", "huber", "cauchy",
                        "tukey", "geman_mcclure", "dcs");
+DEFINE_string(minimizer, "ceres",
+              "Solves of the whole graph: ceres, resident (keeps the analysis "
+              "of the graph between solves)");
+PLUMBLINE_FLAG_CHOICES(minimizer, "ceres", "resident");
 DEFINE_int32(em_every, 20,
              "Scans between EM steps while replaying; 0: only at the end");
 PLUMBLINE_FLAG_RANGE(em_every, 0, 1e9);
@@ -260,7 +264,7 @@ std::vector<FlagGroup> SolveFlagGroups() {
         "structure_sigma_point_point_coincidence"}},
       {"Expectation maximization",
        {"delta_threshold", "delta_mode", "full_weight_test", "em_every",
-        "em_max_iterations"}},
+        "em_max_iterations", "minimizer"}},
       {"Front-end",
        {"features", "odometry_refinement", "link_radius", "association_depth",
         "global_association", "refine", "usable_range"}},
@@ -321,6 +325,7 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.point_builder.link_radius = FLAGS_link_radius;
   options.point_builder.association_depth = FLAGS_association_depth;
   options.session.delta_mode = FLAGS_delta_mode;
+  options.session.minimizer = FLAGS_minimizer;
   options.em.delta_threshold = FLAGS_delta_threshold;
   options.em.full_weight_test = FLAGS_full_weight_test == "true" ||
                                 (FLAGS_full_weight_test == "auto" &&

@@ -3,6 +3,7 @@
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/information.h>
+#include <plumbline/core/resident_minimizer.h>
 #include <plumbline/core/session.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/factors/chi_square.h>
@@ -28,6 +29,8 @@ constexpr int kMaxInvalidSteps = 20;
 // Rows times squared columns below which a dense solve is done before a sparse
 // one has been set up.
 constexpr double kDenseWork = 3e5;
+// Steps in a row that may lead uphill on the way to a lower cost.
+constexpr int kUphillSteps = 3;
 constexpr int kUnknownRank = -1;
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
@@ -180,6 +183,12 @@ struct SolverSession::Impl {
         problem(ProblemOptions(options_in.fast_removal)) {
     totals.usable = true;
     totals.converged = true;
+    if (options.minimizer == "resident") {
+      resident = std::make_unique<ResidentMinimizer>(&problem);
+    } else if (options.minimizer != "ceres") {
+      throw PLUMBLINE_ERROR("unknown minimizer \"" + options.minimizer + "\"",
+                            "ceres or resident");
+    }
   }
 
   TypeInfo* InfoOf(const FeatureType* type) {
@@ -352,7 +361,14 @@ struct SolverSession::Impl {
       StopWhenAsked stop_when_asked(stop);
       if (stop) solver.callbacks.push_back(&stop_when_asked);
       ceres::Solver::Summary summary;
-      ceres::Solve(solver, solved, &summary);
+      if (resident != nullptr && solved == &problem &&
+          solver.linear_solver_type == ceres::SPARSE_NORMAL_CHOLESKY) {
+        solver.use_nonmonotonic_steps = true;
+        solver.max_consecutive_nonmonotonic_steps = kUphillSteps;
+        resident->Solve(solver, &summary);
+      } else {
+        ceres::Solve(solver, solved, &summary);
+      }
       report.usable = summary.IsSolutionUsable();
       report.converged = !stop_when_asked.has_stopped() &&
                          (summary.termination_type == ceres::CONVERGENCE ||
@@ -508,6 +524,8 @@ struct SolverSession::Impl {
   SolveReport totals;
   int num_solves = 0;
   ceres::Problem problem;
+  // Null: Ceres' own.
+  std::unique_ptr<ResidentMinimizer> resident;
 };
 
 SolverSession::SolverSession(Graph* graph, const Registry& registry,

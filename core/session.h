@@ -17,6 +17,10 @@ namespace plumbline {
 struct SessionOptions {
   /// Weighting of structure constraints: a LossType's name.
   std::string delta_mode = "frozen";
+  /// "resident" (ResidentMinimizer) keeps the analysis of the graph between
+  /// global solves, "ceres" makes it anew. Small and local solves are Ceres' in
+  /// any case.
+  std::string minimizer = "ceres";
   int max_iterations = 50;
   /// Relative change of the cost at which a solve ends.
   double function_tolerance = 1e-8;
@@ -76,7 +80,7 @@ struct CostReport {
 class SolverSession : public GraphListener {
  public:
   /// The graph must outlive the session; features and constraints already in
-  /// it are taken over. Throws Error for an unknown delta_mode.
+  /// it are taken over. Throws Error for an unknown delta_mode or minimizer.
   SolverSession(Graph* graph, const Registry& registry,
                 const SessionOptions& options);
   ~SolverSession() override;

@@ -103,6 +103,68 @@ class SessionTest : public ::testing::Test {
 
 constexpr ConstraintClass kStructure = ConstraintClass::kStructure;
 
+TEST_F(SessionTest, BothMinimizersComeToOneMinimum) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0.0, 0.03);
+  std::vector<FeatureId> poses;
+  for (int i = 0; i < 120; ++i) {
+    poses.push_back(
+        Add("pose", {i + noise(random), noise(random), noise(random)}));
+  }
+  std::vector<ConstraintId> chords;
+  for (int i = 1; i < 120; ++i) {
+    Add(Step(poses[i - 1], poses[i], 1.0 + noise(random), noise(random),
+             noise(random), {1e4, 1e4, 1e5}));
+    if (i < 7) continue;
+    chords.push_back(Add(Step(poses[i - 7], poses[i], 7.0, noise(random),
+                              0.3 * noise(random), {1e3, 1e3, 1e4})));
+  }
+  SessionOptions options;
+  SolverSession ceres_session(&graph_, registry_, options);
+  options.minimizer = "resident";
+  SolverSession resident(&graph_, registry_, options);
+  std::vector<double> start;
+  for (int round = 0; round < 3; ++round) {
+    start.clear();
+    for (const FeatureId id : poses) {
+      for (int k = 0; k < 3; ++k) start.push_back(Value(id, k));
+    }
+    const SolveReport expected = ceres_session.SolveGlobal();
+    std::vector<double> minimum;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      for (int k = 0; k < 3; ++k) {
+        minimum.push_back(Value(poses[i], k));
+        graph_.GetFeature(poses[i]).parameters[k] = start[3 * i + k];
+      }
+    }
+    const SolveReport report = resident.SolveGlobal();
+    EXPECT_TRUE(report.usable) << report.message;
+    EXPECT_TRUE(report.converged);
+    EXPECT_NEAR(report.initial_cost, expected.initial_cost,
+                1e-9 * expected.initial_cost);
+    EXPECT_NEAR(report.final_cost, expected.final_cost,
+                1e-9 * expected.final_cost);
+    for (std::size_t i = 0; i < minimum.size(); ++i) {
+      EXPECT_NEAR(Value(poses[i / 3], static_cast<int>(i % 3)), minimum[i],
+                  1e-6);
+    }
+    Remove(chords[5 + round]);
+    Break(chords[40 + 2 * round]);
+  }
+}
+
+TEST_F(SessionTest, AnUnknownMinimizerIsAnError) {
+  SessionOptions options;
+  options.minimizer = "newton";
+  try {
+    SolverSession session(&graph_, registry_, options);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("\"newton\""));
+    EXPECT_THAT(error.what(), HasSubstr("ceres or resident"));
+  }
+}
+
 TEST_F(SessionTest, StopEndsASolveWithWhatItHas) {
   const FeatureId a = Add("pose", {0.0, 0.0, 0.0}, /*fixed=*/true);
   const FeatureId b = Add("pose", {5.0, 5.0, 2.0});

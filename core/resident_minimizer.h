@@ -1,0 +1,57 @@
+#ifndef PLUMBLINE_CORE_RESIDENT_MINIMIZER_H_
+#define PLUMBLINE_CORE_RESIDENT_MINIMIZER_H_
+
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include <memory>
+
+namespace plumbline {
+
+/// Levenberg-Marquardt on a ceres::Problem that is solved again and again.
+///
+/// What does not change between solves is kept: the pattern of the normal
+/// matrix, its ordering and its symbolic factorization (CHOLMOD). A residual
+/// block that has been removed leaves its place in the pattern empty; new
+/// residual blocks between parameter blocks that had one in common find theirs.
+/// Only variables that come or go, and pairs that had nothing in common, cause
+/// a new analysis. Residuals and Jacobians go into flat arrays; the normal
+/// matrix is summed up from them directly.
+///
+/// Cost functions, losses, manifolds and constant parameter blocks are those of
+/// the problem, steps, radii and reasons to stop those of ceres::Solve() with
+/// LEVENBERG_MARQUARDT and SPARSE_NORMAL_CHOLESKY: both come to the same
+/// minimum.
+class ResidentMinimizer {
+ public:
+  /// The problem is not owned and must outlive the minimizer. It may change
+  /// between solves.
+  explicit ResidentMinimizer(ceres::Problem* problem);
+  ResidentMinimizer(const ResidentMinimizer&) = delete;
+  ResidentMinimizer& operator=(const ResidentMinimizer&) = delete;
+  ~ResidentMinimizer();
+
+  /// Optimizes the parameters in place, as ceres::Solve() does; they stay as
+  /// they were when the solve fails. Of `options` it heeds the limits of
+  /// iterations, time and invalid steps, tolerances, trust region radii, bounds
+  /// of the diagonal, jacobi_scaling, use_nonmonotonic_steps with
+  /// max_consecutive_nonmonotonic_steps (ended at the best state), callbacks
+  /// and update_state_every_iteration. It works on one thread and writes no
+  /// log. Bounds of parameters and evaluation callbacks are not supported: the
+  /// solve fails and says so. Of `summary` it fills in what says how the
+  /// solve ended: termination_type, message, costs, iterations, counts of steps
+  /// and linear solves, and times.
+  void Solve(const ceres::Solver::Options& options,
+             ceres::Solver::Summary* summary);
+
+  /// Symbolic analyses so far.
+  int num_analyses() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_CORE_RESIDENT_MINIMIZER_H_

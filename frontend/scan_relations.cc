@@ -10,6 +10,10 @@
 namespace plumbline {
 namespace {
 
+// Submaps between two questions whether to stop, for each thread: some tenths
+// of a second.
+constexpr std::size_t kSubmapsAtOnce = 16;
+
 // Places [begin, end).
 struct Submap {
   int begin = 0;
@@ -69,6 +73,25 @@ std::vector<ScanPoint> Reference(const Submap& submap,
   return reference;
 }
 
+// At most `most` of the submaps near a place, given nearest first: the nearest
+// half, and others in even steps of time, so that every visit has its share.
+std::vector<int> Spread(const std::vector<std::pair<double, int>>& near,
+                        int most) {
+  std::vector<int> chosen, others;
+  for (const auto& [distance, submap] : near) {
+    const bool is_nearest = static_cast<int>(near.size()) <= most ||
+                            static_cast<int>(chosen.size()) < (most + 1) / 2;
+    (is_nearest ? chosen : others).push_back(submap);
+  }
+  std::sort(others.begin(), others.end());
+  if (others.empty()) return chosen;
+  const std::size_t room = static_cast<std::size_t>(most) - chosen.size();
+  for (std::size_t i = 0; i < room; ++i) {
+    chosen.push_back(others[(2 * i + 1) * others.size() / (2 * room)]);
+  }
+  return chosen;
+}
+
 // For each submap the places to match with it, ascending.
 std::vector<std::vector<int>> Assign(const std::vector<Submap>& submaps,
                                      const std::vector<Pose2>& poses,
@@ -101,10 +124,7 @@ std::vector<std::vector<int>> Assign(const std::vector<Submap>& submaps,
       }
     }
     std::sort(near.begin(), near.end());
-    if (static_cast<int>(near.size()) > options.max_submaps) {
-      near.resize(options.max_submaps);
-    }
-    for (const auto& entry : near) keys[entry.second].push_back(k);
+    for (const int i : Spread(near, options.max_submaps)) keys[i].push_back(k);
   }
   return keys;
 }
@@ -114,8 +134,9 @@ std::vector<std::vector<int>> Assign(const std::vector<Submap>& submaps,
 ScanMatchFinder::ScanMatchFinder(const std::vector<Place>& places,
                                  const ScanRelationOptions& options)
     : places_(places), options_(options) {
-  if (options.submap_size < 1 || !(options.radius > 0.0)) {
-    throw PLUMBLINE_ERROR("submap_size or radius out of range",
+  if (options.submap_size < 1 || !(options.radius > 0.0) ||
+      options.max_submaps < 1) {
+    throw PLUMBLINE_ERROR("submap_size, radius or max_submaps out of range",
                           "positive values");
   }
   attempts_.resize(Submaps(places, options.submap_size).size());
@@ -127,7 +148,7 @@ void ScanMatchFinder::TrustPoses() {
 }
 
 std::vector<ScanRelation> ScanMatchFinder::Find(
-    const std::vector<Pose2>& poses) {
+    const std::vector<Pose2>& poses, const std::function<bool()>& stop) {
   if (places_.size() != poses.size()) {
     throw PLUMBLINE_ERROR(std::to_string(places_.size()) + " places and " +
                               std::to_string(poses.size()) + " poses",
@@ -144,7 +165,7 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
           1.0 / (options_.prior_rotation * options_.prior_rotation))
           .asDiagonal();
   std::vector<std::int64_t> tried(submaps.size(), 0);
-  ParallelFor(submaps.size(), options_.num_threads, [&](std::size_t i) {
+  const auto match = [&](std::size_t i) {
     const int middle = submaps[i].middle();
     std::map<int, Attempt> attempts;
     ScanMatcher matcher(options_.matcher);
@@ -183,7 +204,14 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
       attempts.emplace(k, attempt);
     }
     attempts_[i] = std::move(attempts);
-  });
+  };
+  const std::size_t at_once =
+      kSubmapsAtOnce * static_cast<std::size_t>(options_.num_threads);
+  for (std::size_t i = 0; i < submaps.size(); i += at_once) {
+    if (stop && stop()) break;
+    ParallelFor(std::min(at_once, submaps.size() - i), options_.num_threads,
+                [&](std::size_t j) { match(i + j); });
+  }
   num_tried_ = 0;
   for (const std::int64_t number : tried) num_tried_ += number;
   std::vector<ScanRelation> relations;

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -19,9 +20,10 @@ struct ScanRelationOptions {
   int submap_size = 4;
   /// How far a place may be from a submap's middle, m.
   double radius = 4.0;
-  /// Submaps that one place is matched with, nearest first: bounds the cost
-  /// where a robot stays long.
-  int max_submaps = 40;
+  /// Submaps that one place is matched with: bounds the cost where a robot
+  /// stays long or comes again and again. Half of them are the nearest, the
+  /// others are spread over the visits.
+  int max_submaps = 10;
   /// Shares of the scan's returns that must have a partner before and after
   /// the match.
   double min_overlap = 0.4;
@@ -80,8 +82,11 @@ class ScanMatchFinder {
 
   /// All relations at these poses: one per place, in one frame, good to within
   /// the matcher's initial radius where scans overlap. They come in the order
-  /// of submaps, then of places. Cost: linear in the places.
-  std::vector<ScanRelation> Find(const std::vector<Pose2>& poses);
+  /// of submaps, then of places. Cost: linear in the places. `stop` (may be
+  /// null) is asked now and then by the calling thread; once it has returned
+  /// true no more is matched, and what comes is not whole.
+  std::vector<ScanRelation> Find(const std::vector<Pose2>& poses,
+                                 const std::function<bool()>& stop = nullptr);
 
   /// Forgets what was matched, and takes the places of a submap from now on
   /// where the poses given to Find have them: for poses that are adjusted.

@@ -2,6 +2,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/scan_relations.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "frontend/synthetic_world.h"
@@ -23,14 +24,14 @@ using testing::Wall;
 
 class ScanRelationsTest : public ::testing::Test {
  protected:
-  // A robot drives along y = 0 twice.
-  void Drive(const std::vector<Wall>& walls) {
+  // A robot drives along y = 0 twice, or more often.
+  void Drive(const std::vector<Wall>& walls, int visits = 2) {
     Noise noise(5);
     Laser laser = testing::FullCircle();
     laser.angle_step = DegToRad(2.0);
     laser.beams = 180;
     laser.sigma = 0.01;
-    for (int visit = 0; visit < 2; ++visit) {
+    for (int visit = 0; visit < visits; ++visit) {
       for (int i = 0; i < 8; ++i) {
         truth_.emplace_back(-3.5 + i, 0.1 * visit, 0.2 * visit);
         Place place;
@@ -116,6 +117,23 @@ TEST_F(ScanRelationsTest, CostIsBoundedWhereTheRobotStays) {
   for (const ScanRelation& relation : relations) ++count[relation.to];
   for (const int n : count) EXPECT_LE(n, 1);
   EXPECT_GE(relations.size(), 12u);
+}
+
+TEST_F(ScanRelationsTest, VisitsShareWhatAPlaceIsMatchedWith) {
+  Drive(testing::Room(10.0, 6.0), /*visits=*/12);
+  options_.max_submaps = 6;
+  std::vector<int> count(places_.size(), 0);
+  int last_visit = 0;
+  for (const ScanRelation& relation :
+       FindScanRelations(places_, truth_, options_)) {
+    ++count[relation.to];
+    // Visits lie farther off one by one: the six nearest end with the sixth.
+    if (relation.to / 8 == 0) {
+      last_visit = std::max(last_visit, relation.from / 8);
+    }
+  }
+  for (const int n : count) EXPECT_LE(n, 6);
+  EXPECT_GE(last_visit, 9);
 }
 
 TEST_F(ScanRelationsTest, SameForAnyNumberOfThreads) {

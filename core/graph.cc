@@ -293,6 +293,67 @@ TransactionResult Graph::Add(Transaction* transaction) {
   return result;
 }
 
+void Graph::Restore(std::vector<Feature> features,
+                    std::vector<Constraint> constraints, FeatureId feature_end,
+                    ConstraintId constraint_end) {
+  if (feature_id_end() > 0 || constraint_id_end() > 0) {
+    throw PLUMBLINE_ERROR("the graph had features already", "a new graph");
+  }
+  // As a transaction on a graph of the same features under new ids it is
+  // checked whole.
+  std::map<FeatureId, FeatureId> provisional;
+  FeatureId last_feature = kNoId;
+  for (const Feature& feature : features) {
+    if (feature.id <= last_feature || feature.id >= feature_end) {
+      throw UnknownId("feature", feature.id);
+    }
+    last_feature = feature.id;
+    CheckFeature(feature);
+    provisional.emplace(feature.id,
+                        Transaction::ProvisionalId(provisional.size()));
+  }
+  ConstraintId last_constraint = kNoId;
+  for (Constraint& constraint : constraints) {
+    if (constraint.id <= last_constraint || constraint.id >= constraint_end) {
+      throw UnknownId("constraint", constraint.id);
+    }
+    last_constraint = constraint.id;
+    const std::vector<FeatureId> ids = constraint.features;
+    for (FeatureId& id : constraint.features) {
+      const auto found = provisional.find(id);
+      if (found == provisional.end()) throw UnknownId("feature", id);
+      id = found->second;
+    }
+    CheckAddition(constraint, features, Removals());
+    constraint.features = ids;
+  }
+  features_.resize(static_cast<std::size_t>(feature_end));
+  constraints_.resize(static_cast<std::size_t>(constraint_end));
+  TransactionResult added;
+  for (Feature& feature : features) {
+    if (feature.is_virtual) {
+      virtual_features_[feature.level].push_back(feature.id);
+    }
+    added.features.push_back(feature.id);
+    auto node = std::make_unique<Node>();
+    node->feature = std::move(feature);
+    features_[static_cast<std::size_t>(added.features.back())] =
+        std::move(node);
+  }
+  for (Constraint& constraint : constraints) {
+    for (const FeatureId id : constraint.features) {
+      features_[static_cast<std::size_t>(id)]->constraints.push_back(
+          constraint.id);
+    }
+    added.constraints.push_back(constraint.id);
+    constraints_[static_cast<std::size_t>(constraint.id)] =
+        std::make_unique<Constraint>(std::move(constraint));
+  }
+  num_features_ = features.size();
+  num_constraints_ = constraints.size();
+  Tell(Retired(), added);
+}
+
 void Graph::Tell(const Retired& retired, const TransactionResult& added) const {
   for (GraphListener* listener : listeners_) {
     for (const Constraint* constraint : retired.constraints) {

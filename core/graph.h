@@ -43,6 +43,16 @@ class Graph {
   /// message names both).
   TransactionResult Apply(Transaction transaction);
 
+  /// Fills an empty graph with what another one had, under the same ids:
+  /// features and constraints with their ids, ascending, live and broken, and
+  /// the ends of both (feature_id_end, constraint_id_end). What comes next gets
+  /// the same ids as it would have in the other graph. Throws Error, and leaves
+  /// the graph as it was, when the graph is not new, ids do not fit, or as
+  /// Apply does.
+  void Restore(std::vector<Feature> features,
+               std::vector<Constraint> constraints, FeatureId feature_end,
+               ConstraintId constraint_end);
+
   /// Gives a live measurement a new expected value and information (the robot's
   /// links while it moves). Throws Error as Apply does.
   void UpdateConstraint(ConstraintId id, const Eigen::VectorXd& expected,

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -93,6 +94,41 @@ class GraphTest : public ::testing::Test {
   const RelationType link_ = MakeRelation();
   Graph graph_;
 };
+
+TEST_F(GraphTest, IsRestoredUnderTheSameIds) {
+  AddChain();
+  Transaction change;
+  change.RemoveConstraint(0);
+  change.BreakConstraint(1);
+  change.RemoveFeature(0);
+  graph_.Apply(std::move(change));
+  std::vector<Feature> features;
+  for (const Feature* feature : std::as_const(graph_).Features()) {
+    features.push_back(*feature);
+  }
+  std::vector<Constraint> constraints;
+  for (const Constraint* constraint : std::as_const(graph_).Constraints()) {
+    constraints.push_back(*constraint);
+  }
+  Graph copy;
+  copy.Restore(features, constraints, 4, 2);
+  EXPECT_EQ(copy.num_features(), 2u);
+  EXPECT_EQ(copy.num_constraints(), 1u);
+  EXPECT_EQ(copy.FindFeature(0), nullptr);
+  EXPECT_EQ(copy.GetFeature(2).parameters[0], 12.0);
+  EXPECT_EQ(copy.GetConstraint(1).state, ConstraintState::kBroken);
+  EXPECT_THAT(copy.ConstraintsOf(1), ElementsAre(1));
+  // The id 3 was handed out and is gone, too.
+  Transaction more;
+  more.AddFeature(Dot(1.0));
+  EXPECT_THAT(copy.Apply(std::move(more)).features, ElementsAre(4));
+  // Nor twice, nor with ids that do not fit.
+  EXPECT_THROW(copy.Restore(features, constraints, 4, 2), Error);
+  Graph other;
+  EXPECT_THROW(other.Restore(features, constraints, 2, 2), Error);
+  EXPECT_THROW(other.Restore({features[0]}, constraints, 4, 2), Error);
+  EXPECT_EQ(other.feature_id_end(), 0);
+}
 
 TEST_F(GraphTest, HandsOutIdsInOrder) {
   AddChain();

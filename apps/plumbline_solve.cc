@@ -8,13 +8,16 @@
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/initial_guess.h>
 #include <plumbline/core/plugin.h>
+#include <plumbline/core/sha256.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/core/utf8.h>
+#include <plumbline/core/version.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/log_reader.h>
+#include <plumbline/outputs/checkpoint_file.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/output_folder.h>
 #include <plumbline/outputs/solve_outputs.h>
@@ -168,7 +171,10 @@ std::vector<std::filesystem::path> InputFiles() {
 
 // Every name that a run may write.
 std::set<std::string> NamesOfAllOutputs(const Registry& registry) {
-  return FilesOfOutputs(SelectOutputs("all", registry), registry);
+  std::set<std::string> names =
+      FilesOfOutputs(SelectOutputs("all", registry), registry);
+  names.insert(CheckpointFile::kName);
+  return names;
 }
 
 // Says which flags that were given do nothing for this kind of input.
@@ -267,6 +273,61 @@ void CheckHierarchy(const LogSolverOptions& options, const Registry& registry) {
   });
 }
 
+// Everything that a log is solved from, as one number.
+std::string DigestOf(const Log& log) {
+  Sha256 sha;
+  const auto take = [&sha](const void* data, std::size_t size) {
+    sha.Update(std::string_view(static_cast<const char*>(data), size));
+  };
+  for (const Scan& scan : log.scans) {
+    const double numbers[] = {
+        scan.timestamp,       scan.odometry[0],        scan.odometry[1],
+        scan.odometry[2],     scan.laser_offset[0],    scan.laser_offset[1],
+        scan.laser_offset[2], scan.start_angle,        scan.angle_step,
+        scan.maximum_range,   1.0 * scan.ranges.size()};
+    take(numbers, sizeof numbers);
+    take(scan.ranges.data(), scan.ranges.size() * sizeof(float));
+    sha.Update(scan.timestamp_text);
+  }
+  return sha.HexDigest();
+}
+
+// What the state between the stages of a run depends on: not on what is made of
+// the map in the end, nor on the number of threads.
+CheckpointFile::Identity IdentityOfRun(const Log& log) {
+  CheckpointFile::Identity identity;
+  identity["the version"] = kVersion;
+  identity["the program's digest"] = Sha256OfFile("/proc/self/exe");
+  identity["the input's digest"] = DigestOf(log);
+  std::istringstream plugins(FLAGS_plugins);
+  std::string plugin;
+  while (std::getline(plugins, plugin, ',')) {
+    identity["the digest of " + plugin] = Sha256OfFile(plugin);
+  }
+  if (!FLAGS_structure_prior.empty()) {
+    identity["the structure prior's digest"] =
+        Sha256OfFile(FLAGS_structure_prior);
+  }
+  const std::set<std::string> without_effect = {"input",
+                                                "output_dir",
+                                                "outputs",
+                                                "marginals",
+                                                "verbose",
+                                                "quiet",
+                                                "checkpoint_every",
+                                                "num_threads",
+                                                "marginals_hold_gauge",
+                                                "help_format",
+                                                "ellipse_sigmas",
+                                                "grid_resolution"};
+  for (const FlagValue& flag : OwnFlags()) {
+    if (without_effect.count(flag.name) == 0) {
+      identity["--" + flag.name] = flag.value;
+    }
+  }
+  return identity;
+}
+
 int SolveLog(InputStream* input, const LogReaderType& reader,
              const Registry& registry, double begin, OutputFolder* folder) {
   SolveOutcome outcome;
@@ -292,6 +353,16 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
            lines.c_str());
   }
   Detail("read %zu scans in %.1f s", log.scans.size(), summary.parse_seconds);
+
+  CheckpointFile checkpoint(
+      std::filesystem::path(FLAGS_output_dir) / CheckpointFile::kName,
+      [&log] { return IdentityOfRun(log); }, FLAGS_checkpoint_every);
+  std::optional<std::string> state;
+  if (FLAGS_checkpoint_every > 0.0) state = checkpoint.Read();
+  if (state) {
+    Remark("%s: goes on where a run that did not end had got to",
+           FLAGS_output_dir.c_str());
+  }
 
   LogSolver solver(registry, options);
   LogSolverResult result;
@@ -321,7 +392,22 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
     control.step = [&](const char* step) {
       Detail("%s, after %.1f s", step, Now() - begin_solving);
     };
-    result = solver.Run(log, control);
+    bool may_write = FLAGS_checkpoint_every > 0.0;
+    if (may_write) {
+      control.checkpoint = [&](const std::function<std::string()>& make_state) {
+        if (!may_write) return;
+        try {
+          checkpoint.Offer(make_state);
+        } catch (const Error& error) {
+          // The run can do without.
+          may_write = false;
+          Remark("goes on without checkpoints: %s", error.what());
+        }
+      };
+    }
+    result =
+        state ? solver.Resume(log, *state, control) : solver.Run(log, control);
+    state.reset();
   }
   for (const EmPhase& phase : solver.trace()) TellPhase(phase);
   summary.scans = static_cast<std::int64_t>(result.trajectory.size());
@@ -354,16 +440,18 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   Summarize(result.initial_cost, result.final_cost, result.em, &summary);
   outcome.graph = &solver.graph();
   outcome.registry = &registry;
-  TakeMarginals(nullptr, &outcome);
+  if (!InterruptRequested()) TakeMarginals(nullptr, &outcome);
   outcome.scans = &log.scans;
   outcome.without_structure = [&] {
-    return ReplayWithoutStructure(log.scans, registry, options, result);
+    return ReplayWithoutStructure(log.scans, registry, options, result,
+                                  [] { return InterruptRequested(); });
   };
   outcome.trace = solver.trace();
   outcome.occupancy = OccupancyOptionsFromFlags();
   outcome.title = TitleOf(*input) + (FLAGS_structure ? ", with structure"
                                                      : ", without structure");
   WriteOutputs(&outcome, begin, folder);
+  if (!summary.partial) checkpoint.Remove();
   return kExitSuccess;
 }
 
@@ -478,9 +566,10 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin,
   outcome.graph = &graph;
   outcome.registry = &registry;
   outcome.trace = std::move(result.trace);
-  TakeMarginals(&solver.session(), &outcome);
+  if (!InterruptRequested()) TakeMarginals(&solver.session(), &outcome);
   outcome.g2o = &*g2o;
   outcome.without_structure = [&] {
+    if (InterruptRequested()) return MapWithoutStructure();
     return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
   };
   outcome.title = TitleOf(*input);

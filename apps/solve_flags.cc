@@ -66,6 +66,13 @@ PLUMBLINE_FLAG_RANGE(ellipse_sigmas, 0.0, 1000.0);
 DEFINE_double(grid_resolution, 0.05, "Side of a cell of occupancy.pgm, m");
 PLUMBLINE_FLAG_RANGE(grid_resolution, 0.001, 10.0);
 
+DEFINE_double(
+    checkpoint_every, 60.0,
+    "Shortest time between two states of a run on a log that are kept in the "
+    "output folder (at the ends of stages), s; the same command goes on from "
+    "there after the process was killed. 0: none is written or read");
+PLUMBLINE_FLAG_RANGE(checkpoint_every, 0.0, 1e9);
+
 DEFINE_bool(structure, true, "Find structure; false: measurements only");
 DEFINE_string(hierarchy, "",
               "Detectors by level, levels separated by /, detectors of a level "
@@ -270,7 +277,8 @@ std::vector<FlagGroup> SolveFlagGroups() {
         "global_association", "refine", "usable_range"}},
       {"Laser", {"laser_start_angle", "laser_step", "laser_max_range"}},
       {"Running",
-       {"seed", "num_threads", "plugins", "list_plugins", "quiet", "verbose"}},
+       {"seed", "num_threads", "checkpoint_every", "plugins", "list_plugins",
+        "quiet", "verbose"}},
   };
 }
 
@@ -279,10 +287,11 @@ std::vector<std::string> GraphFlags() {
 }
 
 std::vector<std::string> LogFlags() {
-  return {"grid_resolution",     "em_every",    "features",
-          "odometry_refinement", "link_radius", "association_depth",
-          "global_association",  "refine",      "usable_range",
-          "laser_start_angle",   "laser_step",  "laser_max_range"};
+  return {"grid_resolution",   "checkpoint_every",    "em_every",
+          "features",          "odometry_refinement", "link_radius",
+          "association_depth", "global_association",  "refine",
+          "usable_range",      "laser_start_angle",   "laser_step",
+          "laser_max_range"};
 }
 
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {

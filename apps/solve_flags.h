@@ -18,6 +18,7 @@ DECLARE_string(input);
 DECLARE_string(output_dir);
 DECLARE_string(log_reader);
 DECLARE_string(outputs);
+DECLARE_double(checkpoint_every);
 DECLARE_bool(structure);
 DECLARE_double(delta_threshold);
 DECLARE_string(hierarchy);

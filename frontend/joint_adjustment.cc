@@ -107,18 +107,17 @@ double VarianceFactor(std::vector<double> chi_squares, double redundancy,
 
 }  // namespace
 
-JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
-                                 const Registry& registry,
-                                 const std::vector<Scan>& scans,
-                                 const std::vector<RefinedScan>& refined,
-                                 const std::vector<KeyScanRecord>& records,
-                                 const std::vector<Pose2>& key_poses,
-                                 FeatureId robot,
-                                 const JointAdjustmentOptions& options)
+JointAdjustment::JointAdjustment(
+    Graph* graph, SolverSession* session, const Registry& registry,
+    const std::vector<Scan>& scans, const std::vector<RefinedScan>& refined,
+    const std::vector<KeyScanRecord>& records,
+    const std::vector<Pose2>& key_poses, FeatureId robot,
+    const JointAdjustmentOptions& options, std::function<bool()> stop)
     : graph_(graph),
       session_(session),
       registry_(registry),
       options_(options),
+      stop_(std::move(stop)),
       records_(records) {
   if (options_.place_stride < 1) {
     throw PLUMBLINE_ERROR(
@@ -263,7 +262,7 @@ void JointAdjustment::Match() {
   for (const ConstraintId id : relation_constraints_) {
     transaction.RemoveConstraint(id);
   }
-  relations_ = finder_->Find(PlacePoses());
+  relations_ = finder_->Find(PlacePoses(), stop_);
   const RelationType& pose_pose = registry_.GetRelation("pose_pose");
   for (const ScanRelation& relation : relations_) {
     Constraint constraint;
@@ -352,12 +351,12 @@ void JointAdjustment::EstimateVariances() {
   Solve();
 }
 
-void JointAdjustment::Adjust(const std::function<bool()>& stop) {
-  const SolveStop solve_stop(session_, stop);
+void JointAdjustment::Adjust() {
+  const SolveStop solve_stop(session_, stop_);
   for (int pass = 0; pass < options_.max_passes; ++pass) {
     const std::vector<Pose2> before = PlacePoses();
     for (int round = 0; round < options_.rounds; ++round) {
-      if (stop && stop()) return;
+      if (stop_ && stop_()) return;
       // Walls as they were given come first.
       if (pass > 0 || round > 0) {
         MoveWallJunctions(options_.junctions, graph_);
@@ -371,7 +370,7 @@ void JointAdjustment::Adjust(const std::function<bool()>& stop) {
     for (std::size_t p = 0; p < after.size(); ++p) {
       moved = std::max(moved, (after[p] - before[p]).head<2>().norm());
     }
-    if (moved <= options_.settled_distance || (stop && stop())) break;
+    if (moved <= options_.settled_distance || (stop_ && stop_())) break;
     if (pass + 1 < options_.max_passes) Match();
   }
 }
@@ -386,27 +385,38 @@ std::vector<Pose2> JointAdjustment::PlacePoses() const {
 }
 
 std::vector<Pose2> JointAdjustment::KeyPoses() const {
-  const std::vector<Pose2> places = PlacePoses();
-  std::vector<Pose2> keys(records_.size(), Pose2::Zero());
+  return KeyPosesOfPlaces(*graph_, poses_, records_, options_.place_stride);
+}
+
+std::vector<Pose2> KeyPosesOfPlaces(const Graph& graph,
+                                    const std::vector<FeatureId>& places,
+                                    const std::vector<KeyScanRecord>& records,
+                                    int place_stride) {
+  const std::vector<std::size_t> begins = PlaceBegins(records, place_stride);
+  if (begins.size() != places.size()) {
+    throw PLUMBLINE_ERROR(std::to_string(places.size()) + " places",
+                          std::to_string(begins.size()));
+  }
+  std::vector<Pose2> keys(records.size(), Pose2::Zero());
   for (std::size_t p = 0; p < places.size(); ++p) {
-    const std::size_t begin = begins_[p];
-    const std::size_t end =
-        p + 1 < places.size() ? begins_[p + 1] : records_.size();
+    const Pose2 place = PoseOf(graph.GetFeature(places[p]));
+    const std::size_t begin = begins[p];
+    const bool has_next = p + 1 < places.size();
+    const std::size_t end = has_next ? begins[p + 1] : records.size();
     Pose2 relative = Pose2::Zero();
     for (std::size_t k = begin; k < end; ++k) {
-      if (k > begin) relative = Compose(relative, records_[k].motion.mean);
+      if (k > begin) relative = Compose(relative, records[k].motion.mean);
       keys[k] = relative;
     }
     Pose2 missing = Pose2::Zero();
-    if (p + 1 < places.size() && records_[end].from < 0 &&
-        !records_[end].is_loose) {
-      missing = Between(
-          Compose(places[p], Compose(relative, records_[end].motion.mean)),
-          places[p + 1]);
+    if (has_next && records[end].from < 0 && !records[end].is_loose) {
+      missing =
+          Between(Compose(place, Compose(relative, records[end].motion.mean)),
+                  PoseOf(graph.GetFeature(places[p + 1])));
     }
     for (std::size_t k = begin; k < end; ++k) {
       const double share = static_cast<double>(k - begin) / (end - begin);
-      keys[k] = Compose(Compose(places[p], keys[k]), Pose2(share * missing));
+      keys[k] = Compose(Compose(place, keys[k]), Pose2(share * missing));
     }
   }
   return keys;

@@ -46,6 +46,15 @@ struct JointAdjustmentOptions {
   int num_threads = 1;
 };
 
+/// The poses of all key scans (map frame, one per record) where these places
+/// stand in the graph, as JointAdjustment::places lists them: those between
+/// places by refined odometry, what is missing at the next place spread over
+/// the way.
+std::vector<Pose2> KeyPosesOfPlaces(const Graph& graph,
+                                    const std::vector<FeatureId>& places,
+                                    const std::vector<KeyScanRecord>& records,
+                                    int place_stride);
+
 /// Joint adjustment of poses, walls and structure: the last word of the scans
 /// on the map (ours; core/method.md, section 7, ends with finding the scans
 /// again on a map that stays as it is).
@@ -66,13 +75,16 @@ class JointAdjustment {
   /// Puts places into the graph, where `key_poses` say (map frame, one per
   /// record). `robot`: the pose that the front-end keeps in the graph, which
   /// leaves it (kNoId: none). `refined` has one entry per scan. Pointers are
-  /// not owned and must outlive this.
+  /// not owned and must outlive this, and so must what `stop` (may be null)
+  /// refers to: it is asked now and then here and below, and once it has
+  /// returned true the work ends early, the graph whole but unfinished.
   JointAdjustment(Graph* graph, SolverSession* session,
                   const Registry& registry, const std::vector<Scan>& scans,
                   const std::vector<RefinedScan>& refined,
                   const std::vector<KeyScanRecord>& records,
                   const std::vector<Pose2>& key_poses, FeatureId robot,
-                  const JointAdjustmentOptions& options);
+                  const JointAdjustmentOptions& options,
+                  std::function<bool()> stop = nullptr);
 
   /// Matches all scans anew at the poses as they are now: once they are
   /// adjusted they are better than the odometry that placed the scans of one
@@ -100,13 +112,14 @@ class JointAdjustment {
 
   /// Takes votes and weights anew at the present state and solves, `rounds`
   /// times, then matches what has come near and starts again, until the poses
-  /// have settled or `stop` (asked between solves, may be empty) returns true.
-  /// Throws Error when a solve fails.
-  void Adjust(const std::function<bool()>& stop = nullptr);
+  /// have settled or `stop` returns true. Throws Error when a solve fails.
+  void Adjust();
 
-  /// The key poses as they stand, one per record: those between places by
-  /// refined odometry, what is missing at the next place spread over the way.
+  /// The key poses as they stand (KeyPosesOfPlaces).
   std::vector<Pose2> KeyPoses() const;
+
+  /// The features of the places, in the order of the log.
+  const std::vector<FeatureId>& places() const { return poses_; }
 
   /// Matches of scans and votes for walls that are live.
   std::int64_t num_relations() const {
@@ -131,6 +144,7 @@ class JointAdjustment {
   SolverSession* session_;
   const Registry& registry_;
   JointAdjustmentOptions options_;
+  std::function<bool()> stop_;
   const std::vector<KeyScanRecord>& records_;
   std::vector<Place> places_;
   // The record that each place begins with.

@@ -173,9 +173,11 @@ struct LineSums {
 class Completion {
  public:
   Completion(const Graph& graph, const Registry& registry,
-             const WallCompletionOptions& options)
+             const WallCompletionOptions& options,
+             const std::function<bool()>& stop)
       : registry_(registry),
         options_(options),
+        stop_(stop),
         index_(graph, options.explained_gap) {}
 
   Transaction Run(const std::vector<Scan>& scans,
@@ -198,10 +200,18 @@ class Completion {
     }
     // Then all together, also what scans from poses less exact have smeared.
     Look(scans, poses, 0, count, {1.0, 2.0});
+    if (is_stopped_) return {};
     return std::move(transaction_);
   }
 
  private:
+  // Every so many times that it is asked.
+  bool IsStopped() {
+    constexpr int kEvery = 256;
+    if (++asked_ % kEvery == 0 && stop_ && stop_()) is_stopped_ = true;
+    return is_stopped_;
+  }
+
   void Look(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
             std::size_t begin, std::size_t end,
             std::initializer_list<double> smears) {
@@ -224,6 +234,7 @@ class Completion {
     for (const double smear : smears) {
       scatter_ = smear * options_.max_scatter;
       for (int seed : order) {
+        if (IsStopped()) return;
         if (!cells_[seed].used) Grow(seed);
       }
     }
@@ -231,7 +242,7 @@ class Completion {
 
   void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
               std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
+    for (std::size_t i = begin; i < end && !IsStopped(); ++i) {
       const Scan& scan = scans[i];
       const Pose2 laser = Compose(poses[i], scan.laser_offset);
       for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
@@ -613,6 +624,9 @@ class Completion {
 
   const Registry& registry_;
   const WallCompletionOptions options_;
+  const std::function<bool()>& stop_;
+  int asked_ = 0;
+  bool is_stopped_ = false;
   WallIndex index_;
   std::vector<Cell> cells_;
   std::unordered_map<std::int64_t, int> cell_of_;
@@ -642,8 +656,9 @@ class Completion {
 Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
                               const std::vector<Scan>& scans,
                               const std::vector<Pose2>& poses,
-                              const WallCompletionOptions& options) {
-  return Completion(graph, registry, options).Run(scans, poses);
+                              const WallCompletionOptions& options,
+                              const std::function<bool()>& stop) {
+  return Completion(graph, registry, options, stop).Run(scans, poses);
 }
 
 }  // namespace plumbline

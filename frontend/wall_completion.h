@@ -8,6 +8,7 @@
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/scan_points.h>
 
+#include <functional>
 #include <vector>
 
 namespace plumbline {
@@ -57,11 +58,13 @@ struct WallCompletionOptions {
 /// poses, that no wall of the map explains, and grows straight pieces in them.
 /// Returns the transaction that adds them as segments of level 0, bound to
 /// their neighbours by measurements; the graph is not changed. One pose per
-/// scan (map frame). Cost: linear in the returns.
+/// scan (map frame). Cost: linear in the returns. Empty once `stop` (asked now
+/// and then; may be null) has returned true.
 Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
                               const std::vector<Scan>& scans,
                               const std::vector<Pose2>& poses,
-                              const WallCompletionOptions& options);
+                              const WallCompletionOptions& options,
+                              const std::function<bool()>& stop = nullptr);
 
 }  // namespace plumbline
 

@@ -2,6 +2,7 @@
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/pipeline/log_solver.h>
+#include <plumbline/pipeline/log_solver_state.h>
 
 #include <algorithm>
 #include <string>
@@ -47,6 +48,8 @@ struct LogSolver::Context {
   LogSolverResult result;
   // As the scans were found again last.
   std::vector<Pose2> keys;
+  // Features of the places of the second map.
+  std::vector<FeatureId> places;
 
   void Begin(const char* step) const {
     if (control.step) control.step(step);
@@ -64,14 +67,15 @@ LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
     : registry_(registry),
       profile_(ProfileOf(options.features)),
       options_(WithProfile(profile_, options)),
+      graph_(std::make_unique<Graph>()),
       refiner_(options_.odometry) {
-  session_ =
-      std::make_unique<SolverSession>(&graph_, registry_, options_.session);
+  session_ = std::make_unique<SolverSession>(graph_.get(), registry_,
+                                             options_.session);
   em_ = std::make_unique<EmOrchestrator>(
-      &graph_, session_.get(), registry_,
+      graph_.get(), session_.get(), registry_,
       options_.structure ? MakeDetectors(HierarchyOfOptions()) : Hierarchy(),
       options_.em);
-  builder_ = profile_.make_builder(options_, &graph_, registry_);
+  builder_ = profile_.make_builder(options_, graph_.get(), registry_);
 }
 
 LogSolver::~LogSolver() = default;
@@ -141,7 +145,7 @@ void LogSolver::TakeScan(const std::vector<Scan>& scans) {
 
 void LogSolver::RunEmNearRobot() {
   builder_->WriteRobot();
-  const std::size_t features = graph_.num_features();
+  const std::size_t features = graph_->num_features();
   if (features < static_cast<std::size_t>(options_.small_map) &&
       features > features_at_last_global_ + kSmallMapGrowth) {
     features_at_last_global_ = features;
@@ -154,21 +158,20 @@ void LogSolver::RunEmNearRobot() {
   builder_->ReadRobot();
 }
 
-std::vector<Pose2> LogSolver::KeyPoses() const {
+std::vector<Pose2> LogSolver::KeyPoses(
+    const std::vector<KeyScanRecord>& records) const {
   if (options_.refine != Refinement::kNone) {
-    return RelocalizeKeyScans(graph_, builder_->records(),
-                              options_.relocalization);
+    return RelocalizeKeyScans(*graph_, records, options_.relocalization);
   }
   std::vector<Pose2> poses;
-  for (const KeyScanRecord& record : builder_->records()) {
-    poses.push_back(record.pose);
-  }
+  for (const KeyScanRecord& record : records) poses.push_back(record.pose);
   return poses;
 }
 
 std::vector<Pose2> LogSolver::Trajectory() const {
   RequireUnfinished();
-  return InterpolateScans(refined_, builder_->records(), KeyPoses());
+  return InterpolateScans(refined_, builder_->records(),
+                          KeyPoses(builder_->records()));
 }
 
 LogSolverResult LogSolver::Run(const Log& log, const RunControl& control) {
@@ -192,11 +195,35 @@ LogSolverResult LogSolver::Finish(const RunControl& control) {
   return FinishWith(scans_, control);
 }
 
+LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
+                                  const RunControl& control) {
+  RequireUnfinished();
+  if (!refined_.empty()) {
+    throw PLUMBLINE_ERROR("scans were added before Resume", "a new solver");
+  }
+  is_finished_ = true;
+  builder_.reset();
+  Context context{log.scans, control, {}, {}, {}};
+  Stage stage = Stage::kFindStructure;
+  StateReader reader(state);
+  ExchangeState(reader, &stage, &context);
+  if (context.result.refined.size() != log.scans.size()) {
+    throw PLUMBLINE_ERROR("the state is of a log with " +
+                              std::to_string(context.result.refined.size()) +
+                              " scans",
+                          std::to_string(log.scans.size()));
+  }
+  Renew();
+  if (control.progress) control.progress(log.scans.size(), log.scans.size());
+  return FinishFrom(stage, &context);
+}
+
 LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
                                       const RunControl& control) {
   is_finished_ = true;
-  Context context{scans, control, {}, {}};
-  context.result.interrupted = refined_.size() < scans.size();
+  Context context{scans, control, {}, {}, {}};
+  LogSolverResult& result = context.result;
+  result.interrupted = refined_.size() < scans.size();
   {
     const Stopwatch watch;
     double em_seconds = 0.0;
@@ -204,17 +231,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
     TakeSettled(scans, &em_seconds);
     frontend_seconds_ += watch.Seconds() - em_seconds;
   }
-  FindStructure(&context);
-  CloseLoops(&context);
-  FindScansAgain(&context);
-  CompleteWalls(&context);
-  AdjustJointly(&context);
-  CheckMap(&context);
-
-  LogSolverResult& result = context.result;
-  result.detect_seconds =
-      em_before_.detect_seconds + em_->totals().detect_seconds;
-  result.solve_seconds = em_before_.solve_seconds + em_->totals().solve_seconds;
+  builder_->WriteRobot();
   result.frontend_seconds = frontend_seconds_;
   result.scan_seconds = std::move(scan_seconds_);
   result.key_scans = static_cast<std::int64_t>(builder_->records().size());
@@ -225,8 +242,71 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
   result.features_created = builder_->num_created();
   result.records = builder_->records();
   result.refined = std::move(refined_);
+  builder_.reset();
+  return FinishFrom(Stage::kFindStructure, &context);
+}
+
+LogSolverResult LogSolver::FinishFrom(Stage stage, Context* context) {
+  if (stage == Stage::kFindStructure) {
+    FindStructure(context);
+    BeginStage(stage = Stage::kCloseLoops, context);
+  }
+  if (stage == Stage::kCloseLoops) {
+    CloseLoops(context);
+    FindScansAgain(context);
+    CompleteWalls(context);
+    BeginStage(stage = Stage::kAdjustPoses, context);
+  }
+  if (stage == Stage::kAdjustPoses) {
+    AdjustPoses(context);
+    BeginStage(stage = Stage::kFindStructureAgain, context);
+  }
+  if (stage == Stage::kFindStructureAgain) {
+    FindStructureAgain(context);
+    CheckMap(context);
+    BeginStage(stage = Stage::kEnd, context);
+  }
+  context->result.detect_seconds =
+      em_before_.detect_seconds + em_->totals().detect_seconds;
+  context->result.solve_seconds =
+      em_before_.solve_seconds + em_->totals().solve_seconds;
   scans_ = {};
-  return std::move(context.result);
+  return std::move(context->result);
+}
+
+void LogSolver::BeginStage(Stage stage, Context* context) {
+  // What was cut short is for no other run to go on with.
+  if (context->IsStopped()) return;
+  Renew();
+  if (!context->control.checkpoint) return;
+  context->control.checkpoint([&] {
+    StateWriter writer;
+    ExchangeState(writer, &stage, context);
+    return writer.bytes();
+  });
+}
+
+void LogSolver::DropEm() {
+  if (em_ != nullptr) CountEm();
+  em_.reset();
+  session_.reset();
+}
+
+// The session and EM know nothing but what is in the graph.
+void LogSolver::Renew() {
+  DropEm();
+  session_ = std::make_unique<SolverSession>(graph_.get(), registry_,
+                                             options_.session);
+  em_ = std::make_unique<EmOrchestrator>(graph_.get(), session_.get(),
+                                         registry_, Hierarchy(), options_.em);
+}
+
+template <typename Archive>
+void LogSolver::ExchangeState(Archive& archive, Stage* stage,
+                              Context* context) {
+  ExchangeAll(archive, *stage, context->result, context->keys, context->places,
+              em_before_, trace_);
+  Exchange(archive, registry_, *graph_);
 }
 
 void LogSolver::RunEm(Context* context) {
@@ -237,7 +317,6 @@ void LogSolver::RunEm(Context* context) {
 
 void LogSolver::FindStructure(Context* context) {
   context->Begin("structure of the whole map");
-  builder_->WriteRobot();
   context->result.initial_cost = session_->Cost();
   TraceEm();
   RunEm(context);
@@ -254,13 +333,13 @@ void LogSolver::CloseLoops(Context* context) {
 }
 
 void LogSolver::FindScansAgain(Context* context) {
-  builder_->ReadRobot();
-  context->result.final_cost = session_->Cost();
+  LogSolverResult& result = context->result;
+  result.final_cost = session_->Cost();
   context->IsStopped();
-  const ScopedTimer timer(&context->result.relocalization_seconds);
-  context->keys = KeyPoses();
-  context->result.trajectory =
-      InterpolateScans(refined_, builder_->records(), context->keys);
+  const ScopedTimer timer(&result.relocalization_seconds);
+  context->keys = KeyPoses(result.records);
+  result.trajectory =
+      InterpolateScans(result.refined, result.records, context->keys);
 }
 
 void LogSolver::CompleteWalls(Context* context) {
@@ -273,41 +352,70 @@ void LogSolver::CompleteWalls(Context* context) {
   Transaction walls;
   {
     const ScopedTimer timer(&result.completion_seconds);
-    walls = FindGlimpsedWalls(graph_, registry_, context->scans,
-                              result.trajectory, options_.completion);
+    walls =
+        FindGlimpsedWalls(*graph_, registry_, context->scans, result.trajectory,
+                          options_.completion, context->control.stop);
   }
   result.glimpsed_walls =
       static_cast<std::int64_t>(walls.added_features().size());
   if (walls.empty()) return;
-  graph_.Apply(std::move(walls));
+  graph_->Apply(std::move(walls));
   RunEm(context);
   FindScansAgain(context);
 }
 
-void LogSolver::AdjustJointly(Context* context) {
+void LogSolver::AdjustPoses(Context* context) {
   if (options_.refine != Refinement::kFull || context->IsStopped()) return;
   LogSolverResult& result = context->result;
   const ScopedTimer timer(&result.adjustment_seconds);
   context->Begin("adjustment of poses");
+  StateWriter first_map;
+  Exchange(first_map, registry_, *graph_);
+  const std::vector<Pose2> first_trajectory = result.trajectory;
+  MakeSecondMap(context);
+  if (!context->IsStopped()) return;
+  // Half of a second map is worth less than the whole of the first.
+  StateReader reader(first_map.bytes());
+  DropEm();
+  graph_ = std::make_unique<Graph>();
+  Exchange(reader, registry_, *graph_);
+  Renew();
+  context->places.clear();
+  result.trajectory = first_trajectory;
+  result.scan_relations = result.wall_votes = 0;
+}
+
+void LogSolver::MakeSecondMap(Context* context) {
+  LogSolverResult& result = context->result;
   ClearGraph();
-  JointAdjustment adjustment(&graph_, session_.get(), registry_, context->scans,
-                             refined_, builder_->records(), context->keys,
-                             kNoId, options_.adjustment);
-  adjustment.Adjust(context->control.stop);
+  JointAdjustment adjustment(graph_.get(), session_.get(), registry_,
+                             context->scans, result.refined, result.records,
+                             context->keys, kNoId, options_.adjustment,
+                             context->control.stop);
+  context->places = adjustment.places();
+  adjustment.Adjust();
+  if (context->IsStopped()) return;
   adjustment.MatchAnew();
-  adjustment.Adjust(context->control.stop);
+  adjustment.Adjust();
+  if (context->IsStopped()) return;
   adjustment.EstimateVariances();
-  const auto take_trajectory = [&] {
-    result.trajectory =
-        InterpolateScans(refined_, builder_->records(), adjustment.KeyPoses());
-  };
-  take_trajectory();
+  TakeTrajectory(context);
   context->Begin("walls from adjusted poses");
-  adjustment.AddWalls(FindGlimpsedWalls(graph_, registry_, context->scans,
-                                        result.trajectory,
-                                        options_.completion));
+  adjustment.AddWalls(FindGlimpsedWalls(*graph_, registry_, context->scans,
+                                        result.trajectory, options_.completion,
+                                        context->control.stop));
+  if (context->IsStopped()) return;
   context->Begin("joint adjustment of poses and walls");
-  adjustment.Adjust(context->control.stop);
+  adjustment.Adjust();
+  TakeTrajectory(context);
+  result.scan_relations = adjustment.num_relations();
+  result.wall_votes = adjustment.num_votes();
+}
+
+void LogSolver::FindStructureAgain(Context* context) {
+  if (options_.refine != Refinement::kFull || context->places.empty()) return;
+  LogSolverResult& result = context->result;
+  const ScopedTimer timer(&result.adjustment_seconds);
   HierarchySpec hierarchy = HierarchyOfOptions();
   if (options_.global_association) AddSameWall(&hierarchy);
   EmOptions options = options_.em;
@@ -317,14 +425,19 @@ void LogSolver::AdjustJointly(Context* context) {
   RunEm(context);
   context->IsStopped();
   result.final_cost = session_->Cost();
-  take_trajectory();
-  result.scan_relations = adjustment.num_relations();
-  result.wall_votes = adjustment.num_votes();
+  TakeTrajectory(context);
+}
+
+void LogSolver::TakeTrajectory(Context* context) const {
+  LogSolverResult& result = context->result;
+  result.trajectory = InterpolateScans(
+      result.refined, result.records,
+      KeyPosesOfPlaces(*graph_, context->places, result.records,
+                       options_.adjustment.place_stride));
 }
 
 void LogSolver::CheckMap(Context* context) const {
   LogSolverResult& result = context->result;
-  result.loose = refiner_.loose();
   if (!options_.check_map || options_.refine == Refinement::kNone ||
       context->IsStopped()) {
     return;
@@ -333,7 +446,7 @@ void LogSolver::CheckMap(Context* context) const {
   const ScopedTimer timer(&result.relocalization_seconds);
   std::vector<int> keys;
   std::vector<Pose2> poses;
-  for (const KeyScanRecord& record : builder_->records()) {
+  for (const KeyScanRecord& record : result.records) {
     keys.push_back(record.scan);
     poses.push_back(result.trajectory[static_cast<std::size_t>(record.scan)]);
   }
@@ -355,26 +468,26 @@ void LogSolver::CheckMap(Context* context) const {
 
 void LogSolver::ClearGraph() {
   Transaction clear;
-  for (const Constraint* constraint : std::as_const(graph_).Constraints()) {
+  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
     clear.RemoveConstraint(constraint->id);
   }
-  for (const Feature* feature : std::as_const(graph_).Features()) {
+  for (const Feature* feature : std::as_const(*graph_).Features()) {
     clear.RemoveFeature(feature->id);
   }
-  graph_.Apply(std::move(clear));
+  graph_->Apply(std::move(clear));
 }
 
 void LogSolver::BeginClosing() {
   const Eigen::Vector3d scale(1.0 / options_.closing_position_scale,
                               1.0 / options_.closing_position_scale, 1.0);
-  for (const Constraint* constraint : std::as_const(graph_).Constraints()) {
+  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
     if (constraint->kind != ConstraintClass::kMeasurement ||
         constraint->state != ConstraintState::kLive ||
         !constraint->type->Is(RelationRole::kPose) ||
         constraint->features.size() != 2) {
       continue;
     }
-    graph_.UpdateConstraint(
+    graph_->UpdateConstraint(
         constraint->id, constraint->expected,
         scale.asDiagonal() * constraint->information * scale.asDiagonal());
   }
@@ -385,13 +498,17 @@ void LogSolver::BeginClosing() {
   ReplaceEm(MakeDetectors(hierarchy), options);
 }
 
-void LogSolver::ReplaceEm(Hierarchy detectors, const EmOptions& options) {
+void LogSolver::CountEm() {
   const EmReport& totals = em_->totals();
   em_before_.iterations += totals.iterations;
   em_before_.detect_seconds += totals.detect_seconds;
   em_before_.solve_seconds += totals.solve_seconds;
-  em_ = std::make_unique<EmOrchestrator>(&graph_, session_.get(), registry_,
-                                         std::move(detectors), options);
+}
+
+void LogSolver::ReplaceEm(Hierarchy detectors, const EmOptions& options) {
+  CountEm();
+  em_ = std::make_unique<EmOrchestrator>(
+      graph_.get(), session_.get(), registry_, std::move(detectors), options);
   TraceEm();
 }
 

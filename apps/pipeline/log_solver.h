@@ -140,6 +140,15 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
 ///     const LogSolverResult result = solver.Finish();
 ///
 /// Run does all of it for a log that is there. A solver solves one log.
+///
+/// A run that was killed can be gone on with. What is between two stages is
+/// little: the map, what the front-end made of the scans, and counts; the
+/// minimizer and EM start anew in each stage, whether it was gone on with or
+/// not. So a stage depends on these bytes alone (RunControl::checkpoint), and
+/// Resume ends with the bytes of a run that was never interrupted. What is lost
+/// is the stage that was under way. The stages: taking the scans and finding
+/// their structure; closing loops and finding scans again; adjusting poses and
+/// making walls anew; finding structure in these; the end.
 class LogSolver {
  public:
   /// The registry must outlive the solver and have the built-ins. Throws Error
@@ -164,13 +173,27 @@ class LogSolver {
   /// same bytes. Throws Error when scans were added before.
   LogSolverResult Run(const Log& log, const RunControl& control = {});
 
+  /// Goes on where RunControl::checkpoint made `state`, in a solver with the
+  /// same options, registry and log: the same bytes as Run, timings apart.
+  /// Throws Error when the state does not fit, or scans were added before.
+  LogSolverResult Resume(const Log& log, const std::string& state,
+                         const RunControl& control = {});
+
   /// The map as it stands: after any scan, and after Finish.
-  const Graph& graph() const { return graph_; }
+  const Graph& graph() const { return *graph_; }
   const SolverSession& session() const { return *session_; }
   /// Rows of em_trace.csv: the EM on the whole map at the end.
   const std::vector<EmPhase>& trace() const { return trace_; }
 
  private:
+  // A stage once all scans are in, by what it does.
+  enum class Stage : int {
+    kFindStructure,
+    kCloseLoops,
+    kAdjustPoses,
+    kFindStructureAgain,
+    kEnd,
+  };
   struct Context;
 
   void RequireUnfinished() const;
@@ -184,17 +207,29 @@ class LogSolver {
   // The stages once all scans are in, in order.
   LogSolverResult FinishWith(const std::vector<Scan>& scans,
                              const RunControl& control);
+  LogSolverResult FinishFrom(Stage stage, Context* context);
   void FindStructure(Context* context);
   void CloseLoops(Context* context);
   void FindScansAgain(Context* context);
   void CompleteWalls(Context* context);
-  void AdjustJointly(Context* context);
+  void AdjustPoses(Context* context);
+  void MakeSecondMap(Context* context);
+  void FindStructureAgain(Context* context);
   // Tells what hangs loosely, or contradicts the rest of the map.
   void CheckMap(Context* context) const;
+
+  // Between stages: all that is left is in the state.
+  void BeginStage(Stage stage, Context* context);
+  void DropEm();
+  void Renew();
+  template <typename Archive>
+  void ExchangeState(Archive& archive, Stage* stage, Context* context);
+  void TakeTrajectory(Context* context) const;
 
   void RunEm(Context* context);
   // Loosens the relations between features and lets closures be proposed.
   void BeginClosing();
+  void CountEm();
   void ReplaceEm(Hierarchy detectors, const EmOptions& options);
   // Takes everything out of the graph: what the front-end made of the scans has
   // served to place the poses.
@@ -203,15 +238,16 @@ class LogSolver {
   void TraceEm();
   HierarchySpec HierarchyOfOptions() const;
   Hierarchy MakeDetectors(const HierarchySpec& spec) const;
-  std::vector<Pose2> KeyPoses() const;
+  std::vector<Pose2> KeyPoses(const std::vector<KeyScanRecord>& records) const;
 
   const Registry& registry_;
   const RawFeatureProfile& profile_;
   LogSolverOptions options_;
-  Graph graph_;
+  std::unique_ptr<Graph> graph_;
   std::unique_ptr<SolverSession> session_;
   std::unique_ptr<EmOrchestrator> em_;
   OdometryRefiner refiner_;
+  // While scans come in.
   std::unique_ptr<GraphBuilder> builder_;
   // Of AddScan; empty with Run.
   std::vector<Scan> scans_;

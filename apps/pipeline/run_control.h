@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <string>
 
 namespace plumbline {
 
@@ -14,6 +15,9 @@ struct RunControl {
   std::function<bool()> stop;
   /// Told, in a few words, of each step after the last scan as it begins.
   std::function<void(const char* name)> step;
+  /// Told when a stage of solving a log has ended. `state()` makes the bytes
+  /// that LogSolver::Resume goes on from, at the cost of copying the map.
+  std::function<void(const std::function<std::string()>& state)> checkpoint;
 };
 
 }  // namespace plumbline

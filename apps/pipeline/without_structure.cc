@@ -59,14 +59,17 @@ std::map<FeatureId, Feature> SolveWithoutStructure(const Graph& graph,
 MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
                                            const Registry& registry,
                                            const LogSolverOptions& options,
-                                           const LogSolverResult& result) {
+                                           const LogSolverResult& result,
+                                           const std::function<bool()>& stop) {
   MapWithoutStructure map;
+  const auto is_stopped = [&stop] { return stop && stop(); };
   if (!options.structure || result.records.empty()) return map;
   Graph graph;
   const std::unique_ptr<GraphBuilder> builder =
       ProfileOf(options.features).make_builder(options, &graph, registry);
   std::vector<ScanPoint> points;
   for (const KeyScanRecord& record : result.records) {
+    if (is_stopped()) return map;
     const Scan& scan = scans[static_cast<std::size_t>(record.scan)];
     const RefinedScan& refined =
         result.refined[static_cast<std::size_t>(record.scan)];
@@ -75,7 +78,8 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
   }
   builder->WriteRobot();
   SolverSession session(&graph, registry, options.session);
-  if (!session.SolveGlobal().usable) return map;
+  session.SetStop(is_stopped);
+  if (!session.SolveGlobal().usable || is_stopped()) return map;
 
   std::vector<Pose2> keys;
   if (options.refine != Refinement::kNone) {

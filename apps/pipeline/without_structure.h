@@ -8,6 +8,7 @@
 #include <plumbline/frontend/scan.h>
 #include <plumbline/pipeline/log_solver.h>
 
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -26,13 +27,13 @@ std::map<FeatureId, Feature> SolveWithoutStructure(const Graph& graph,
 /// counterpart is the one that took the same piece of wall in the same scan.
 /// `options` are those that gave `result`, whose fields refined and records are
 /// read. Empty when there is nothing to compare: no scans, no structure asked
-/// for, or a solve that fails. Throws Error when the scans cannot be found
-/// again on the map. Costs the front-end without scan matching, one global
-/// solve and one relocalization.
-MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
-                                           const Registry& registry,
-                                           const LogSolverOptions& options,
-                                           const LogSolverResult& result);
+/// for, a solve that fails, or once `stop` (may be null) says so. Throws Error
+/// when the scans cannot be found again on the map. Costs the front-end without
+/// scan matching, one global solve and one relocalization.
+MapWithoutStructure ReplayWithoutStructure(
+    const std::vector<Scan>& scans, const Registry& registry,
+    const LogSolverOptions& options, const LogSolverResult& result,
+    const std::function<bool()>& stop = nullptr);
 
 }  // namespace plumbline
 

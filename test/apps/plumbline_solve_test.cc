@@ -696,6 +696,52 @@ TEST_F(SolveTest, KilledRunsLeaveWholeFolders) {
   EXPECT_EQ(Files("out"), FilesOfALog());
 }
 
+TEST_F(SolveTest, AKilledRunIsGoneOnWith) {
+  const std::string log = Write("office.log", Join(OfficeLines(250)));
+  const std::string flags = "--checkpoint_every=1e-9 --num_threads=1";
+  std::string output;
+  ASSERT_EQ(Solve(log, "whole", flags, &output), 0) << output;
+  EXPECT_EQ(Files("whole"), FilesOfALog());
+  auto whole = Comparable("whole");
+  const fs::path checkpoint = folder_ / "out" / "checkpoint.plumbline";
+  // As soon as the first state is there.
+  const auto kill_early = [&] {
+    const pid_t child = fork();
+    if (child == 0) {
+      const std::string out = "--output_dir=" + (folder_ / "out").string();
+      const std::string input = "--input=" + log;
+      execl(binary_.c_str(), binary_.c_str(), input.c_str(), out.c_str(),
+            "--checkpoint_every=1e-9", "--num_threads=1", "--quiet",
+            static_cast<char*>(nullptr));
+      _exit(99);
+    }
+    while (!fs::exists(checkpoint) && waitpid(child, nullptr, WNOHANG) == 0) {
+      usleep(1000);
+    }
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+  };
+  kill_early();
+  if (!fs::exists(checkpoint)) GTEST_SKIP() << "it ended before it was killed";
+
+  // Others are refused, and leave it alone.
+  EXPECT_EQ(Solve(log, "out", flags + " --seed=7", &output), 2);
+  EXPECT_THAT(output, HasSubstr("--seed was '1' then and is '7' now"));
+  const std::string other = Write("other.log", Join(OfficeLines(249)));
+  EXPECT_EQ(Solve(other, "out", flags, &output), 2);
+  EXPECT_THAT(output, HasSubstr("the input's digest"));
+  EXPECT_TRUE(fs::exists(checkpoint));
+
+  ASSERT_EQ(Solve(log, "out", flags, &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("goes on where a run that did not end"));
+  EXPECT_EQ(Files("out"), FilesOfALog());
+  for (const auto& [name, content] : Comparable("out")) {
+    // It names the folder.
+    if (name == "summary.json" || name == "report.html") continue;
+    EXPECT_EQ(content, whole[name]) << name;
+  }
+}
+
 // Said, since a reader of the command would think otherwise.
 TEST_F(SolveTest, FlagsOfTheOtherInput) {
   const std::string log = Write("office.log", Join(OfficeLines(30)));

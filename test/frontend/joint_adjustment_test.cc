@@ -5,6 +5,7 @@
 #include <plumbline/frontend/joint_adjustment.h>
 
 #include <cmath>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -270,17 +271,22 @@ TEST_F(JointAdjustmentTest, ABentStartComesStraight) {
 
 TEST_F(JointAdjustmentTest, EndsWhenItIsTold) {
   SolverSession session(&graph_, registry_, {});
+  std::function<bool()> stop = [] { return false; };
   JointAdjustment adjustment(&graph_, &session, registry_, scans_, refined_,
-                             records_, keys_, robot_, options_);
+                             records_, keys_, robot_, options_,
+                             [&stop] { return stop(); });
   const std::vector<Pose2> before = adjustment.KeyPoses();
-  adjustment.Adjust([] { return true; });
+  stop = [] { return true; };
+  adjustment.Adjust();
   EXPECT_EQ(adjustment.KeyPoses(), before);
   // It is asked within a solve as well.
-  adjustment.Adjust([&] { return session.num_solves() > 0; });
+  stop = [&] { return session.num_solves() > 0; };
+  adjustment.Adjust();
   EXPECT_EQ(session.num_solves(), 1);
   const std::vector<Pose2> after_one = adjustment.KeyPoses();
   EXPECT_LT(WorstKey(after_one), WorstKey(before));
-  adjustment.Adjust([] { return false; });
+  stop = [] { return false; };
+  adjustment.Adjust();
   EXPECT_NE(adjustment.KeyPoses(), after_one);
 }
 

@@ -48,6 +48,83 @@ class LogSolverTest : public ::testing::Test {
   Registry registry_;
 };
 
+TEST_F(LogSolverTest, GoesOnFromEveryStateToTheSameBytes) {
+  const Log log = Office(500);
+  for (const Refinement refine : {Refinement::kFull, Refinement::kMap}) {
+    LogSolverOptions options;
+    options.refine = refine;
+    std::vector<std::string> states;
+    RunControl control;
+    control.checkpoint = [&](const std::function<std::string()>& state) {
+      states.push_back(state());
+    };
+    LogSolver whole(registry_, options);
+    const LogSolverResult expected = whole.Run(log, control);
+    ASSERT_EQ(states.size(), 4u);
+    // Whoever makes no states gets the same.
+    LogSolver without(registry_, options);
+    without.Run(log);
+    EXPECT_EQ(Json(without.graph()), Json(whole.graph()));
+    for (const std::string& state : states) {
+      LogSolver solver(registry_, options);
+      std::vector<std::string> later;
+      control.checkpoint = [&](const std::function<std::string()>& make) {
+        later.push_back(make());
+      };
+      const LogSolverResult result = solver.Resume(log, state, control);
+      EXPECT_EQ(Json(solver.graph()), Json(whole.graph()));
+      EXPECT_EQ(result.trajectory, expected.trajectory);
+      EXPECT_EQ(result.em.iterations, expected.em.iterations);
+      EXPECT_EQ(result.final_cost.total(), expected.final_cost.total());
+      EXPECT_EQ(result.records.size(), expected.records.size());
+      EXPECT_EQ(solver.trace().size(), whole.trace().size());
+    }
+  }
+}
+
+TEST_F(LogSolverTest, AStateOfAnotherLogIsRefused) {
+  const Log log = Office(60);
+  std::string state;
+  RunControl control;
+  control.checkpoint = [&](const std::function<std::string()>& make) {
+    if (state.empty()) state = make();
+  };
+  LogSolver(registry_, {}).Run(log, control);
+  EXPECT_THROW(LogSolver(registry_, {}).Resume(Office(61), state), Error);
+  for (const std::size_t size :
+       {std::size_t{0}, std::size_t{7}, state.size() / 2, state.size() - 1}) {
+    EXPECT_THROW(LogSolver(registry_, {}).Resume(log, state.substr(0, size)),
+                 Error)
+        << size;
+  }
+}
+
+TEST_F(LogSolverTest, AnInterruptLeavesAWholeMap) {
+  const Log log = Office(300);
+  // How often it is asked in all.
+  int questions = 0;
+  RunControl control;
+  control.stop = [&] {
+    ++questions;
+    return false;
+  };
+  LogSolver(registry_, {}).Run(log, control);
+  for (int share = 1; share < 12; ++share) {
+    const int last = 300 + (questions - 300) * share / 12;
+    int asked = 0;
+    control.stop = [&] { return ++asked >= last; };
+    LogSolver solver(registry_, {});
+    const LogSolverResult result = solver.Run(log, control);
+    EXPECT_TRUE(result.interrupted);
+    EXPECT_EQ(result.trajectory.size(), 300u);
+    int segments = 0;
+    for (const Feature* feature : solver.graph().Features()) {
+      if (feature->type->name == "segment") ++segments;
+    }
+    EXPECT_GT(segments, 10) << share;
+  }
+}
+
 TEST_F(LogSolverTest, SolvesTheStartOfALog) {
   const Log log = Office(250);
   LogSolver solver(registry_, {});

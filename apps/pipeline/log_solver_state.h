@@ -1,0 +1,173 @@
+#ifndef PLUMBLINE_PIPELINE_LOG_SOLVER_STATE_H_
+#define PLUMBLINE_PIPELINE_LOG_SOLVER_STATE_H_
+
+#include <plumbline/core/em.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/pipeline/log_solver.h>
+#include <plumbline/pipeline/state_archive.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+// What a LogSolver has between two stages, for a StateWriter or StateReader
+// (state_archive.h).
+
+namespace plumbline {
+
+template <typename Archive>
+void Exchange(Archive& archive, UncertainPose2& pose) {
+  auto& [mean, covariance] = pose;
+  ExchangeAll(archive, mean, covariance);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, RefinedScan& scan) {
+  auto& [pose, since_key, since, is_key, odometry_only, tie] = scan;
+  ExchangeAll(archive, pose, since_key, since, is_key, odometry_only, tie);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, SegmentObservation& observation) {
+  auto& [pose, length, points, covariance] = observation;
+  ExchangeAll(archive, pose, length, points, covariance);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, PointObservation& observation) {
+  auto& [position, covariance, share] = observation;
+  ExchangeAll(archive, position, covariance, share);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, FeatureMatch& match) {
+  auto& [feature, observation] = match;
+  ExchangeAll(archive, feature, observation);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, PointMatch& match) {
+  auto& [feature, observation] = match;
+  ExchangeAll(archive, feature, observation);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, KeyScanRecord& record) {
+  auto& [scan, motion, from, is_loose, pose, matches, points] = record;
+  ExchangeAll(archive, scan, motion, from, is_loose, pose, matches, points);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, LooseTrack& track) {
+  auto& [begin, end, why, found] = track;
+  ExchangeAll(archive, begin, end, why, found);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, CostReport& cost) {
+  auto& [measurement, structure] = cost;
+  ExchangeAll(archive, measurement, structure);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, EmReport& report) {
+  auto& [iterations, converged, detect_seconds, solve_seconds] = report;
+  ExchangeAll(archive, iterations, converged, detect_seconds, solve_seconds);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, EmPhase& row) {
+  auto& [iteration, phase, cost, features, structure, broken, structure_by,
+         broken_by, detections, seconds] = row;
+  ExchangeAll(archive, iteration, phase, cost, features, structure, broken,
+              structure_by, broken_by, detections, seconds);
+}
+
+template <typename Archive>
+void Exchange(Archive& archive, LogSolverResult& result) {
+  auto& [trajectory, em, initial_cost, final_cost, frontend_seconds,
+         detect_seconds, solve_seconds, relocalization_seconds,
+         completion_seconds, adjustment_seconds, glimpsed_walls, scan_relations,
+         wall_votes, scan_seconds, key_scans, wide_searches, refused_matches,
+         lost_tracks, loose, feature_matches, features_created, interrupted,
+         refined, records] = result;
+  ExchangeAll(archive, trajectory, em, initial_cost, final_cost,
+              frontend_seconds, detect_seconds, solve_seconds,
+              relocalization_seconds, completion_seconds, adjustment_seconds,
+              glimpsed_walls, scan_relations, wall_votes, scan_seconds,
+              key_scans, wide_searches, refused_matches, lost_tracks, loose,
+              feature_matches, features_created, interrupted, refined, records);
+}
+
+// Types go by their registered names.
+template <typename Archive, typename Type, typename Find>
+void ExchangeType(Archive& archive, const Type*& type, const Find& find) {
+  std::string name = type == nullptr ? std::string() : type->name;
+  Exchange(archive, name);
+  if constexpr (Archive::kReads) type = &find(name);
+}
+
+template <typename Archive>
+void ExchangeFeature(Archive& archive, const Registry& registry,
+                     Feature& feature) {
+  auto& [id, type, level, is_virtual, fixed, parameters, anchor, begin, end,
+         observations, source] = feature;
+  ExchangeType(
+      archive, type, [&](const std::string& name) -> const auto& {
+        return registry.GetFeature(name);
+      });
+  ExchangeAll(archive, id, level, is_virtual, fixed, parameters, anchor, begin,
+              end, observations, source);
+}
+
+template <typename Archive>
+void ExchangeConstraint(Archive& archive, const Registry& registry,
+                        Constraint& constraint) {
+  auto& [id, type, features, expected, information, kind, state, delta,
+         source] = constraint;
+  ExchangeType(
+      archive, type, [&](const std::string& name) -> const auto& {
+        return registry.GetRelation(name);
+      });
+  ExchangeAll(archive, id, features, expected, information, kind, state, delta,
+              source);
+}
+
+inline void Exchange(StateWriter& archive, const Registry& registry,
+                     const Graph& graph) {
+  FeatureId feature_end = graph.feature_id_end();
+  ConstraintId constraint_end = graph.constraint_id_end();
+  ExchangeAll(archive, feature_end, constraint_end);
+  const std::vector<const Feature*> features = graph.Features();
+  ExchangeSize(archive, features.size());
+  for (const Feature* feature : features) {
+    Feature copy = *feature;
+    ExchangeFeature(archive, registry, copy);
+  }
+  const std::vector<const Constraint*> constraints = graph.Constraints();
+  ExchangeSize(archive, constraints.size());
+  for (const Constraint* constraint : constraints) {
+    Constraint copy = *constraint;
+    ExchangeConstraint(archive, registry, copy);
+  }
+}
+
+inline void Exchange(StateReader& archive, const Registry& registry,
+                     Graph& graph) {
+  FeatureId feature_end = 0;
+  ConstraintId constraint_end = 0;
+  ExchangeAll(archive, feature_end, constraint_end);
+  std::vector<Feature> features(ExchangeSize(archive, 0));
+  for (Feature& feature : features) ExchangeFeature(archive, registry, feature);
+  std::vector<Constraint> constraints(ExchangeSize(archive, 0));
+  for (Constraint& constraint : constraints) {
+    ExchangeConstraint(archive, registry, constraint);
+  }
+  graph.Restore(std::move(features), std::move(constraints), feature_end,
+                constraint_end);
+}
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PIPELINE_LOG_SOLVER_STATE_H_

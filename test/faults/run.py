@@ -10,6 +10,8 @@ are made wrong by rule. Ends with status 1 when anything is found:
 
 - a folder that holds files of two runs and does not say so, or files missing;
 - a file of somebody else that is changed or gone;
+- a run that was killed and gone on with, and ends with other bytes than one
+  that never was;
 - an exit status other than 0, 1, 2 and 130, or an error without a message that
   says what was expected.
 """
@@ -93,7 +95,7 @@ class Solve:
         self.root = root
         self.log = os.path.join(root, "office.log")
         with open(self.log, "w") as file:
-            file.write(office(150))
+            file.write(office(250))
 
     def command(self, folder, *flags):
         return [self.binary, "--input=" + self.log, "--output_dir=" + folder,
@@ -143,6 +145,42 @@ def kills(solve, count, rng):
         finding("left behind: " + " ".join(left))
     print("kills: %d, %d of them after the end; folders %s; then whole again, "
           "same map.json, nothing left behind" % (count, ended, states))
+
+
+FILES = ["map.json", "graph.g2o", "trajectory.tum", "map.svg", "floorplan.dxf",
+         "occupancy.pgm"]
+
+
+def resumed(solve, count, rng):
+    """Killed at any moment, with a state kept at the end of every stage."""
+    flags = ["--checkpoint_every=1e-9", "--quiet"]
+    folder = new_folder(solve.root, "resumed")
+    begin = time.monotonic()
+    solve.run(folder, *flags)
+    length = time.monotonic() - begin
+    wanted = {name: digest(os.path.join(folder, name)) for name in FILES}
+    alike = with_state = 0
+    for i in range(count):
+        shutil.rmtree(folder)
+        os.makedirs(folder)
+        process = subprocess.Popen(solve.command(folder, *flags))
+        time.sleep(length * (i + rng.random()) / count)
+        process.kill()
+        process.wait()
+        with_state += os.path.exists(
+            os.path.join(folder, "checkpoint.plumbline"))
+        again = solve.run(folder, *flags)
+        if again.returncode != 0:
+            finding("gone on with: " + again.stderr)
+        elif {name: digest(os.path.join(folder, name))
+              for name in FILES} != wanted:
+            finding("gone on with: other bytes")
+        elif "checkpoint.plumbline" in os.listdir(folder):
+            finding("gone on with: the checkpoint is left")
+        else:
+            alike += 1
+    print("killed and gone on with: %d, %d of them from a state, %d ended with "
+          "the same bytes" % (count, with_state, alike))
 
 
 def full_disk(solve):
@@ -320,6 +358,7 @@ def main():
     solve = Solve(arguments.bin_dir, root)
     if arguments.kills > 0:
         kills(solve, arguments.kills, rng)
+        resumed(solve, arguments.kills, rng)
     full_disk(solve)
     folders(solve)
     bad_inputs(arguments.bin_dir, root, arguments.bad_inputs, rng)

@@ -790,8 +790,11 @@ TEST_F(SolveTest, GridThatIsTooLarge) {
   EXPECT_THAT(output, HasSubstr("occupancy.pgm not written: "));
   EXPECT_THAT(output, HasSubstr("cells of 0.05 m"));
   std::set<std::string> expected = FilesOfALog();
+  // Nor are there rooms without a grid.
+  EXPECT_THAT(output, HasSubstr("rooms.csv not written: "));
   expected.erase("occupancy.pgm");
   expected.erase("occupancy.yaml");
+  expected.erase("rooms.csv");
   EXPECT_EQ(Files("out"), expected);
 }
 

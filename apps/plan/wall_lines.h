@@ -30,7 +30,7 @@ struct WallLineOptions {
   /// Faces of one wall are no farther apart, m: the thickest wall.
   double max_thickness = 0.3;
   /// Pieces in line with a longer gap than this, m, are on lines of their own.
-  double in_line_gap = 3.0;
+  double in_line_gap = 4.0;
 };
 
 /// Pieces of wall in one straight line, both faces of it, plan frame, m.

@@ -1,10 +1,11 @@
 // Drives a robot with a laser and drifting odometry through a synthetic
-// building and writes what it measures as a CARMEN log, with the truth; or
+// building and writes what it measures as a log, with the truth; or
 // writes one of the paper's synthetic worlds as a graph.
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/cli/progress.h>
+#include <plumbline/apps/simulation/bag_writer.h>
 #include <plumbline/apps/simulation/bent_world.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/stress.h>
@@ -64,6 +65,13 @@ PLUMBLINE_FLAG_RANGE(outliers, -1, 1000);
 
 DEFINE_string(output, "",
               "Log (gzip when the name ends in .gz) or g2o file to write.");
+DEFINE_string(format, "carmen",
+              "Of the log: carmen, ros1 (a bag of ROS 1), ros2_db3 (a folder "
+              "with metadata.yaml and .db3) or mcap. All say the same.");
+PLUMBLINE_FLAG_CHOICES(format, "carmen", "ros1", "ros2_db3", "mcap");
+DEFINE_string(bag_compression, "none",
+              "Of chunks: none, bz2 or lz4 (ros1), none, lz4 or zstd (mcap).");
+PLUMBLINE_FLAG_CHOICES(bag_compression, "none", "bz2", "lz4", "zstd");
 DEFINE_string(truth, "",
               "Where to write walls and poses, or positions and structure, as "
               "JSON.");
@@ -244,12 +252,54 @@ int RunSynthetic() {
   return kExitSuccess;
 }
 
+// The log in the format that was asked for.
+void WriteLog(const Simulation& simulation, const LaserModel& laser) {
+  if (FLAGS_format == "ros2_db3") {
+    WriteRosbag2(SimulatedMessages(simulation, laser, MessageEncoding::kCdr),
+                 FLAGS_output);
+    return;
+  }
+  WriteFileAtomically(FLAGS_output, [&](std::ostream& output) {
+    std::ostringstream text;
+    if (FLAGS_format == "carmen") {
+      WriteCarmenLog(simulation, laser, {Provenance()}, text);
+    } else {
+      BagWriterOptions options;
+      options.compression = FLAGS_bag_compression;
+      const bool is_ros1 = FLAGS_format == "ros1";
+      const std::vector<BagRecord> messages = SimulatedMessages(
+          simulation, laser,
+          is_ros1 ? MessageEncoding::kRos1 : MessageEncoding::kCdr);
+      text << (is_ros1 ? MakeRosbag1(messages, options)
+                       : MakeMcap(messages, options));
+    }
+    output << (EndsWith(FLAGS_output, ".gz") ? GzipCompress(text.str())
+                                             : text.str());
+  });
+}
+
+// A compression that the format does not have is refused before the work.
+void CheckCompression() {
+  const std::string& kind = FLAGS_bag_compression;
+  if (kind == "none" ||
+      (FLAGS_format == "ros1" && (kind == "bz2" || kind == "lz4")) ||
+      (FLAGS_format == "mcap" && (kind == "lz4" || kind == "zstd"))) {
+    return;
+  }
+  throw Error("--bag_compression", 0,
+              "'" + kind + "' does not go with --format=" + FLAGS_format,
+              FLAGS_format == "ros1"   ? "none, bz2 or lz4"
+              : FLAGS_format == "mcap" ? "none, lz4 or zstd"
+                                       : "none");
+}
+
 int Run() {
   if (FLAGS_world.empty() || FLAGS_output.empty()) {
     throw Error("plumbline_simulate", 0, "a flag is missing",
                 "--world and --output (--help explains them)");
   }
   if (IsSynthetic(FLAGS_world)) return RunSynthetic();
+  CheckCompression();
   World world = LoadWorld();
   RotateWorld(FLAGS_rotation, &world);
   if (!FLAGS_save_world.empty()) {
@@ -273,15 +323,7 @@ int Run() {
   Detail("%zu steps driven, writing %s", simulation.states.size(),
          FLAGS_output.c_str());
 
-  WriteFileAtomically(FLAGS_output, [&](std::ostream& output) {
-    if (!EndsWith(FLAGS_output, ".gz")) {
-      WriteCarmenLog(simulation, options.laser, {Provenance()}, output);
-      return;
-    }
-    std::ostringstream text;
-    WriteCarmenLog(simulation, options.laser, {Provenance()}, text);
-    output << GzipCompress(text.str());
-  });
+  WriteLog(simulation, options.laser);
   if (!FLAGS_truth.empty()) {
     WriteFileAtomically(FLAGS_truth, [&](std::ostream& output) {
       WriteTruth(simulation, output);
@@ -316,7 +358,7 @@ int main(int argc, char** argv) {
   info.name = "plumbline_simulate";
   info.summary =
       "Drives a robot with a laser and drifting odometry through a synthetic "
-      "building and writes a CARMEN log, with the true walls and poses; or "
+      "building and writes a log, with the true walls and poses; or "
       "writes a world of the synthetic experiments as a graph, with its "
       "structure. The same flags give the same files.";
   info.usage = {"--world=NAME_OR_FILE --output=LOG [flags]",
@@ -328,7 +370,8 @@ int main(int argc, char** argv) {
       {"World", {"world", "seed", "size", "rotation", "bend_deg"}},
       {"Graphs", {"position_noise", "distance_noise", "outliers"}},
       {"Output",
-       {"output", "truth", "relations", "save_world", "quiet", "verbose"}},
+       {"output", "format", "bag_compression", "truth", "relations",
+        "save_world", "quiet", "verbose"}},
       {"Laser",
        {"beams", "maximum_range", "range_noise", "range_noise_per_metre",
         "missing", "laser_offset"}},

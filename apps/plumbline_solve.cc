@@ -17,6 +17,7 @@
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/log_reader.h>
+#include <plumbline/frontend/scan_odometry.h>
 #include <plumbline/outputs/checkpoint_file.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/output_folder.h>
@@ -258,8 +259,108 @@ class ReadingProgress {
 };
 
 // A file's name, for people: a name may have any bytes.
-std::string TitleOf(const InputStream& input) {
-  return PrintableUtf8(std::filesystem::path(input.name()).filename().string());
+std::string TitleOf(const std::string& name) {
+  std::filesystem::path path(name);
+  // Of a folder that ends in a slash, too.
+  if (path.filename().empty()) path = path.parent_path();
+  return PrintableUtf8(path.filename().string());
+}
+
+// A log and what reads it: by the stream of a file's bytes, or, where that is
+// null, by its path.
+struct LogInput {
+  std::string name;
+  const LogReaderType* reader = nullptr;
+  InputStream* stream = nullptr;
+};
+
+Log ReadInput(const LogInput& input) {
+  LaserOptions options = LaserOptionsFromFlags();
+  if (input.stream != nullptr) {
+    const ReadingProgress progress(input.stream);
+    return input.reader->read(input.stream, options);
+  }
+  std::unique_ptr<Progress> progress;
+  options.stop = [] { return InterruptRequested(); };
+  options.progress = [&](std::int64_t done, std::int64_t size) {
+    if (progress == nullptr) {
+      progress = std::make_unique<Progress>("reading", "kB", size / 1000);
+    }
+    progress->Update(done / 1000);
+  };
+  return input.reader->read_path(input.name, options);
+}
+
+// What was passed over and taken for granted.
+void TellOfLog(const std::string& name, const Log& log, Summary* summary) {
+  for (const SkipReport& skip : log.skipped) {
+    std::string places;
+    for (int place : skip.first_lines) places += " " + std::to_string(place);
+    Remark("%s: %lld skipped: %s; first at %s%s", name.c_str(),
+           static_cast<long long>(skip.count),
+           PrintableUtf8(skip.reason).c_str(), log.position_unit.c_str(),
+           places.c_str());
+  }
+  for (const std::string& note : log.notes) {
+    Remark("%s: %s", name.c_str(), PrintableUtf8(note).c_str());
+  }
+  summary->skipped = log.skipped;
+  summary->log_format = log.format;
+  summary->scan_source = log.scan_message;
+  summary->odometry_source = log.odometry_source;
+  summary->notes = log.notes;
+}
+
+// Scan matching alone carries a log without odometry.
+void MatchScansAlone(const std::string& name,
+                     const LogSolverOptions& solver_options, Log* log,
+                     Summary* summary) {
+  ScanOdometryOptions options;
+  options.points = solver_options.odometry.points;
+  options.matcher = solver_options.odometry.matcher;
+  options.stop = [] { return InterruptRequested(); };
+  Progress progress("matching", "scans",
+                    static_cast<std::int64_t>(log->scans.size()));
+  options.progress = [&](std::size_t done, std::size_t) {
+    progress.Update(static_cast<std::int64_t>(done));
+  };
+  const Stopwatch watch;
+  const ScanOdometryReport report = AddScanOdometry(options, log);
+  progress.Finish();
+  char text[256];
+  summary->odometry_source = "scan matching";
+  if (report.used_yaw_rates) {
+    std::snprintf(text, sizeof text,
+                  " with turn rates of %s (scale %.4g, bias %.3g degrees/s)",
+                  log->yaw_rate_source.c_str(), report.yaw_scale,
+                  RadToDeg(report.yaw_bias));
+    summary->odometry_source += text;
+  } else if (!log->yaw_rates.empty()) {
+    std::snprintf(text, sizeof text,
+                  "turn rates of %s are not used: they explain %.0f %% of how "
+                  "the scans turn",
+                  log->yaw_rate_source.c_str(),
+                  100.0 * std::max(0.0, report.explained));
+    Remark("%s: %s", name.c_str(), text);
+    summary->notes.push_back(text);
+  }
+  Remark("%s: there is no odometry: %s carries it", name.c_str(),
+         summary->odometry_source.c_str());
+  if (report.sweep != 0) {
+    summary->notes.push_back(
+        "scans fit each other better as sweeps of a turning laser: the motion "
+        "during them is undone");
+    Remark("%s: %s", name.c_str(), summary->notes.back().c_str());
+  }
+  if (report.unmatched > 0) {
+    std::snprintf(text, sizeof text,
+                  "%zu of %zu scans could not be matched: there the robot is "
+                  "taken to go on as before",
+                  report.unmatched, log->scans.size());
+    Remark("%s: %s", name.c_str(), text);
+    summary->notes.push_back(text);
+  }
+  Detail("matched scans for want of odometry in %.1f s", watch.Seconds());
 }
 
 // A hierarchy that does not fit what logs are made of is refused before the log
@@ -287,6 +388,7 @@ std::string DigestOf(const Log& log) {
         scan.maximum_range,   1.0 * scan.ranges.size()};
     take(numbers, sizeof numbers);
     take(scan.ranges.data(), scan.ranges.size() * sizeof(float));
+    take(scan.bearings.data(), scan.bearings.size() * sizeof(float));
     sha.Update(scan.timestamp_text);
   }
   return sha.HexDigest();
@@ -328,8 +430,8 @@ CheckpointFile::Identity IdentityOfRun(const Log& log) {
   return identity;
 }
 
-int SolveLog(InputStream* input, const LogReaderType& reader,
-             const Registry& registry, double begin, OutputFolder* folder) {
+int SolveLog(const LogInput& input, const Registry& registry, double begin,
+             OutputFolder* folder) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
   summary.input = FLAGS_input;
@@ -337,22 +439,16 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   summary.flags = ChangedFlags();
   const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
   CheckHierarchy(options, registry);
-  RemarkOnFlags(input->name(), "log", "graphs", GraphFlags());
+  RemarkOnFlags(input.name, "log", "graphs", GraphFlags());
 
   const double parse_begin = Now();
-  const Log log = [&] {
-    const ReadingProgress progress(input);
-    return reader.read(input, LaserOptionsFromFlags());
-  }();
+  Log log = ReadInput(input);
   summary.parse_seconds = Now() - parse_begin;
-  for (const SkipReport& skip : log.skipped) {
-    std::string lines;
-    for (int line : skip.first_lines) lines += " " + std::to_string(line);
-    Remark("%s: %lld skipped: %s; first at line%s", input->name().c_str(),
-           static_cast<long long>(skip.count), skip.reason.c_str(),
-           lines.c_str());
-  }
+  TellOfLog(input.name, log, &summary);
   Detail("read %zu scans in %.1f s", log.scans.size(), summary.parse_seconds);
+  if (!log.has_odometry) {
+    MatchScansAlone(input.name, options, &log, &summary);
+  }
 
   CheckpointFile checkpoint(
       std::filesystem::path(FLAGS_output_dir) / CheckpointFile::kName,
@@ -412,7 +508,6 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   for (const EmPhase& phase : solver.trace()) TellPhase(phase);
   summary.scans = static_cast<std::int64_t>(result.trajectory.size());
   summary.scans_in_log = static_cast<std::int64_t>(log.scans.size());
-  summary.skipped = log.skipped;
   for (const LooseTrack& part : result.loose) {
     const Scan& begin_scan = log.scans[static_cast<std::size_t>(part.begin)];
     const Scan& end_scan = log.scans[static_cast<std::size_t>(part.end)];
@@ -420,7 +515,7 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
         {begin_scan.timestamp, end_scan.timestamp, part.why});
     if (!part.found) ++summary.tracking.pieces;
     Remark("%s: the map hangs by a thread, %.3f s to %.3f s: %s",
-           input->name().c_str(), begin_scan.timestamp, end_scan.timestamp,
+           input.name.c_str(), begin_scan.timestamp, end_scan.timestamp,
            part.why.c_str());
   }
   summary.frontend_seconds =
@@ -448,8 +543,9 @@ int SolveLog(InputStream* input, const LogReaderType& reader,
   };
   outcome.trace = solver.trace();
   outcome.occupancy = OccupancyOptionsFromFlags();
-  outcome.title = TitleOf(*input) + (FLAGS_structure ? ", with structure"
-                                                     : ", without structure");
+  outcome.title =
+      TitleOf(input.name) +
+      (FLAGS_structure ? ", with structure" : ", without structure");
   WriteOutputs(&outcome, begin, folder);
   if (!summary.partial) checkpoint.Remove();
   return kExitSuccess;
@@ -572,7 +668,7 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin,
     if (InterruptRequested()) return MapWithoutStructure();
     return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
   };
-  outcome.title = TitleOf(*input);
+  outcome.title = TitleOf(input->name());
   WriteOutputs(&outcome, begin, folder);
   return kExitSuccess;
 }
@@ -601,23 +697,42 @@ int Run() {
     throw Error("--ellipse_sigmas", 0, "ellipses of nothing",
                 "features named by --marginals");
   }
-  InputStream input(FLAGS_input, [] { return InterruptRequested(); });
-  const std::string_view prefix = input.Peek(1 << 16);
-  if (prefix.empty() && InterruptRequested()) {
-    std::fprintf(stderr, "interrupted: nothing was read yet\n");
-    return kExitInterrupted;
-  }
   const LogReaderType* reader =
       FLAGS_log_reader.empty()
-          ? RecognizeLog(registry, prefix)
+          ? nullptr
           : &ForFlag(
                 "log_reader", [&]() -> const auto& {
                   return registry.Get<LogReaderType>(FLAGS_log_reader);
                 });
-  const bool is_graph = reader == nullptr && LooksLikeG2o(prefix);
-  // What nobody recognizes is for the reader of the commonest format to refuse:
-  // it says what it found.
-  if (reader == nullptr) reader = &registry.Get<LogReaderType>("carmen");
+  LogInput log_input;
+  log_input.name = FLAGS_input;
+  if (FLAGS_input != "-") {
+    const bool takes_path = reader != nullptr && reader->read_path != nullptr &&
+                            reader->recognizes_path != nullptr &&
+                            reader->recognizes_path(FLAGS_input);
+    log_input.reader = takes_path ? reader
+                       : reader == nullptr
+                           ? RecognizeLogPath(registry, FLAGS_input)
+                           : nullptr;
+  }
+  std::optional<InputStream> input;
+  bool is_graph = false;
+  if (log_input.reader == nullptr) {
+    input.emplace(FLAGS_input, [] { return InterruptRequested(); });
+    const std::string_view prefix = input->Peek(1 << 16);
+    if (prefix.empty() && InterruptRequested()) {
+      std::fprintf(stderr, "interrupted: nothing was read yet\n");
+      return kExitInterrupted;
+    }
+    if (reader == nullptr) reader = RecognizeLog(registry, prefix);
+    is_graph = reader == nullptr && LooksLikeG2o(prefix);
+    // What nobody recognizes is for the reader of the commonest format to
+    // refuse: it says what it found.
+    if (reader == nullptr) reader = &registry.Get<LogReaderType>("carmen");
+    log_input.reader = reader;
+    log_input.stream = &*input;
+    log_input.name = input->name();
+  }
   // What is wrong with the folder is said before the work, not after it.
   OutputFolder folder(FLAGS_output_dir, NamesOfAllOutputs(registry),
                       InputFiles());
@@ -627,8 +742,8 @@ int Run() {
     Remark("%s: removed what a run that was killed had left: %s",
            FLAGS_output_dir.c_str(), Joined(folder.cleaned()).c_str());
   }
-  return is_graph ? SolveGraph(&input, registry, begin, &folder)
-                  : SolveLog(&input, *reader, registry, begin, &folder);
+  return is_graph ? SolveGraph(&*input, registry, begin, &folder)
+                  : SolveLog(log_input, registry, begin, &folder);
 }
 
 }  // namespace

@@ -19,8 +19,8 @@
 
 DEFINE_string(
     input, "",
-    "Robot log (CARMEN) or graph (g2o), plain, gzip or bzip2; - reads "
-    "standard input");
+    "Robot log (ROS 1 or 2 bag, a file or a folder; CARMEN; CSV) or graph "
+    "(g2o), plain or compressed; - reads standard input");
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 DEFINE_string(log_reader, "",
               "Format of the log; empty: recognized by content");
@@ -164,6 +164,13 @@ PLUMBLINE_FLAG_CHOICES(refine, "none", "map", "full");
 DEFINE_double(usable_range, 50.0, "Returns farther away are left out, m");
 PLUMBLINE_FLAG_RANGE(usable_range, 0.5, 10000.0);
 
+DEFINE_string(scan_topic, "",
+              "Topic of a bag's laser scans; empty: the only one there is");
+DEFINE_string(odometry_topic, "",
+              "Topic of a bag's odometry, tf (the transform of odom to the "
+              "robot) or none; empty: the only topic there is, else tf, else "
+              "none");
+
 DEFINE_string(laser_start_angle, "",
               "Direction of the first beam, degrees; empty: as the log says or "
               "by the number of beams");
@@ -275,6 +282,7 @@ std::vector<FlagGroup> SolveFlagGroups() {
       {"Front-end",
        {"features", "odometry_refinement", "link_radius", "association_depth",
         "global_association", "refine", "usable_range"}},
+      {"Bags", {"scan_topic", "odometry_topic"}},
       {"Laser", {"laser_start_angle", "laser_step", "laser_max_range"}},
       {"Running",
        {"seed", "num_threads", "checkpoint_every", "plugins", "list_plugins",
@@ -291,7 +299,7 @@ std::vector<std::string> LogFlags() {
           "features",          "odometry_refinement", "link_radius",
           "association_depth", "global_association",  "refine",
           "usable_range",      "laser_start_angle",   "laser_step",
-          "laser_max_range"};
+          "laser_max_range",   "scan_topic",          "odometry_topic"};
 }
 
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
@@ -430,6 +438,8 @@ LaserOptions LaserOptionsFromFlags() {
     Require("laser_max_range", FLAGS_laser_max_range,
             *options.laser_max_range > 0.0, "metres above 0");
   }
+  options.scan_topic = FLAGS_scan_topic;
+  options.odometry_topic = FLAGS_odometry_topic;
   return options;
 }
 

@@ -1,10 +1,21 @@
 #include <plumbline/frontend/beam_directions.h>
 
 #include <cmath>
+#include <limits>
 
 namespace plumbline {
 
 const std::vector<Eigen::Vector2d>& BeamDirections::Of(const Scan& scan) {
+  if (!scan.bearings.empty()) {
+    directions_.resize(scan.ranges.size());
+    for (std::size_t i = 0; i < directions_.size(); ++i) {
+      directions_[i] = {std::cos(scan.bearings[i]), std::sin(scan.bearings[i])};
+    }
+    // No other scan has these.
+    angle_step_ = 0.0;
+    start_angle_ = std::numeric_limits<double>::quiet_NaN();
+    return directions_;
+  }
   if (scan.ranges.size() == directions_.size() &&
       scan.start_angle == start_angle_ && scan.angle_step == angle_step_) {
     return directions_;

@@ -1,10 +1,32 @@
+#include <plumbline/frontend/bags/bag_log.h>
+#include <plumbline/frontend/bags/mcap.h>
+#include <plumbline/frontend/bags/rosbag1.h>
+#include <plumbline/frontend/bags/rosbag2.h>
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/log_reader.h>
 
+#include <memory>
+#include <string>
 #include <utility>
 
 namespace plumbline {
+namespace {
+
+LogReaderType BagReaderType(const char* name, const char* description,
+                            bool (*recognizes)(std::string_view),
+                            std::unique_ptr<BagSource> (*open)(InputStream*)) {
+  LogReaderType type;
+  type.name = name;
+  type.description = description;
+  type.recognizes = recognizes;
+  type.read = [open](InputStream* input, const LaserOptions& options) {
+    return ReadBag(open(input).get(), input->name(), options);
+  };
+  return type;
+}
+
+}  // namespace
 
 void RegisterBuiltinLogReaders(Registry* registry) {
   if (registry->Find<LogReaderType>("carmen") == nullptr) {
@@ -18,6 +40,28 @@ void RegisterBuiltinLogReaders(Registry* registry) {
     };
     registry->Register(std::move(carmen));
   }
+  const auto add = [registry](LogReaderType type) {
+    if (registry->Find<LogReaderType>(type.name) == nullptr) {
+      registry->Register(std::move(type));
+    }
+  };
+  add(BagReaderType("mcap",
+                    "MCAP: messages of ROS 2 or ROS 1, chunks plain, "
+                    "lz4 or zstd",
+                    LooksLikeMcap, OpenMcap));
+  add(BagReaderType("ros1_bag", "ROS 1 bag (2.0): chunks plain, bz2 or lz4",
+                    LooksLikeRosbag1, OpenRosbag1));
+  LogReaderType ros2 = BagReaderType(
+      "ros2_bag",
+      "ROS 2 bag: folder with metadata.yaml and .db3 or .mcap, or a .db3",
+      LooksLikeSqlite, OpenRosbag2Sqlite);
+  ros2.recognizes_path = LooksLikeRosbag2Folder;
+  ros2.read_path = [](const std::string& path, const LaserOptions& options) {
+    return ReadBag(
+        OpenRosbag2Folder(path, options.stop, options.progress).get(), path,
+        options);
+  };
+  add(std::move(ros2));
 }
 
 }  // namespace plumbline

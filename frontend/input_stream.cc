@@ -1,3 +1,5 @@
+#include <archive.h>
+#include <archive_entry.h>
 #include <bzlib.h>
 #include <fcntl.h>
 #include <plumbline/core/error.h>
@@ -105,6 +107,18 @@ bool StartsWithBzip2(const StoredBytes& bytes) {
          bytes.data()[3] >= '1' && bytes.data()[3] <= '9';
 }
 
+// xz, zstd, lz4 or zip.
+bool StartsWithArchive(const StoredBytes& bytes) {
+  if (bytes.size() < 4) return false;
+  for (const char* mark :
+       {"\xfd"
+        "7zX",
+        "\x28\xb5\x2f\xfd", "\x04\x22\x4d\x18", "PK\x03\x04"}) {
+    if (std::memcmp(bytes.data(), mark, 4) == 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 // Plain unless told otherwise by the subclasses' Unpack.
@@ -123,6 +137,9 @@ class InputStream::Unpacker {
     return count;
   }
 
+  // The bytes as they are stored.
+  virtual bool is_plain() const { return true; }
+
   const std::string& damage() const { return damage_; }
   std::int64_t bytes_read() const { return bytes_->bytes_read(); }
 
@@ -135,6 +152,7 @@ class InputStream::Unpacker {
  private:
   class Gzip;
   class Bzip2;
+  class Archive;
 };
 
 class InputStream::Unpacker::Gzip : public Unpacker {
@@ -146,6 +164,7 @@ class InputStream::Unpacker::Gzip : public Unpacker {
       throw PLUMBLINE_ERROR("zlib cannot be initialized", "enough memory");
   }
   ~Gzip() override { inflateEnd(&stream_); }
+  bool is_plain() const override { return false; }
 
   std::size_t Unpack(char* output, std::size_t capacity) override {
     while (!done_) {
@@ -200,6 +219,7 @@ class InputStream::Unpacker::Bzip2 : public Unpacker {
     Start();
   }
   ~Bzip2() override { BZ2_bzDecompressEnd(&stream_); }
+  bool is_plain() const override { return false; }
 
   std::size_t Unpack(char* output, std::size_t capacity) override {
     while (!done_) {
@@ -252,11 +272,95 @@ class InputStream::Unpacker::Bzip2 : public Unpacker {
   bool done_ = false;
 };
 
+class InputStream::Unpacker::Archive : public Unpacker {
+ public:
+  explicit Archive(std::unique_ptr<StoredBytes> bytes)
+      : Unpacker(std::move(bytes)) {
+    archive_.reset(archive_read_new());
+    if (archive_ == nullptr) {
+      throw PLUMBLINE_ERROR("libarchive cannot be initialized",
+                            "enough memory");
+    }
+    is_zip_ = *bytes_->data() == 'P';
+    archive_read_support_filter_xz(archive_.get());
+    archive_read_support_filter_zstd(archive_.get());
+    archive_read_support_filter_lz4(archive_.get());
+    if (is_zip_) {
+      archive_read_support_format_zip_streamable(archive_.get());
+    } else {
+      archive_read_support_format_raw(archive_.get());
+    }
+    archive_entry* entry = nullptr;
+    done_ = archive_read_open(archive_.get(), this, nullptr, Read, nullptr) !=
+            ARCHIVE_OK;
+    while (!done_) {
+      const int status = archive_read_next_header(archive_.get(), &entry);
+      done_ = status != ARCHIVE_OK && status != ARCHIVE_WARN;
+      if (!is_zip_ || archive_entry_filetype(entry) != AE_IFDIR) break;
+    }
+    if (done_) Damage();
+  }
+  bool is_plain() const override { return false; }
+
+  std::size_t Unpack(char* output, std::size_t capacity) override {
+    if (done_) return 0;
+    const la_ssize_t count =
+        archive_read_data(archive_.get(), output, capacity);
+    if (count > 0) return static_cast<std::size_t>(count);
+    done_ = true;
+    if (count < 0) {
+      Damage();
+    } else if (is_zip_) {
+      archive_entry* entry = nullptr;
+      if (archive_read_next_header(archive_.get(), &entry) == ARCHIVE_OK) {
+        damage_ = "the zip holds more than one file, and the first is read";
+      }
+    }
+    return 0;
+  }
+
+ private:
+  struct Free {
+    void operator()(archive* a) const { archive_read_free(a); }
+  };
+
+  static la_ssize_t Read(archive*, void* self, const void** data) {
+    auto* const unpacker = static_cast<Archive*>(self);
+    StoredBytes& stored = *unpacker->bytes_;
+    stored.Consume(unpacker->given_);
+    unpacker->given_ = 0;
+    // An exception must not pass through libarchive.
+    try {
+      if (!stored.Require(1)) return 0;
+    } catch (const Error& error) {
+      archive_set_error(unpacker->archive_.get(), EIO, "%s", error.what());
+      return -1;
+    }
+    unpacker->given_ = stored.size();
+    *data = stored.data();
+    return static_cast<la_ssize_t>(stored.size());
+  }
+
+  void Damage() {
+    const char* const why = archive_error_string(archive_.get());
+    damage_ = "compressed data is corrupt or breaks off";
+    if (why != nullptr) damage_ += std::string(": ") + why;
+  }
+
+  std::unique_ptr<archive, Free> archive_;
+  bool is_zip_ = false;
+  std::size_t given_ = 0;
+  bool done_ = false;
+};
+
 std::unique_ptr<InputStream::Unpacker> InputStream::Unpacker::Create(
     std::unique_ptr<StoredBytes> bytes) {
   bytes->Require(4);
   if (StartsWithGzip(*bytes)) return std::make_unique<Gzip>(std::move(bytes));
   if (StartsWithBzip2(*bytes)) return std::make_unique<Bzip2>(std::move(bytes));
+  if (StartsWithArchive(*bytes)) {
+    return std::make_unique<Archive>(std::move(bytes));
+  }
   return std::make_unique<Unpacker>(std::move(bytes));
 }
 
@@ -288,6 +392,7 @@ InputStream::InputStream(const std::string& path, std::function<bool()> stop)
   }
   if (S_ISREG(status.st_mode)) size_ = status.st_size;
   unpacker_ = Unpacker::Create(std::move(bytes));
+  is_plain_file_ = owned && S_ISREG(status.st_mode) && unpacker_->is_plain();
   SkipByteOrderMark();
 }
 
@@ -367,6 +472,17 @@ std::string_view InputStream::Peek(std::size_t count) {
   }
   return std::string_view(buffer_.data() + begin_,
                           std::min(count, end_ - begin_));
+}
+
+std::uint64_t InputStream::Consume(std::uint64_t count) {
+  std::uint64_t left = count;
+  while (left > 0) {
+    if (begin_ == end_ && !Fill()) break;
+    const std::uint64_t taken = std::min<std::uint64_t>(left, end_ - begin_);
+    begin_ += static_cast<std::size_t>(taken);
+    left -= taken;
+  }
+  return count - left;
 }
 
 std::string InputStream::ReadRest(std::size_t limit) {

@@ -11,10 +11,10 @@
 
 namespace plumbline {
 
-/// Text input read line by line from a plain, gzip or bzip2 file, recognized
-/// by content and not by name. Files made of several compressed members are
-/// read through to their end. A byte order mark at the beginning is passed
-/// over.
+/// Input read line by line, or as bytes, from a plain or compressed file (gzip,
+/// bzip2, xz, zstd, lz4, or a zip that holds one file), recognized by content
+/// and not by name. Files made of several compressed members are read through
+/// to their end. A byte order mark at the beginning is passed over.
 ///
 /// Compressed data that breaks off or is corrupt ends the input there: what
 /// was unpacked before is read as usual and damage() then says what happened.
@@ -52,6 +52,10 @@ class InputStream {
   /// format.
   std::string_view Peek(std::size_t count);
 
+  /// Passes over the next bytes, at most `count` and fewer only at the end of
+  /// the input; how many they were. They need not have been peeked at.
+  std::uint64_t Consume(std::uint64_t count);
+
   /// Everything that was not consumed yet, for readers that want a
   /// std::istream. Throws Error on a read error, for more than `limit` bytes
   /// and for nothing but bytes that are zero: what is unpacked may be far
@@ -70,6 +74,10 @@ class InputStream {
   /// The path, or "standard input".
   const std::string& name() const { return name_; }
 
+  /// Whether the bytes of the file `name()` are these very bytes: no
+  /// compression, no pipe, no standard input.
+  bool is_plain_file() const { return is_plain_file_; }
+
   /// What was wrong with the compressed data, empty when nothing was (known
   /// for certain only once the end is reached).
   const std::string& damage() const;
@@ -86,6 +94,7 @@ class InputStream {
   std::unique_ptr<Unpacker> unpacker_;
   std::function<void(std::int64_t, std::int64_t)> progress_;
   std::int64_t size_ = 0;
+  bool is_plain_file_ = false;
   std::vector<char> buffer_;
   // Unconsumed bytes are buffer_[begin_, end_).
   std::size_t begin_ = 0;

@@ -19,8 +19,23 @@ const LogReaderType* RecognizeLog(const Registry& registry,
   return nullptr;
 }
 
+const LogReaderType* RecognizeLogPath(const Registry& registry,
+                                      const std::string& path) {
+  for (const LogReaderType* reader : registry.All<LogReaderType>()) {
+    if (reader->recognizes_path != nullptr && reader->read_path != nullptr &&
+        reader->recognizes_path(path)) {
+      return reader;
+    }
+  }
+  return nullptr;
+}
+
 Log ReadLog(const std::string& path, const Registry& registry,
             const LaserOptions& options) {
+  if (path != "-") {
+    const LogReaderType* reader = RecognizeLogPath(registry, path);
+    if (reader != nullptr) return reader->read_path(path, options);
+  }
   InputStream input(path);
   const LogReaderType* reader =
       RecognizeLog(registry, input.Peek(kRecognizedBytes));

@@ -5,14 +5,17 @@
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/scan.h>
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace plumbline {
 
-/// What a log does not say about its laser, or says wrongly.
+/// What a log does not say about its laser, or says wrongly, and what of it is
+/// to be read.
 struct LaserOptions {
   /// Direction of the first beam in the laser's frame, rad. Unset: from the
   /// log, or by its format.
@@ -22,6 +25,19 @@ struct LaserOptions {
   /// Readings at or above it are no return, m. Unset: as above. How far a laser
   /// is trusted is the front-end's business, not the reader's.
   std::optional<double> laser_max_range;
+  /// Topic of the scans in a log that has topics. Empty: the only one there is.
+  std::string scan_topic;
+  /// Topic of the odometry; "tf": the transform of odom to the robot; "none":
+  /// without odometry. Empty: the only one there is, else tf, else without.
+  std::string odometry_topic;
+  /// Called with what the log holds once it was read, also when it is refused
+  /// then. May be empty.
+  std::function<void(const std::vector<LogTopic>& topics)> on_topics;
+  /// Asked while a folder is read: true ends the input there. And how much of
+  /// it was read, bytes. Of a single file these are the InputStream's. May be
+  /// empty.
+  std::function<bool()> stop;
+  std::function<void(std::int64_t done, std::int64_t size)> progress;
 };
 
 /// A format of robot logs: a kind of plug-in (Registry::Register, Find, Get,
@@ -39,12 +55,23 @@ struct LogReaderType {
   /// Reads a log. Lines that cannot be used are passed over and counted in
   /// Log::skipped; throws Error when there is no scan at all.
   std::function<Log(InputStream* input, const LaserOptions& options)> read;
+  /// For logs that are a folder, or more than the stream of a file's bytes:
+  /// whether the file or folder at `path` is such a log, asked before
+  /// `recognizes`, and what reads it then, in place of `read`. Both or none.
+  std::function<bool(const std::string& path)> recognizes_path;
+  std::function<Log(const std::string& path, const LaserOptions& options)>
+      read_path;
 };
 
 /// The first reader, in the order of names, that recognizes text that starts
 /// with `prefix`; null when none does.
 const LogReaderType* RecognizeLog(const Registry& registry,
                                   std::string_view prefix);
+
+/// The first reader, in the order of names, that recognizes the file or folder
+/// `path` as a whole (LogReaderType::recognizes_path); null when none does.
+const LogReaderType* RecognizeLogPath(const Registry& registry,
+                                      const std::string& path);
 
 /// Reads the log `path` ("-": standard input), whatever its format and
 /// compression, with the reader that recognizes it. Throws Error when the file

@@ -31,7 +31,7 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
     if (!(range >= options.minimum_range) || range > options.usable_range) {
       continue;
     }
-    const double angle = scan.start_angle + i * scan.angle_step;
+    const double angle = scan.Bearing(static_cast<std::size_t>(i));
     ScanPoint point;
     point.position = from_laser.Point(
         Eigen::Vector2d(range * std::cos(angle), range * std::sin(angle)));

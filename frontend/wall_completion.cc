@@ -252,7 +252,9 @@ class Completion {
           continue;
         }
         const double angle =
-            laser[2] + scan.start_angle + beam * scan.angle_step;
+            scan.bearings.empty()
+                ? laser[2] + scan.start_angle + beam * scan.angle_step
+                : laser[2] + scan.bearings[beam];
         const Eigen::Vector2d ray(std::cos(angle), std::sin(angle));
         const Eigen::Vector2d point = laser.head<2>() + range * ray;
         if (index_.Explains(point, options_.explained_offset,

@@ -241,6 +241,12 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
     const std::optional<double> late = MeanOfTenth(summary.scan_seconds, 9);
     Json frontend;
     frontend["skipped"] = std::move(skipped);
+    if (!summary.log_format.empty()) frontend["format"] = summary.log_format;
+    if (!summary.scan_source.empty()) frontend["scans"] = summary.scan_source;
+    if (!summary.odometry_source.empty()) {
+      frontend["odometry"] = summary.odometry_source;
+    }
+    if (!summary.notes.empty()) frontend["notes"] = summary.notes;
     frontend["scan_seconds_second_tenth"] = OptionalToJson(early);
     frontend["scan_seconds_last_tenth"] = OptionalToJson(late);
     frontend["scan_seconds_growth"] =

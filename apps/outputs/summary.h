@@ -142,6 +142,12 @@ struct Summary {
   /// scan took, s, in the order of scans; may be empty.
   std::vector<SkipReport> skipped;
   std::vector<double> scan_seconds;
+  /// Of a log only: its format, what gave the scans and the odometry, and what
+  /// was taken for granted, for people. Empty: not written.
+  std::string log_format;
+  std::string scan_source;
+  std::string odometry_source;
+  std::vector<std::string> notes;
 };
 
 /// Fills in features, constraints, closures and orthogonality_deg.
@@ -158,9 +164,9 @@ void CountGraph(const Graph& graph, Summary* summary);
 /// (cost.total), iterations, solves, converged, evaluation_s, linear_solver_s,
 /// setup_s, start {poses, landmarks, kept, seconds}}; for a log also frontend
 /// {skipped [{reason, count, first_lines}], scan_seconds_second_tenth,
-/// scan_seconds_last_tenth, scan_seconds_growth (their quotient)}, tracking
-/// {pieces, loose [{begin, end, why}]}. Numbers that are not finite become
-/// null.
+/// scan_seconds_last_tenth, scan_seconds_growth (their quotient), format,
+/// scans, odometry (names; of logs that tell), notes [text]}, tracking {pieces,
+/// loose [{begin, end, why}]}. Numbers that are not finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// The same into a file, whole or not at all. Throws Error when it cannot be

@@ -1,0 +1,56 @@
+#include <plumbline/frontend/bags/bag_source.h>
+
+namespace plumbline {
+namespace {
+
+// Lies have no end.
+constexpr std::size_t kMostReasons = 50;
+constexpr std::size_t kMostPositions = 5;
+constexpr std::size_t kMostTopics = 4096;
+
+}  // namespace
+
+void SkipCounter::Add(const std::string& reason, int position,
+                      std::int64_t count) {
+  std::string kept = reason;
+  if (index_.count(kept) == 0 && index_.size() >= kMostReasons) {
+    kept = "further reasons";
+  }
+  const auto [entry, is_new] = index_.emplace(kept, reports_.size());
+  if (is_new) {
+    reports_.emplace_back();
+    reports_.back().reason = kept;
+  }
+  SkipReport& report = reports_[entry->second];
+  report.count += count;
+  if (report.first_lines.size() < kMostPositions) {
+    report.first_lines.push_back(position);
+  }
+}
+
+std::size_t BagSource::AddTopic(const BagTopic& topic) {
+  for (std::size_t i = 0; i < topics_.size(); ++i) {
+    if (topics_[i].name == topic.name && topics_[i].type == topic.type &&
+        topics_[i].encoding == topic.encoding &&
+        topics_[i].unreadable == topic.unreadable) {
+      return i;
+    }
+  }
+  if (topics_.size() < kMostTopics) {
+    topics_.push_back(topic);
+  } else if (topics_.size() == kMostTopics) {
+    topics_.emplace_back();
+    topics_.back().name = "(further topics)";
+    topics_.back().unreadable = "the bag has too many topics";
+  }
+  return topics_.size() - 1;
+}
+
+std::string PlainTypeName(const std::string& type) {
+  const std::size_t place = type.find("/msg/");
+  return place == std::string::npos
+             ? type
+             : type.substr(0, place) + type.substr(place + 4);
+}
+
+}  // namespace plumbline

@@ -1,0 +1,100 @@
+#ifndef PLUMBLINE_FRONTEND_BAGS_BAG_SOURCE_H_
+#define PLUMBLINE_FRONTEND_BAGS_BAG_SOURCE_H_
+
+#include <plumbline/frontend/bags/message_decoder.h>
+#include <plumbline/frontend/scan.h>
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace plumbline {
+
+/// A topic of a bag: a stream of messages of one type.
+struct BagTopic {
+  std::string name;
+  /// As ROS 1 writes it, "sensor_msgs/LaserScan" (ROS 2 has
+  /// "sensor_msgs/msg/LaserScan"); empty when the bag does not say.
+  std::string type;
+  MessageEncoding encoding = MessageEncoding::kRos1;
+  /// Why its messages cannot be read; empty when they can.
+  std::string unreadable;
+};
+
+/// A message as a bag has it.
+struct BagMessage {
+  /// Index into BagSource::topics().
+  std::size_t topic = 0;
+  /// When it was recorded, ns since the epoch of the recording's clock.
+  std::int64_t time = 0;
+  /// Packed fields, valid until the next call of Next(); empty where nobody
+  /// wanted them.
+  std::string_view data;
+};
+
+/// Something in a bag that was passed over: counts by reason.
+class SkipCounter {
+ public:
+  /// `position` is the number of the message at hand, from 1.
+  void Add(const std::string& reason, int position, std::int64_t count = 1);
+  const std::vector<SkipReport>& reports() const { return reports_; }
+
+ private:
+  std::map<std::string, std::size_t> index_;
+  std::vector<SkipReport> reports_;
+};
+
+/// The messages of a bag in the order of the file, one at a time: no more than
+/// a chunk is in memory. What is damaged is passed over and counted.
+class BagSource {
+ public:
+  virtual ~BagSource() = default;
+
+  /// Says whose messages' data are worth reading. Set before the first Next();
+  /// all when it is not.
+  void SetWanted(std::function<bool(const BagTopic&)> wanted) {
+    wanted_ = std::move(wanted);
+  }
+
+  /// The next message; false at the end. Throws Error on a read error.
+  virtual bool Next(BagMessage* message) = 0;
+
+  /// Topics met so far; grows while messages are read.
+  const std::vector<BagTopic>& topics() const { return topics_; }
+  /// What was passed over so far.
+  const std::vector<SkipReport>& skipped() const { return skips_.reports(); }
+  /// "ROS 1 bag", "ROS 2 bag (mcap)", ...: for people.
+  const std::string& format() const { return format_; }
+
+ protected:
+  explicit BagSource(std::string format) : format_(std::move(format)) {}
+
+  /// Adds a topic, or finds the one of that name and type; its index.
+  std::size_t AddTopic(const BagTopic& topic);
+  bool IsWanted(const BagTopic& topic) const {
+    return topic.unreadable.empty() && (!wanted_ || wanted_(topic));
+  }
+  /// Counts a message or its lack; the position is that of the message at hand.
+  void Skip(const std::string& reason, std::int64_t count = 1) {
+    skips_.Add(reason, position_, count);
+  }
+  /// A message was met.
+  void CountMessage() { ++position_; }
+
+ private:
+  std::string format_;
+  std::vector<BagTopic> topics_;
+  std::function<bool(const BagTopic&)> wanted_;
+  SkipCounter skips_;
+  int position_ = 0;
+};
+
+/// "sensor_msgs/msg/LaserScan" as "sensor_msgs/LaserScan".
+std::string PlainTypeName(const std::string& type);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_BAGS_BAG_SOURCE_H_

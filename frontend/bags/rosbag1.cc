@@ -1,0 +1,460 @@
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/bags/chunk_unpacker.h>
+#include <plumbline/frontend/bags/little_endian.h>
+#include <plumbline/frontend/bags/rosbag1.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr std::string_view kMagic = "#ROSBAG V";
+constexpr std::string_view kVersion = "#ROSBAG V2.0\n";
+
+// A record, and what a chunk unpacks to, may have so many bytes.
+constexpr std::size_t kLargestRecord = std::size_t{1} << 28;
+constexpr std::size_t kLargestHeader = std::size_t{1} << 16;
+// Bytes that are searched for a record at once.
+constexpr std::size_t kSearchStep = std::size_t{1} << 18;
+
+enum Op : unsigned char {
+  kMessage = 2,
+  kBagHeader = 3,
+  kIndex = 4,
+  kChunk = 5,
+  kChunkInfo = 6,
+  kConnection = 7,
+};
+
+using Fields = std::map<std::string_view, std::string_view>;
+
+// "length name=value", one after another; false unless they fill `text`.
+bool ParseFields(std::string_view text, Fields* fields) {
+  fields->clear();
+  while (!text.empty()) {
+    if (text.size() < 4) return false;
+    const std::size_t size = LittleEndian(text, 0, 4);
+    text.remove_prefix(4);
+    if (size > text.size()) return false;
+    const std::string_view field = text.substr(0, size);
+    const std::size_t equals = field.find('=');
+    if (equals == std::string_view::npos || equals == 0) return false;
+    (*fields)[field.substr(0, equals)] = field.substr(equals + 1);
+    text.remove_prefix(size);
+  }
+  return true;
+}
+
+// A number of `size` bytes; false when the field is missing or has another
+// size.
+bool Number(const Fields& fields, std::string_view name, std::size_t size,
+            std::uint64_t* value) {
+  const auto entry = fields.find(name);
+  if (entry == fields.end() || entry->second.size() != size) return false;
+  *value = LittleEndian(entry->second, 0, size);
+  return true;
+}
+
+std::string Text(const Fields& fields, std::string_view name) {
+  const auto entry = fields.find(name);
+  return entry == fields.end() ? std::string() : std::string(entry->second);
+}
+
+struct Record {
+  unsigned char op = 0;
+  Fields fields;
+  // Bytes up to the data.
+  std::size_t header_size = 0;
+  std::size_t data_size = 0;
+};
+
+enum class Parsed { kRecord, kTooShort, kDamaged };
+
+// The header of a record that `bytes` begin with.
+Parsed ParseRecord(std::string_view bytes, Record* record) {
+  if (bytes.size() < 4) return Parsed::kTooShort;
+  const std::size_t size = LittleEndian(bytes, 0, 4);
+  if (size < 8 || size > kLargestHeader) return Parsed::kDamaged;
+  // Cheap, before anything is stored.
+  if (bytes.size() >= 8 && LittleEndian(bytes, 4, 4) > size - 4) {
+    return Parsed::kDamaged;
+  }
+  if (bytes.size() < size + 8) return Parsed::kTooShort;
+  if (!ParseFields(bytes.substr(4, size), &record->fields)) {
+    return Parsed::kDamaged;
+  }
+  std::uint64_t op = 0;
+  std::uint64_t unused = 0;
+  const Fields& fields = record->fields;
+  if (!Number(fields, "op", 1, &op)) return Parsed::kDamaged;
+  record->op = static_cast<unsigned char>(op);
+  record->header_size = size + 8;
+  record->data_size = LittleEndian(bytes, size + 4, 4);
+  bool is_one = false;
+  switch (op) {
+    case kMessage:
+      is_one = Number(fields, "conn", 4, &unused) &&
+               Number(fields, "time", 8, &unused);
+      break;
+    case kBagHeader:
+      is_one = Number(fields, "index_pos", 8, &unused);
+      break;
+    case kIndex:
+      is_one = Number(fields, "count", 4, &unused);
+      break;
+    case kChunk:
+      is_one =
+          fields.count("compression") > 0 && Number(fields, "size", 4, &unused);
+      break;
+    case kChunkInfo:
+      is_one = Number(fields, "count", 4, &unused);
+      break;
+    case kConnection:
+      is_one = Number(fields, "conn", 4, &unused) && fields.count("topic") > 0;
+      break;
+    default:
+      is_one = false;
+  }
+  return is_one ? Parsed::kRecord : Parsed::kDamaged;
+}
+
+class Rosbag1 : public BagSource {
+ public:
+  explicit Rosbag1(InputStream* input) : BagSource("ROS 1 bag"), input_(input) {
+    const std::string_view start = input->Peek(kVersion.size());
+    if (start != kVersion) {
+      const std::size_t end = std::min(start.find('\n'), start.size());
+      throw Error(
+          input->name(), 0,
+          "is a ROS bag of version " +
+              std::string(start.substr(std::min(kMagic.size(), end),
+                                       end - std::min(kMagic.size(), end))),
+          "version 2.0 (rosbag fix brings older bags to it)");
+    }
+    input->Consume(kVersion.size());
+  }
+
+  bool Next(BagMessage* message) override {
+    while (true) {
+      if (!chunk_.empty()) {
+        if (Step(&chunk_, message)) return true;
+        continue;
+      }
+      if (at_end_) {
+        Close();
+        return false;
+      }
+      if (Step(input_, message)) return true;
+    }
+  }
+
+ private:
+  // Takes a record; true when it is a message.
+  template <typename Bytes>
+  bool Step(Bytes* bytes, BagMessage* message) {
+    constexpr bool kInChunk = std::is_same_v<Bytes, MemoryBytes>;
+    // The data of the message before, which were in use until now.
+    if (pending_ > 0) {
+      bytes->Consume(pending_);
+      pending_ = 0;
+      if (bytes->Peek(1).empty()) {
+        if (!kInChunk) at_end_ = true;
+        return false;
+      }
+    }
+    Record record;
+    Parsed parsed = ParseRecord(bytes->Peek(kUsualHeader), &record);
+    if (parsed == Parsed::kTooShort) {
+      parsed = ParseRecord(bytes->Peek(kLargestHeader + 8), &record);
+    }
+    if (parsed != Parsed::kRecord) {
+      if (bytes->Peek(1).empty()) {
+        if (!kInChunk) at_end_ = true;
+        return false;
+      }
+      Skip(parsed == Parsed::kTooShort
+               ? "record that breaks off"
+               : "bytes that are no record of a bag: reading goes on with the "
+                 "next record");
+      bytes->Consume(1);
+      FindRecord(bytes);
+      return false;
+    }
+    if (record.op == kMessage) return TakeMessage(record, bytes, message);
+    switch (record.op) {
+      case kChunk:
+        if (kInChunk) {
+          PassOver(record, bytes);
+        } else {
+          TakeChunk(record);
+        }
+        break;
+      case kConnection:
+        TakeConnection(record, bytes);
+        break;
+      case kBagHeader:
+        TakeBagHeader(record);
+        PassOver(record, bytes);
+        break;
+      case kIndex:
+        PassOverIndex(record, bytes);
+        break;
+      default:
+        PassOver(record, bytes);
+    }
+    return false;
+  }
+
+  // On to the next record that can be one, or the end.
+  template <typename Bytes>
+  void FindRecord(Bytes* bytes) {
+    Record record;
+    while (true) {
+      const std::string_view view =
+          bytes->Peek(kSearchStep + kLargestHeader + 8);
+      const std::size_t end = std::min(view.size(), kSearchStep);
+      for (std::size_t i = 0; i < end; ++i) {
+        if (ParseRecord(view.substr(i), &record) == Parsed::kRecord) {
+          bytes->Consume(i);
+          return;
+        }
+      }
+      bytes->Consume(end);
+      if (end < kSearchStep) return;
+    }
+  }
+
+  template <typename Bytes>
+  void PassOver(const Record& record, Bytes* bytes) {
+    const std::uint64_t size = record.header_size + record.data_size;
+    if (bytes->Consume(size) < size) Skip("record that breaks off");
+  }
+
+  // Says what the data's size is: public bags state more than there is.
+  template <typename Bytes>
+  void PassOverIndex(const Record& record, Bytes* bytes) {
+    std::uint64_t count = 0;
+    Number(record.fields, "count", 4, &count);
+    const std::uint64_t by_count = 12 * count;
+    Record next;
+    if (by_count != record.data_size && by_count < kSearchStep) {
+      const std::string_view view =
+          bytes->Peek(record.header_size + by_count + kUsualHeader);
+      if (view.size() > record.header_size + by_count &&
+          ParseRecord(view.substr(record.header_size + by_count), &next) ==
+              Parsed::kRecord) {
+        bytes->Consume(record.header_size + by_count);
+        Skip("index that states another size than it has");
+        return;
+      }
+    }
+    PassOver(record, bytes);
+  }
+
+  template <typename Bytes>
+  bool TakeMessage(const Record& record, Bytes* bytes, BagMessage* message) {
+    std::uint64_t connection = 0;
+    std::uint64_t time = 0;
+    Number(record.fields, "conn", 4, &connection);
+    Number(record.fields, "time", 8, &time);
+    const auto topic = connections_.find(connection);
+    CountMessage();
+    if (record.data_size > kLargestRecord) {
+      Skip("message that says it has more than 256 MiB");
+      bytes->Consume(record.header_size);
+      FindRecord(bytes);
+      return false;
+    }
+    if (topic == connections_.end()) {
+      Skip("message of a topic that the bag does not describe");
+      PassOver(record, bytes);
+      return false;
+    }
+    message->topic = topic->second;
+    message->time = static_cast<std::int64_t>(time & 0xffffffffu) * 1000000000 +
+                    static_cast<std::int64_t>(time >> 32);
+    message->data = {};
+    const std::size_t size = record.header_size + record.data_size;
+    if (!IsWanted(topics()[topic->second])) {
+      if (bytes->Consume(size) < size) {
+        Skip("record that breaks off");
+        return false;
+      }
+      return true;
+    }
+    // `record` points into what Peek may move.
+    const std::size_t header_size = record.header_size;
+    const std::string_view view = bytes->Peek(size);
+    if (view.size() < size) {
+      Skip("record that breaks off");
+      bytes->Consume(size);
+      return false;
+    }
+    message->data = view.substr(header_size);
+    pending_ = size;
+    return true;
+  }
+
+  template <typename Bytes>
+  void TakeConnection(const Record& record, Bytes* bytes) {
+    std::uint64_t connection = 0;
+    Number(record.fields, "conn", 4, &connection);
+    BagTopic topic;
+    topic.name = Text(record.fields, "topic");
+    topic.encoding = MessageEncoding::kRos1;
+    if (record.data_size > kLargestRecord) {
+      Skip("record that says it has more than 256 MiB");
+      bytes->Consume(record.header_size);
+      FindRecord(bytes);
+      return;
+    }
+    const std::size_t header_size = record.header_size;
+    const std::size_t size = header_size + record.data_size;
+    const std::string_view view = bytes->Peek(size);
+    Fields fields;
+    if (view.size() < size || !ParseFields(view.substr(header_size), &fields)) {
+      Skip("description of a topic that is damaged");
+      bytes->Consume(header_size);
+      if (view.size() < size) {
+        FindRecord(bytes);
+      } else {
+        bytes->Consume(size - header_size);
+      }
+      return;
+    }
+    topic.type = Text(fields, "type");
+    if (topic.type.empty()) {
+      topic.unreadable = "the bag does not say what type its messages have";
+    } else {
+      const std::string sum = Text(fields, "md5sum");
+      const auto known = kDefinitions().find(topic.type);
+      if (known != kDefinitions().end() && !sum.empty() && sum != "*" &&
+          sum != known->second) {
+        topic.unreadable = "its messages are " + topic.type +
+                           " of another definition (MD5 " + sum +
+                           ", expected " + known->second + ")";
+      }
+    }
+    connections_[connection] = AddTopic(topic);
+    bytes->Consume(size);
+  }
+
+  // Checksums of the definitions that the decoder knows.
+  static const std::map<std::string, std::string>& kDefinitions() {
+    static const auto* const definitions =
+        new std::map<std::string, std::string>{
+            {"sensor_msgs/LaserScan", "90c7ef2dc6895d81024acba2ac42f369"},
+            {"nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"},
+            {"sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"},
+            {"tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec"},
+            {"tf/tfMessage", "94810edda583a504dfda3829e70d7eec"}};
+    return *definitions;
+  }
+
+  void TakeBagHeader(const Record& record) {
+    if (!Text(record.fields, "encryptor").empty()) {
+      throw Error(input_->name(), 0,
+                  "is encrypted by " + Text(record.fields, "encryptor"),
+                  "a bag that is not");
+    }
+    std::uint64_t count = 0;
+    if (Number(record.fields, "chunk_count", 4, &count)) {
+      chunks_stated_ = static_cast<std::int64_t>(count);
+    }
+  }
+
+  void TakeChunk(const Record& record) {
+    ++chunks_found_;
+    const std::string compression = Text(record.fields, "compression");
+    std::uint64_t size = 0;
+    Number(record.fields, "size", 4, &size);
+    const std::size_t stored_size = record.data_size;
+    // The records of a plain chunk follow like all others; its size need not be
+    // believed.
+    if (compression == "none") {
+      input_->Consume(record.header_size);
+      return;
+    }
+    if (!IsKnownCompression(compression) || compression == "zstd") {
+      Skip("chunk with the unknown compression '" + compression.substr(0, 20) +
+           "': none, bz2 and lz4 are known");
+      PassOver(record, input_);
+      return;
+    }
+    input_->Consume(record.header_size);
+    std::size_t shown = std::min(stored_size, kLargestRecord);
+    std::string_view stored = input_->Peek(shown);
+    UnpackedChunk unpacked = UnpackChunk(compression, stored, kLargestRecord);
+    if (!unpacked.is_whole && unpacked.damage.empty() &&
+        stored.size() == shown) {
+      // More follows than the chunk says.
+      shown = std::min<std::size_t>(
+          kLargestRecord,
+          shown + static_cast<std::size_t>(size) + kLargestHeader);
+      stored = input_->Peek(shown);
+      unpacked = UnpackChunk(compression, stored, kLargestRecord);
+    }
+    if (unpacked.is_whole) {
+      input_->Consume(unpacked.consumed);
+      if (unpacked.consumed != stored_size) {
+        Skip("chunk that states another size than it has");
+        FindRecord(input_);
+      }
+    } else {
+      Skip(unpacked.damage.empty()
+               ? "chunk that breaks off: what was unpacked before is used"
+               : "chunk whose " + unpacked.damage +
+                     ": what was unpacked before is used");
+      Record next;
+      const std::string_view after = input_->Peek(stored_size + kUsualHeader);
+      if (after.size() > stored_size &&
+          ParseRecord(after.substr(stored_size), &next) == Parsed::kRecord) {
+        input_->Consume(stored_size);
+      } else {
+        FindRecord(input_);
+      }
+    }
+    unpacked_ = std::move(unpacked.bytes);
+    chunk_ = MemoryBytes(unpacked_);
+  }
+
+  // What the bag says it has and has not.
+  void Close() {
+    if (!input_->damage().empty()) {
+      Skip(input_->damage() + ": what was unpacked before it is used");
+    } else if (chunks_stated_ > chunks_found_) {
+      Skip("chunk that the bag says it has and that is not there",
+           chunks_stated_ - chunks_found_);
+    }
+    chunks_stated_ = 0;
+  }
+
+  // Headers are seldom longer.
+  static constexpr std::size_t kUsualHeader = 512;
+
+  InputStream* input_;
+  std::map<std::uint64_t, std::size_t> connections_;
+  // The chunk at hand, what of it is left, and how much of that, or of the
+  // input, the last message takes.
+  std::string unpacked_;
+  MemoryBytes chunk_;
+  std::size_t pending_ = 0;
+  std::int64_t chunks_stated_ = 0;
+  std::int64_t chunks_found_ = 0;
+  bool at_end_ = false;
+};
+
+}  // namespace
+
+bool LooksLikeRosbag1(std::string_view prefix) {
+  return prefix.substr(0, kMagic.size()) == kMagic;
+}
+
+std::unique_ptr<BagSource> OpenRosbag1(InputStream* input) {
+  return std::make_unique<Rosbag1>(input);
+}
+
+}  // namespace plumbline

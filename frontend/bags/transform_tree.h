@@ -1,0 +1,89 @@
+#ifndef PLUMBLINE_FRONTEND_BAGS_TRANSFORM_TREE_H_
+#define PLUMBLINE_FRONTEND_BAGS_TRANSFORM_TREE_H_
+
+#include <plumbline/frontend/bags/message_decoder.h>
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// A rigid motion in space: what maps a point of a frame to its parent's.
+struct Pose3 {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  /// m
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+};
+
+/// a, then b in the frame that a leads to.
+Pose3 Compose(const Pose3& a, const Pose3& b);
+Pose3 Inverse(const Pose3& pose);
+/// The way from a (share 0) to b (share 1): straight, turning evenly.
+Pose3 Interpolate(const Pose3& a, const Pose3& b, double share);
+
+/// What a message has; false when a number is not finite or absurd or the
+/// quaternion is not of unit length (1 % off is allowed for, and made good).
+bool ToPose3(const Pose3Message& message, Pose3* pose);
+
+/// The frames of /tf and /tf_static over time. Names are taken without a slash
+/// in front.
+class TransformTree {
+ public:
+  /// Adds a transform of time `time` (ns). A frame keeps its first parent;
+  /// false when another is given, the frame is its own parent, or its transform
+  /// is no rigid motion: nothing is added then.
+  bool Add(const TransformMessage& message, std::int64_t time, bool is_static);
+
+  /// Puts what was added in the order of time. Call once all is in.
+  void Sort();
+
+  /// `frame`, its parent, and so on to the root.
+  std::vector<std::string> ChainOf(const std::string& frame) const;
+
+  /// The pose of `frame` in its ancestor `ancestor` at `time`, interpolated;
+  /// before the first and after the last transform theirs holds. False when
+  /// there is no such way.
+  bool Lookup(const std::string& ancestor, const std::string& frame,
+              std::int64_t time, Pose3* pose) const;
+
+  /// The same between any two frames that have an ancestor in common.
+  bool LookupAnyWay(const std::string& reference, const std::string& frame,
+                    std::int64_t time, Pose3* pose) const;
+
+  /// Whether the pose of `frame` in its parent was given over time and changed.
+  bool IsMoving(const std::string& frame) const;
+
+  /// Times (ns) of the first and last transform of `frame` to its parent.
+  bool Span(const std::string& frame, std::int64_t* first,
+            std::int64_t* last) const;
+
+  /// "odom -> base_link -> laser, ...": every way from a root, for people.
+  std::string Describe() const;
+
+  bool empty() const { return edges_.empty(); }
+
+ private:
+  struct Sample {
+    std::int64_t time;
+    Pose3 pose;
+  };
+  struct Edge {
+    std::string parent;
+    bool is_static = false;
+    std::vector<Sample> samples;
+  };
+  static Pose3 At(const Edge& edge, std::int64_t time);
+
+  // By the name of the child.
+  std::map<std::string, Edge> edges_;
+};
+
+/// "/laser" as "laser".
+std::string PlainFrameName(const std::string& frame);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_BAGS_TRANSFORM_TREE_H_

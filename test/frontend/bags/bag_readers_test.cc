@@ -1,0 +1,794 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/apps/simulation/bag_writer.h>
+#include <plumbline/apps/simulation/simulator.h>
+#include <plumbline/apps/simulation/world.h>
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/bags/bag_log.h>
+#include <plumbline/frontend/bags/mcap.h>
+#include <plumbline/frontend/bags/rosbag1.h>
+#include <plumbline/frontend/bags/rosbag2.h>
+#include <plumbline/frontend/builtins.h>
+#include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/log_reader.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::Field;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+constexpr std::int64_t kSecond = 1000000000;
+constexpr std::int64_t kStart = 1000 * kSecond;
+
+// A folder of this process that is gone in the end.
+class Folder {
+ public:
+  Folder()
+      : path_(fs::temp_directory_path() /
+              ("plumbline_bags_" + std::to_string(getpid()) + "_" +
+               std::to_string(count_++))) {
+    fs::create_directories(path_);
+  }
+  ~Folder() { fs::remove_all(path_); }
+  std::string operator/(const std::string& name) const {
+    return (path_ / name).string();
+  }
+
+ private:
+  static int count_;
+  fs::path path_;
+};
+int Folder::count_ = 0;
+
+void WriteText(const std::string& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+const Registry& Readers() {
+  static const Registry* const registry = [] {
+    auto* const all = new Registry;
+    RegisterBuiltinLogReaders(all);
+    return all;
+  }();
+  return *registry;
+}
+
+Log ReadPath(const std::string& path, const LaserOptions& options = {}) {
+  return ReadLog(path, Readers(), options);
+}
+
+// Of bytes, by the reader that recognizes them.
+Log ReadBytes(const std::string& bytes, const LaserOptions& options = {}) {
+  InputStream input("bag", bytes);
+  const LogReaderType* reader = RecognizeLog(Readers(), input.Peek(65536));
+  if (reader == nullptr) throw Error("bag", 0, "is not recognized", "");
+  return reader->read(&input, options);
+}
+
+std::string WhatOf(const std::string& bytes, const LaserOptions& options = {}) {
+  try {
+    ReadBytes(bytes, options);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::int64_t Skipped(const Log& log, const std::string& reason) {
+  std::int64_t count = 0;
+  for (const SkipReport& report : log.skipped) {
+    if (report.reason.find(reason) != std::string::npos) count += report.count;
+  }
+  return count;
+}
+
+LaserScanMessage PlainScan(std::int64_t stamp) {
+  LaserScanMessage scan;
+  scan.header = {stamp, "laser"};
+  scan.angle_min = -1.0;
+  scan.angle_max = 1.0;
+  scan.angle_increment = 0.5;
+  scan.range_min = 0.1;
+  scan.range_max = 10.0;
+  scan.ranges = {1.0f, 2.0f, 3.0f, 4.0f, 5.0f};
+  return scan;
+}
+
+BagRecord Record(const LaserScanMessage& scan, MessageEncoding encoding,
+                 const std::string& topic = "/scan") {
+  return {topic, "sensor_msgs/LaserScan", scan.header.stamp,
+          EncodeLaserScan(scan, encoding)};
+}
+
+BagRecord OdometryRecord(std::int64_t stamp, const Pose2& pose,
+                         MessageEncoding encoding,
+                         const std::string& topic = "/odom") {
+  OdometryMessage odometry;
+  odometry.header = {stamp, "odom"};
+  odometry.child_frame = "base_link";
+  odometry.pose.x = pose[0];
+  odometry.pose.y = pose[1];
+  odometry.pose.qz = std::sin(0.5 * pose[2]);
+  odometry.pose.qw = std::cos(0.5 * pose[2]);
+  return {topic, "nav_msgs/Odometry", stamp,
+          EncodeOdometry(odometry, encoding)};
+}
+
+TransformMessage Transform(std::int64_t stamp, const std::string& parent,
+                           const std::string& child, const Pose2& pose) {
+  TransformMessage transform;
+  transform.header = {stamp, parent};
+  transform.child_frame = child;
+  transform.transform.x = pose[0];
+  transform.transform.y = pose[1];
+  transform.transform.qz = std::sin(0.5 * pose[2]);
+  transform.transform.qw = std::cos(0.5 * pose[2]);
+  return transform;
+}
+
+BagRecord TfRecord(const TransformMessage& transform, MessageEncoding encoding,
+                   const std::string& topic = "/tf") {
+  return {topic, "tf2_msgs/TFMessage", transform.header.stamp,
+          EncodeTransforms({transform}, encoding)};
+}
+
+constexpr MessageEncoding kRos1 = MessageEncoding::kRos1;
+constexpr MessageEncoding kCdr = MessageEncoding::kCdr;
+
+// Ten scans a tenth of a second apart, odometry between them.
+std::vector<BagRecord> SmallDrive(MessageEncoding encoding) {
+  std::vector<BagRecord> records;
+  records.push_back(
+      TfRecord(Transform(kStart, "base_link", "laser", Pose2(0.2, 0.0, 0.1)),
+               encoding, "/tf_static"));
+  for (int i = 0; i <= 10; ++i) {
+    const std::int64_t time = kStart + i * kSecond / 10;
+    records.push_back(OdometryRecord(
+        time - kSecond / 20, Pose2(0.1 * i - 0.05, 0.0, 0.0), encoding));
+    if (i < 10) records.push_back(Record(PlainScan(time), encoding));
+  }
+  return records;
+}
+
+const Simulation& Drive() {
+  static const Simulation* const simulation = [] {
+    SimulatorOptions options;
+    options.laser.offset = 0.2;
+    options.progress = [](double share) { return share < 0.03; };
+    return new Simulation(Simulate(MakeWorld("office", 3, 0.5), options, 3));
+  }();
+  return *simulation;
+}
+
+LaserModel Laser() {
+  LaserModel laser;
+  laser.offset = 0.2;
+  return laser;
+}
+
+// Every format says the same of the same drive, to the last digits that floats
+// and quaternions leave.
+class FormatsTest : public ::testing::Test {
+ protected:
+  FormatsTest() {
+    std::ostringstream text;
+    WriteCarmenLog(Drive(), Laser(), {}, text);
+    InputStream input("carmen", text.str());
+    carmen_ = ReadCarmenLog(&input, {});
+  }
+
+  void ExpectSame(const Log& log) const {
+    EXPECT_THAT(log.skipped, IsEmpty());
+    EXPECT_TRUE(log.has_odometry);
+    EXPECT_EQ(log.scan_message, "/scan");
+    EXPECT_EQ(log.odometry_source, "/odom");
+    ASSERT_EQ(log.scans.size(), carmen_.scans.size());
+    ASSERT_GT(log.scans.size(), 20u);
+    for (std::size_t i = 0; i < log.scans.size(); ++i) {
+      const Scan& scan = log.scans[i];
+      const Scan& same = carmen_.scans[i];
+      ASSERT_EQ(scan.ranges, same.ranges) << i;
+      ASSERT_EQ(scan.timestamp, same.timestamp);
+      ASSERT_EQ(scan.odometry, same.odometry);
+      ASSERT_NEAR((scan.laser_offset - same.laser_offset).norm(), 0.0, 2e-6);
+      ASSERT_NEAR(scan.start_angle, same.start_angle, 1e-12);
+      ASSERT_NEAR(scan.angle_step, same.angle_step, 1e-12);
+      ASSERT_EQ(scan.maximum_range, same.maximum_range);
+    }
+  }
+
+  Log carmen_;
+};
+
+TEST_F(FormatsTest, Ros1) {
+  const std::vector<BagRecord> messages =
+      SimulatedMessages(Drive(), Laser(), kRos1);
+  for (const char* compression : {"none", "bz2", "lz4"}) {
+    for (const bool index : {true, false}) {
+      SCOPED_TRACE(std::string(compression) + (index ? "" : ", no index"));
+      BagWriterOptions options;
+      options.compression = compression;
+      options.index = index;
+      options.chunk_size = 10000;
+      ExpectSame(ReadBytes(MakeRosbag1(messages, options)));
+    }
+  }
+}
+
+TEST_F(FormatsTest, Mcap) {
+  const std::vector<BagRecord> messages =
+      SimulatedMessages(Drive(), Laser(), kCdr);
+  for (const char* compression : {"none", "lz4", "zstd"}) {
+    SCOPED_TRACE(compression);
+    BagWriterOptions options;
+    options.compression = compression;
+    options.chunk_size = 10000;
+    ExpectSame(ReadBytes(MakeMcap(messages, options)));
+  }
+  BagWriterOptions options;
+  options.chunks = false;
+  ExpectSame(ReadBytes(MakeMcap(messages, options)));
+}
+
+TEST_F(FormatsTest, Ros2Folder) {
+  const Folder folder;
+  WriteRosbag2(SimulatedMessages(Drive(), Laser(), kCdr), folder / "bag");
+  ExpectSame(ReadPath(folder / "bag"));
+  // The database by itself, and as a folder without its description.
+  ExpectSame(ReadPath(folder / "bag/bag_0.db3"));
+  fs::remove(folder / "bag/metadata.yaml");
+  const Log log = ReadPath(folder / "bag");
+  EXPECT_EQ(Skipped(log, "metadata.yaml"), 1);
+  EXPECT_EQ(log.scans.size(), carmen_.scans.size());
+}
+
+TEST(BagLogTest, TakesPosesAtTheTimeOfTheScan) {
+  for (const MessageEncoding encoding : {kRos1, kCdr}) {
+    const std::vector<BagRecord> records = SmallDrive(encoding);
+    const Log log =
+        ReadBytes(encoding == kRos1 ? MakeRosbag1(records) : MakeMcap(records));
+    ASSERT_EQ(log.scans.size(), 10u);
+    for (int i = 0; i < 10; ++i) {
+      const Scan& scan = log.scans[i];
+      EXPECT_NEAR(scan.odometry[0], 0.1 * i, 1e-9);
+      EXPECT_NEAR(scan.laser_offset[0], 0.2, 1e-9);
+      EXPECT_NEAR(scan.laser_offset[2], 0.1, 1e-9);
+      EXPECT_EQ(scan.ranges.size(), 5u);
+      EXPECT_NEAR(scan.angle_step, 0.5, 1e-7);
+    }
+    EXPECT_EQ(log.scans[1].timestamp_text, "1000.100000000");
+    EXPECT_EQ(log.position_unit, "message");
+    ASSERT_EQ(log.topics.size(), 3u);
+    EXPECT_THAT(log.topics, Contains(AllOf(Field(&LogTopic::name, "/scan"),
+                                           Field(&LogTopic::messages, 10),
+                                           Field(&LogTopic::use, "scans"))));
+    EXPECT_THAT(log.topics, Contains(AllOf(Field(&LogTopic::name, "/odom"),
+                                           Field(&LogTopic::use, "odometry"))));
+  }
+}
+
+TEST(BagLogTest, ReadsBigEndianMessages) {
+  std::vector<BagRecord> records;
+  for (int i = 0; i < 3; ++i) {
+    const LaserScanMessage scan = PlainScan(kStart + i * kSecond);
+    records.push_back({"/scan", "sensor_msgs/LaserScan", scan.header.stamp,
+                       EncodeLaserScan(scan, kCdr, true)});
+  }
+  const Log log = ReadBytes(MakeMcap(records));
+  ASSERT_EQ(log.scans.size(), 3u);
+  EXPECT_EQ(log.scans[0].ranges, PlainScan(0).ranges);
+  EXPECT_EQ(log.scans[2].timestamp, 1002.0);
+}
+
+TEST(BagLogTest, MarksWhatIsNoReturn) {
+  LaserScanMessage scan = PlainScan(kStart);
+  const float infinity = std::numeric_limits<float>::infinity();
+  scan.ranges = {infinity, std::nanf(""), 0.0f, 0.05f, -1.0f, 10.0f, 5.0f};
+  scan.angle_increment = 0.1;
+  const Log log = ReadBytes(MakeRosbag1({Record(scan, kRos1)}));
+  ASSERT_EQ(log.scans.size(), 1u);
+  EXPECT_EQ(log.scans[0].ranges,
+            (std::vector<float>{0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 5.0f}));
+}
+
+TEST(BagLogTest, TurnsScansCounterclockwise) {
+  LaserScanMessage scan = PlainScan(kStart);
+  scan.angle_min = 1.0;
+  scan.angle_increment = -0.5;
+  Log log = ReadBytes(MakeRosbag1({Record(scan, kRos1)}));
+  EXPECT_NEAR(log.scans[0].start_angle, -1.0, 1e-6);
+  EXPECT_NEAR(log.scans[0].angle_step, 0.5, 1e-6);
+  EXPECT_EQ(log.scans[0].ranges,
+            (std::vector<float>{5.0f, 4.0f, 3.0f, 2.0f, 1.0f}));
+
+  // A laser that hangs upside down sees its first beam on the other side.
+  TransformMessage mount =
+      Transform(kStart, "base_link", "laser", Pose2::Zero());
+  mount.transform.qx = 1.0;
+  mount.transform.qw = 0.0;
+  std::vector<BagRecord> records = {
+      TfRecord(mount, kRos1, "/tf_static"),
+      OdometryRecord(kStart, Pose2::Zero(), kRos1),
+      OdometryRecord(kStart + kSecond, Pose2(1.0, 0.0, 0.0), kRos1),
+      Record(PlainScan(kStart), kRos1)};
+  log = ReadBytes(MakeRosbag1(records));
+  EXPECT_NEAR(log.scans[0].start_angle, -1.0, 1e-6);
+  EXPECT_EQ(log.scans[0].ranges,
+            (std::vector<float>{5.0f, 4.0f, 3.0f, 2.0f, 1.0f}));
+  EXPECT_NEAR(log.scans[0].laser_offset[2], 0.0, 1e-9);
+}
+
+// A robot turns on the spot beside a wall; beams come one after another.
+TEST(BagLogTest, UndoesMotionDuringTheScan) {
+  constexpr double kRate = 1.0;      // rad/s
+  constexpr double kDuration = 0.2;  // s
+  constexpr int kBeams = 181;
+  for (const double offset : {0.0, 0.3}) {
+    std::vector<BagRecord> records;
+    records.push_back(TfRecord(
+        Transform(kStart, "base_link", "laser", Pose2(offset, 0.0, 0.0)), kRos1,
+        "/tf_static"));
+    for (int i = 0; i <= 100; ++i) {
+      records.push_back(OdometryRecord(kStart + i * kSecond / 100,
+                                       Pose2(0.0, 0.0, kRate * i / 100.0),
+                                       kRos1));
+    }
+    LaserScanMessage scan = PlainScan(kStart + kSecond / 10);
+    scan.angle_min = -0.5;
+    scan.angle_increment = 1.0 / (kBeams - 1);
+    scan.time_increment = kDuration / (kBeams - 1);
+    scan.ranges.clear();
+    for (int i = 0; i < kBeams; ++i) {
+      // The wall x = 2 of the world.
+      const double heading = kRate * (0.1 + kDuration * i / (kBeams - 1));
+      const double direction = heading - 0.5 + i * scan.angle_increment;
+      scan.ranges.push_back(static_cast<float>(
+          (2.0 - offset * std::cos(heading)) / std::cos(direction)));
+    }
+    records.push_back(Record(scan, kRos1));
+    const Log log = ReadBytes(MakeRosbag1(records));
+    ASSERT_EQ(log.scans.size(), 1u);
+    const Scan& undone = log.scans[0];
+    ASSERT_EQ(undone.bearings.size(), undone.ranges.size());
+    const Pose2 laser = Compose(undone.odometry, undone.laser_offset);
+    for (std::size_t i = 0; i < undone.ranges.size(); ++i) {
+      const double x =
+          laser[0] + undone.ranges[i] * std::cos(laser[2] + undone.Bearing(i));
+      EXPECT_NEAR(x, 2.0, 2e-4) << i;
+    }
+    EXPECT_THAT(log.notes, Contains(HasSubstr("motion during the scan")));
+  }
+}
+
+TEST(BagLogTest, OdometryOfTransforms) {
+  std::vector<BagRecord> records;
+  records.push_back(
+      TfRecord(Transform(kStart, "base_link", "laser", Pose2(0.1, 0.2, 0.0)),
+               kCdr, "/tf_static"));
+  for (int i = 0; i < 5; ++i) {
+    records.push_back(TfRecord(Transform(kStart + i * kSecond, "/odom",
+                                         "base_link", Pose2(i, 0.0, 0.0)),
+                               kCdr));
+    records.push_back(
+        Record(PlainScan(kStart + i * kSecond + kSecond / 4), kCdr));
+  }
+  Log log = ReadBytes(MakeMcap(records));
+  EXPECT_TRUE(log.has_odometry);
+  EXPECT_EQ(log.odometry_source, "tf odom -> base_link");
+  EXPECT_NEAR(log.scans[1].odometry[0], 1.25, 1e-9);
+  EXPECT_NEAR(log.scans[1].laser_offset[1], 0.2, 1e-9);
+
+  LaserOptions options;
+  options.odometry_topic = "none";
+  log = ReadBytes(MakeMcap(records), options);
+  EXPECT_FALSE(log.has_odometry);
+}
+
+TEST(BagLogTest, TfThatLacksTheLaserIsSaid) {
+  std::vector<BagRecord> records = SmallDrive(kRos1);
+  records.erase(records.begin());
+  const Log log = ReadBytes(MakeRosbag1(records));
+  EXPECT_EQ(log.scans[0].laser_offset, Pose2::Zero());
+  EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("'laser'"),
+                                        HasSubstr("robot's centre"))));
+}
+
+TEST(BagLogTest, SeveralTopicsNeedAChoice) {
+  std::vector<BagRecord> records = SmallDrive(kRos1);
+  records.push_back(Record(PlainScan(kStart + 5 * kSecond), kRos1, "/back"));
+  EXPECT_THAT(WhatOf(MakeRosbag1(records)),
+              AllOf(HasSubstr("/scan (10)"), HasSubstr("/back (1)"),
+                    HasSubstr("--scan_topic")));
+  LaserOptions options;
+  options.scan_topic = "back";
+  const Log log = ReadBytes(MakeRosbag1(records), options);
+  EXPECT_EQ(log.scans.size(), 1u);
+  EXPECT_EQ(log.scan_message, "/back");
+  options.scan_topic = "/front";
+  EXPECT_THAT(WhatOf(MakeRosbag1(records), options),
+              AllOf(HasSubstr("no topic /front"), HasSubstr("/back (1)")));
+  options.scan_topic = "/odom";
+  EXPECT_THAT(WhatOf(MakeRosbag1(records), options),
+              HasSubstr("messages of type nav_msgs/Odometry on /odom"));
+
+  records = SmallDrive(kRos1);
+  records.push_back(
+      OdometryRecord(kStart, Pose2(5.0, 0.0, 0.0), kRos1, "/wheels"));
+  EXPECT_THAT(WhatOf(MakeRosbag1(records)),
+              AllOf(HasSubstr("/odom (11)"), HasSubstr("/wheels (1)"),
+                    HasSubstr("--odometry_topic")));
+  options = LaserOptions();
+  options.odometry_topic = "/odom";
+  EXPECT_NEAR(ReadBytes(MakeRosbag1(records), options).scans[1].odometry[0],
+              0.1, 1e-9);
+  options.odometry_topic = "tf";
+  EXPECT_THAT(WhatOf(MakeRosbag1(records), options),
+              HasSubstr("frame called odom"));
+}
+
+TEST(BagLogTest, ListsWhatIsThereWhenThereIsNoScan) {
+  std::vector<LogTopic> topics;
+  LaserOptions options;
+  options.on_topics = [&](const std::vector<LogTopic>& t) { topics = t; };
+  const std::string bag =
+      MakeRosbag1({OdometryRecord(kStart, Pose2::Zero(), kRos1)});
+  EXPECT_THAT(WhatOf(bag, options),
+              AllOf(HasSubstr("/odom (nav_msgs/Odometry, 1)"),
+                    HasSubstr("sensor_msgs/LaserScan")));
+  ASSERT_EQ(topics.size(), 1u);
+  EXPECT_EQ(topics[0].name, "/odom");
+}
+
+TEST(BagLogTest, OrdersScansWithinASecond) {
+  std::vector<BagRecord> records;
+  for (const int i : {0, 2, 1, 3}) {
+    records.push_back(Record(PlainScan(kStart + i * kSecond / 10), kRos1));
+  }
+  // A clock that was set back by a minute is meant.
+  records.push_back(Record(PlainScan(kStart - 60 * kSecond), kRos1));
+  const Log log = ReadBytes(MakeRosbag1(records));
+  ASSERT_EQ(log.scans.size(), 5u);
+  EXPECT_NEAR(log.scans[1].timestamp, 1000.1, 1e-9);
+  EXPECT_NEAR(log.scans[4].timestamp, 940.0, 1e-9);
+  EXPECT_EQ(log.time_reversals, 1);
+  EXPECT_THAT(log.notes, Contains(HasSubstr("out of order")));
+}
+
+TEST(BagLogTest, ClocksThatDifferAreAligned) {
+  std::vector<BagRecord> records = SmallDrive(kRos1);
+  // The robot's clock is an hour behind that of the laser's computer; messages
+  // were recorded at the same time.
+  std::vector<BagRecord> changed;
+  for (const BagRecord& record : records) {
+    if (record.topic != "/odom") {
+      changed.push_back(record);
+      continue;
+    }
+    OdometryMessage odometry;
+    std::string why;
+    ASSERT_TRUE(DecodeOdometry(record.data, kRos1, &odometry, &why));
+    odometry.header.stamp -= 900 * kSecond;
+    BagRecord moved = record;
+    moved.data = EncodeOdometry(odometry, kRos1);
+    changed.push_back(moved);
+  }
+  const Log log = ReadBytes(MakeRosbag1(changed));
+  EXPECT_NEAR(log.scans[3].odometry[0], 0.3, 1e-9);
+  EXPECT_THAT(log.notes, Contains(HasSubstr("another clock")));
+}
+
+TEST(BagLogTest, YawRatesServeWhereThereIsNoOdometry) {
+  std::vector<BagRecord> records;
+  for (int i = 0; i < 5; ++i) {
+    ImuMessage imu;
+    imu.header = {kStart + i * kSecond / 10, "imu"};
+    imu.yaw_rate = 0.1 * i;
+    records.push_back(
+        {"/imu", "sensor_msgs/Imu", imu.header.stamp, EncodeImu(imu, kCdr)});
+    records.push_back(Record(PlainScan(imu.header.stamp), kCdr));
+  }
+  const Log log = ReadBytes(MakeMcap(records));
+  EXPECT_FALSE(log.has_odometry);
+  ASSERT_EQ(log.yaw_rates.size(), 5u);
+  EXPECT_NEAR(log.yaw_rates[3].rate, 0.3, 1e-12);
+  EXPECT_EQ(log.yaw_rate_source, "/imu");
+}
+
+// Bad input.
+
+TEST(BadBagTest, OldVersionIsRefusedByName) {
+  EXPECT_THAT(WhatOf("#ROSBAG V1.2\nsomething"),
+              AllOf(HasSubstr("version 1.2"), HasSubstr("2.0")));
+}
+
+TEST(BadBagTest, EveryCutIsSaidOrRefused) {
+  const std::vector<BagRecord> ros1 = SmallDrive(kRos1);
+  const std::vector<BagRecord> cdr = SmallDrive(kCdr);
+  std::vector<std::pair<std::string, std::string>> bags;
+  for (const char* compression : {"none", "bz2", "lz4", "zstd"}) {
+    BagWriterOptions options;
+    options.compression = compression;
+    options.chunk_size = 700;
+    if (std::string(compression) != "zstd") {
+      bags.emplace_back(std::string("ros1 ") + compression,
+                        MakeRosbag1(ros1, options));
+    }
+    if (std::string(compression) != "bz2") {
+      bags.emplace_back(std::string("mcap ") + compression,
+                        MakeMcap(cdr, options));
+    }
+  }
+  for (const auto& [name, bytes] : bags) {
+    for (int k = 1; k < 50; ++k) {
+      SCOPED_TRACE(name + " cut at " + std::to_string(k) + "/50");
+      const std::string cut = bytes.substr(0, bytes.size() * k / 50);
+      try {
+        const Log log = ReadBytes(cut);
+        // Half a map is never silent. What is cut off behind the last message,
+        // the index, is no loss.
+        if (log.scans.size() < 10) {
+          EXPECT_THAT(log.skipped, Not(IsEmpty()));
+        }
+      } catch (const Error& error) {
+        EXPECT_THAT(error.what(), HasSubstr("bag"));
+      }
+    }
+  }
+}
+
+TEST(BadBagTest, EveryCutOfADatabaseIsSaidOrRefused) {
+  const Folder folder;
+  // Several pages of it.
+  std::vector<BagRecord> records;
+  for (int i = 0; i < 20; ++i) {
+    for (BagRecord record : SmallDrive(kCdr)) {
+      record.time += 10 * i * kSecond;
+      records.push_back(record);
+    }
+  }
+  WriteRosbag2(records, folder / "whole");
+  std::ifstream file(folder / "whole/whole_0.db3", std::ios::binary);
+  std::stringstream whole;
+  whole << file.rdbuf();
+  const std::string bytes = whole.str();
+  for (int k = 1; k < 50; ++k) {
+    SCOPED_TRACE("cut at " + std::to_string(k) + "/50");
+    const std::string path = folder / "cut.db3";
+    WriteText(path, bytes.substr(0, bytes.size() * k / 50));
+    try {
+      const Log log = ReadPath(path);
+      EXPECT_THAT(log.skipped, Not(IsEmpty()));
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("cut.db3"));
+    }
+  }
+}
+
+TEST(BadBagTest, IndexThatLiesAboutItsSizeIsSurvived) {
+  BagWriterOptions options;
+  options.chunk_size = 700;
+  std::string bag = MakeRosbag1(SmallDrive(kRos1), options);
+  // The size behind the first index's header.
+  const std::size_t op = bag.find("op=\x04");
+  ASSERT_NE(op, std::string::npos);
+  const std::size_t size = bag.find("ver=", op) + 8;
+  ASSERT_LT(static_cast<unsigned char>(bag[size]), 128);
+  bag[size] = static_cast<char>(bag[size] + 100);
+  const Log log = ReadBytes(bag);
+  EXPECT_EQ(log.scans.size(), 10u);
+  EXPECT_EQ(Skipped(log, "index that states another size"), 1);
+}
+
+TEST(BadBagTest, ChunkThatLiesAboutItsSizeIsSurvived) {
+  for (const char* compression : {"bz2", "lz4"}) {
+    for (const int difference : {-30, 40}) {
+      SCOPED_TRACE(std::string(compression) + std::to_string(difference));
+      BagWriterOptions options;
+      options.compression = compression;
+      options.chunk_size = 700;
+      std::string bag = MakeRosbag1(SmallDrive(kRos1), options);
+      const std::size_t place = bag.find("size=", bag.find("op=\x05")) + 9;
+      std::uint32_t size = 0;
+      std::memcpy(&size, &bag[place], 4);
+      size = static_cast<std::uint32_t>(static_cast<int>(size) + difference);
+      std::memcpy(&bag[place], &size, 4);
+      const Log log = ReadBytes(bag);
+      EXPECT_EQ(log.scans.size(), 10u);
+      EXPECT_GE(Skipped(log, "states another size"), 1);
+    }
+  }
+}
+
+TEST(BadBagTest, DamagedChunksAreCounted) {
+  for (const char* compression : {"none", "lz4", "zstd"}) {
+    SCOPED_TRACE(compression);
+    BagWriterOptions options;
+    options.compression = compression;
+    options.chunk_size = 700;
+    std::string bag = MakeMcap(SmallDrive(kCdr), options);
+    bag[bag.size() / 2] = static_cast<char>(bag[bag.size() / 2] ^ 0x55);
+    const Log log = ReadBytes(bag);
+    EXPECT_LT(log.scans.size(), 10u);
+    EXPECT_GT(log.scans.size(), 3u);
+    EXPECT_THAT(log.skipped,
+                Contains(Field(&SkipReport::reason, HasSubstr("chunk"))));
+  }
+}
+
+TEST(BadBagTest, UnknownCompressionIsCounted) {
+  std::string bag = MakeRosbag1(SmallDrive(kRos1));
+  const std::size_t place = bag.find("compression=none");
+  bag.replace(place, 16, "compression=rar5");
+  EXPECT_THAT(WhatOf(bag), AllOf(HasSubstr("unknown compression 'rar5'"),
+                                 HasSubstr("none, bz2 and lz4 are known")));
+  BagWriterOptions options;
+  options.compression = "zstd";
+  bag = MakeMcap(SmallDrive(kCdr), options);
+  bag.replace(bag.find("zstd"), 4, "rar5");
+  EXPECT_THAT(WhatOf(bag), HasSubstr("unknown compression 'rar5'"));
+}
+
+TEST(BadBagTest, FourGibibyteLengthsAreSurvived) {
+  // Of every place where a length may stand: nothing crashes, nothing is taken
+  // into memory that is not there.
+  const std::vector<std::string> bags = {
+      MakeRosbag1({Record(PlainScan(kStart), kRos1),
+                   Record(PlainScan(kStart + kSecond), kRos1)}),
+      MakeMcap({Record(PlainScan(kStart), kCdr),
+                Record(PlainScan(kStart + kSecond), kCdr)})};
+  for (const std::string& bag : bags) {
+    const std::size_t begin = bag.size() > 4109 ? 4109 : 8;
+    for (std::size_t i = begin; i + 4 <= std::min(bag.size(), begin + 900);
+         ++i) {
+      std::string changed = bag;
+      changed.replace(i, 4, "\xff\xff\xff\xff");
+      WhatOf(changed);
+    }
+  }
+}
+
+TEST(BadBagTest, MessagesWithoutBytesAreCounted) {
+  std::vector<BagRecord> records = SmallDrive(kCdr);
+  records.push_back({"/scan", "sensor_msgs/LaserScan", kStart, ""});
+  records.push_back({"/odom", "nav_msgs/Odometry", kStart, ""});
+  records.push_back({"/tf_static", "tf2_msgs/TFMessage", kStart, ""});
+  // And one in another representation.
+  records.push_back({"/scan", "sensor_msgs/LaserScan", kStart,
+                     std::string("\0\x07\0\0rest", 8)});
+  const Log log = ReadBytes(MakeMcap(records));
+  EXPECT_EQ(log.scans.size(), 10u);
+  EXPECT_EQ(Skipped(log, "LaserScan on /scan that has no bytes"), 1);
+  EXPECT_EQ(Skipped(log, "Odometry on /odom that has no bytes"), 1);
+  EXPECT_EQ(Skipped(log, "TFMessage on /tf_static that has no bytes"), 1);
+  EXPECT_EQ(Skipped(log, "no plain CDR"), 1);
+}
+
+TEST(BadBagTest, TopicsOfAnotherTypeAndDefinition) {
+  std::vector<BagRecord> records = SmallDrive(kRos1);
+  records.push_back({"/points", "sensor_msgs/PointCloud2", kStart, "junk"});
+  EXPECT_EQ(ReadBytes(MakeRosbag1(records)).scans.size(), 10u);
+  std::string bag = MakeRosbag1(SmallDrive(kRos1));
+  const std::string md5 = "90c7ef2dc6895d81024acba2ac42f369";
+  for (std::size_t i = 0; (i = bag.find(md5, i)) != std::string::npos;) {
+    bag[i] = '8';
+  }
+  EXPECT_THAT(WhatOf(bag), HasSubstr("another definition"));
+}
+
+TEST(BadBagTest, McapWithoutASchema) {
+  std::string bag = MakeMcap({Record(PlainScan(kStart), kCdr)});
+  // The channel's record: opcode 4, length, its number, the schema's.
+  const std::size_t topic = bag.find("/scan", bag.find("cdr") - 20);
+  const std::size_t schema = topic - 4 - 2;
+  bag[schema] = 9;
+  // Chunks have checksums.
+  const std::size_t chunk = bag.find('\x06', 30);
+  for (std::size_t i = 0; i < 4; ++i) bag[chunk + 9 + 24 + i] = 0;
+  EXPECT_THAT(WhatOf(bag), HasSubstr("no schema says what type"));
+}
+
+TEST(BadBagTest, AbsurdAnglesAndPosesAreCounted) {
+  std::vector<BagRecord> records = SmallDrive(kRos1);
+  LaserScanMessage scan = PlainScan(kStart + 2 * kSecond);
+  scan.angle_increment = 100.0;
+  records.push_back(Record(scan, kRos1));
+  scan = PlainScan(kStart + 2 * kSecond);
+  scan.ranges.clear();
+  records.push_back(Record(scan, kRos1));
+  OdometryMessage odometry;
+  odometry.header = {kStart, "odom"};
+  odometry.pose.x = std::nan("");
+  records.push_back(
+      {"/odom", "nav_msgs/Odometry", kStart, EncodeOdometry(odometry, kRos1)});
+  const Log log = ReadBytes(MakeRosbag1(records));
+  EXPECT_EQ(log.scans.size(), 10u);
+  EXPECT_EQ(Skipped(log, "absurd angles"), 1);
+  EXPECT_EQ(Skipped(log, "no readings"), 1);
+  EXPECT_EQ(Skipped(log, "has no pose"), 1);
+}
+
+TEST(BadBagTest, FolderWithoutItsFiles) {
+  const Folder folder;
+  fs::create_directories(folder / "bag");
+  WriteText(folder / "bag/metadata.yaml",
+            "rosbag2_bagfile_information:\n  relative_file_paths:\n"
+            "    - gone_0.db3\n");
+  try {
+    ReadPath(folder / "bag");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("gone_0.db3"));
+  }
+}
+
+// Real bags.
+
+std::string Dataset(const std::string& name) {
+  const char* const folder = std::getenv("PLUMBLINE_DATASETS");
+  if (folder == nullptr) return "";
+  const std::string path = std::string(folder) + "/bags/" + name;
+  return fs::exists(path) ? path : "";
+}
+
+TEST(RealBagTest, Turtlebot3) {
+  const std::string path = Dataset("ros1/turtlebot3.bag");
+  if (path.empty()) GTEST_SKIP() << "PLUMBLINE_DATASETS has no bags";
+  const Log log = ReadPath(path);
+  EXPECT_EQ(log.scans.size(), 457u);
+  EXPECT_EQ(log.messages.at("/odom"), 2741);
+  EXPECT_TRUE(log.has_odometry);
+  EXPECT_THAT(log.skipped, IsEmpty());
+  EXPECT_EQ(log.scans[0].ranges.size(), 360u);
+}
+
+TEST(RealBagTest, SlowHalfHallway) {
+  const std::string path = Dataset("ros2/slow_half_hallway");
+  if (path.empty()) GTEST_SKIP() << "PLUMBLINE_DATASETS has no bags";
+  const Log log = ReadPath(path);
+  EXPECT_EQ(log.scans.size(), 789u);
+  EXPECT_EQ(log.yaw_rates.size(), 3369u);
+  EXPECT_FALSE(log.has_odometry);
+  EXPECT_THAT(log.skipped, IsEmpty());
+}
+
+TEST(RealBagTest, OthersAreRefusedWithWhatTheyHold) {
+  if (Dataset("ros1").empty()) {
+    GTEST_SKIP() << "PLUMBLINE_DATASETS has no bags";
+  }
+  for (const auto& [name, holds] :
+       std::vector<std::pair<std::string, std::string>>{
+           {"ros1/example.bag", "/tf (tf/tfMessage, 2688)"},
+           {"ros1/example-bz2.bag", "/tf (tf/tfMessage, 2688)"},
+           {"ros1/example-lz4.bag", "/tf (tf/tfMessage, 2688)"},
+           {"ros1/no-messages.bag", "no topics"},
+           {"ros1/tf_example.bag", "/tf (tf2_msgs/TFMessage, 517)"},
+           {"ros2/tf_example", "/tf (tf2_msgs/TFMessage, 517)"},
+           {"ros2/nav2_turtlebot.mcap", "/odom (nav_msgs/Odometry, 2639)"}}) {
+    try {
+      ReadPath(Dataset(name));
+      ADD_FAILURE() << name;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(holds)) << name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -17,10 +17,9 @@
 #include <thread>
 #include <utility>
 
-DEFINE_string(
-    input, "",
-    "Robot log (ROS 1 or 2 bag, a file or a folder; CARMEN; CSV) or graph "
-    "(g2o), plain or compressed; - reads standard input");
+DEFINE_string(input, "",
+              "Robot log (ROS 1 or 2 bag, a file or a folder; CARMEN) or graph "
+              "(g2o), plain or compressed; - reads standard input");
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 DEFINE_string(log_reader, "",
               "Format of the log; empty: recognized by content");

@@ -25,6 +25,7 @@ class StateWriter {
  public:
   static constexpr bool kReads = false;
 
+  /// Appends the `size` bytes at `data`.
   void Bytes(void* data, std::size_t size) {
     bytes_.append(static_cast<const char*>(data), size);
   }
@@ -42,6 +43,7 @@ class StateReader {
   /// `bytes` must outlive it.
   explicit StateReader(std::string_view bytes) : bytes_(bytes) {}
 
+  /// Takes the next `size` bytes to `data`.
   void Bytes(void* data, std::size_t size) {
     if (size > bytes_.size()) {
       throw PLUMBLINE_ERROR("the state ends too early", "a whole one");

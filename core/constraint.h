@@ -39,9 +39,25 @@ struct Constraint {
   /// measurements. The frozen loss reads it from here, so its address is
   /// stable.
   double delta = 1.0;
-  /// Who proposed it.
+  /// Label in files and reports: who proposed it. Nothing is decided by it.
   std::string source;
 };
+
+/// A live measurement: what the sensors say of these features.
+Constraint MakeMeasurement(const RelationType& type,
+                           std::vector<FeatureId> features,
+                           Eigen::VectorXd expected,
+                           Eigen::MatrixXd information, std::string source);
+
+/// A live hypothesis about the structure of these features.
+Constraint MakeStructure(const RelationType& type,
+                         std::vector<FeatureId> features,
+                         Eigen::VectorXd expected, Eigen::MatrixXd information,
+                         std::string source);
+
+/// The information of rows that are independent of each other: `sigmas` are
+/// their standard deviations (tolerances), in the units of the rows, above 0.
+Eigen::MatrixXd InformationFromSigmas(const Eigen::VectorXd& sigmas);
 
 }  // namespace plumbline
 

@@ -47,6 +47,11 @@ struct DetectionScope {
   }
 };
 
+/// What a detector looks at: the features of the scope's level, ascending. On a
+/// level above 0 these are virtual ones.
+std::vector<const Feature*> FeaturesInScope(const Graph& graph,
+                                            const DetectionScope& scope);
+
 /// Reads the features of one level and proposes what is seen in them: virtual
 /// features one level up with constraints down to what supports them, or
 /// constraints between features of the level. It never changes the graph, and

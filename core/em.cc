@@ -52,7 +52,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
         options(options_in),
         schedule(graph, session, options),
         judge(std::move(judge_in)),
-        support(graph, hierarchy),
+        support(graph, hierarchy, registry),
         memory(graph, options),
         filter(graph, options.relation_priors, &memory, &support) {
     if (judge == nullptr) {

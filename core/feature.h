@@ -24,7 +24,8 @@ constexpr int kMaxAnchorSize = 3;
 /// number which is none is refused.
 constexpr int kMaxLevel = 1000;
 
-struct FeatureType;  // core/registry.h
+struct DetectorType;  // core/registry.h
+struct FeatureType;   // core/registry.h
 
 /// A node of the graph: something with parameters to be estimated (method.md,
 /// section 3). Built-in types and the order of their parameters:
@@ -67,7 +68,12 @@ struct Feature {
   double extent_end = 0.0;
   /// How many scans saw it (0 for virtual features).
   int observations = 0;
-  /// Who put it there: "frontend", a reader, or a detector's name.
+  /// The detector whose rules of support keep it alive (SupportPolicy): the one
+  /// that made it. The orchestrator and readers of files set it; null for raw
+  /// features.
+  const DetectorType* maker = nullptr;
+  /// Label in files and reports: "frontend", a reader, a detector's name.
+  /// Nothing is decided by it.
   std::string source;
 
   /// The parameter block, type->size numbers.

@@ -301,7 +301,7 @@ class Reader {
  public:
   Reader(const std::string& name, const Registry& registry,
          const G2oOptions& options)
-      : name_(name) {
+      : name_(name), registry_(registry) {
     file_.options = options;
     for (const FeatureType* type : registry.features()) {
       feature_types_[type->name] = type;
@@ -728,6 +728,9 @@ class Reader {
       feature.extent_end = own.attributes.extent_end;
       feature.observations = own.attributes.observations;
       feature.source = own.attributes.source;
+      if (feature.is_virtual) {
+        feature.maker = registry_.FindDetector(feature.source);
+      }
     }
     for (const Feature& feature : features_) transaction->AddFeature(feature);
   }
@@ -793,6 +796,7 @@ class Reader {
   const std::string& name_;
   std::unordered_map<std::string, VertexTag> vertex_tags_;
   std::unordered_map<std::string, EdgeTag> edge_tags_;
+  const Registry& registry_;
   std::unordered_map<std::string, const FeatureType*> feature_types_;
   int line_ = 0;
   std::vector<std::string_view> fields_;

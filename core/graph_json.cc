@@ -274,6 +274,7 @@ Feature ReadFeature(const Node& node, const Registry& registry) {
   feature.observations =
       static_cast<int>(node.Get("observations").Integer(kLargestInt));
   feature.source = node.Get("source").String();
+  if (feature.is_virtual) feature.maker = registry.FindDetector(feature.source);
   return feature;
 }
 

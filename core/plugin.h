@@ -9,7 +9,7 @@ namespace plumbline {
 
 /// Version of the plug-in interface: changes whenever core/registry.h,
 /// core/detector.h or what they include changes its layout.
-constexpr int kPluginInterfaceVersion = 5;
+constexpr int kPluginInterfaceVersion = 6;
 
 /// What a plug-in's shared object exports, with C linkage, under the names
 /// below:

@@ -203,6 +203,7 @@ Transaction ProposalFilter::Filter(Transaction proposal,
   std::vector<Feature>& features = proposal.added_features();
   for (Feature& feature : features) {
     feature.is_virtual = true;
+    feature.maker = support_->TypeOf(detector);
     if (feature.source.empty()) feature.source = detector.name();
   }
   ProposedFeatures proposed(graph_, &features);
@@ -280,11 +281,8 @@ bool ProposalFilter::ApplyPrior(Constraint* constraint) const {
         "prior of " + found->first + " has " + std::to_string(rows) + " sigmas",
         std::to_string(constraint->type->residual_size));
   }
-  constraint->information =
-      Eigen::Map<const Eigen::VectorXd>(sigmas.data(), rows)
-          .cwiseAbs2()
-          .cwiseInverse()
-          .asDiagonal();
+  constraint->information = InformationFromSigmas(
+      Eigen::Map<const Eigen::VectorXd>(sigmas.data(), rows));
   return true;
 }
 

@@ -118,6 +118,10 @@ std::string RelationType::AcceptedNames(std::size_t place) const {
   return names;
 }
 
+bool DetectorType::Reads(const FeatureType& type) const {
+  return std::count(reads.begin(), reads.end(), type.name) > 0;
+}
+
 DetectorParameters DetectorType::defaults() const {
   DetectorParameters values;
   for (const DetectorParameter& parameter : parameters) {

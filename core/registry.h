@@ -207,6 +207,8 @@ struct DetectorType {
 
   /// The parameters that are no lists, at their defaults.
   DetectorParameters defaults() const;
+  /// Whether it reads features of the type.
+  bool Reads(const FeatureType& type) const;
 };
 
 /// The plug-ins by name: the kinds that core works with, and any other that a

@@ -5,11 +5,11 @@
 #include <plumbline/core/information.h>
 #include <plumbline/core/resident_minimizer.h>
 #include <plumbline/core/session.h>
+#include <plumbline/core/stopwatch.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/factors/chi_square.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -32,11 +32,6 @@ constexpr double kDenseWork = 3e5;
 // Steps in a row that may lead uphill on the way to a lower cost.
 constexpr int kUphillSteps = 3;
 constexpr int kUnknownRank = -1;
-
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
-      .count();
-}
 
 // Some builds of CHOLMOD start a hard-coded number of OpenMP threads whatever
 // the machine, which makes factorizations slower. While this lives, OpenMP
@@ -326,8 +321,7 @@ struct SolverSession::Impl {
                     const std::vector<Block*>& variables, int num_residuals,
                     int rows, int columns, int num_threads,
                     double function_tolerance, double trust_region_radius,
-                    bool is_coarse,
-                    std::chrono::steady_clock::time_point start) {
+                    bool is_coarse, const Stopwatch& watch) {
     SolveReport report;
     report.residual_blocks = num_residuals;
     report.variable_blocks = static_cast<int>(variables.size());
@@ -395,7 +389,7 @@ struct SolverSession::Impl {
         report.message = summary.message;
       }
     }
-    report.total_seconds = SecondsSince(start);
+    report.total_seconds = watch.Seconds();
     report.setup_seconds =
         std::max(0.0, report.total_seconds - report.evaluation_seconds -
                           report.linear_solver_seconds);
@@ -405,7 +399,7 @@ struct SolverSession::Impl {
 
   SolveReport SolveGlobal(double function_tolerance, double trust_region_radius,
                           bool is_coarse) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     for (Block& block : blocks) {
       if (block.residuals > 0) SetConstant(&block, block.feature->fixed);
     }
@@ -419,7 +413,7 @@ struct SolverSession::Impl {
     }
     return Solve(&problem, variables, problem.NumResidualBlocks(),
                  problem.NumResiduals(), columns, options.num_threads,
-                 function_tolerance, trust_region_radius, is_coarse, start);
+                 function_tolerance, trust_region_radius, is_coarse, watch);
   }
 
   void AddToTotals(const SolveReport& report) {
@@ -562,7 +556,7 @@ SolveReport SolverSession::SolveGlobal(double function_tolerance,
 }
 
 SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   std::vector<FeatureId> ids;
   for (const FeatureId id : features) {
     const Feature* feature = impl_->graph->FindFeature(id);
@@ -623,7 +617,7 @@ SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
                       rows, columns, /*num_threads=*/1,
                       impl_->options.function_tolerance,
                       impl_->options.initial_trust_region_radius,
-                      /*is_coarse=*/false, start);
+                      /*is_coarse=*/false, watch);
 }
 
 void SolverSession::SetStop(std::function<bool()> stop) {

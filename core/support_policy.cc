@@ -23,11 +23,12 @@ FeatureId Followed(const Constraint& constraint, FeatureId follower) {
 
 }  // namespace
 
-SupportPolicy::SupportPolicy(Graph* graph, const Hierarchy& hierarchy)
+SupportPolicy::SupportPolicy(Graph* graph, const Hierarchy& hierarchy,
+                             const Registry& registry)
     : graph_(graph) {
   for (const auto& level : hierarchy) {
     for (const auto& detector : level) {
-      detectors_[detector->name()] = detector.get();
+      detectors_[&registry.GetDetector(detector->name())] = detector.get();
     }
   }
 }
@@ -79,6 +80,14 @@ bool SupportPolicy::DropUnsupported() {
   return has_dropped;
 }
 
+const DetectorType* SupportPolicy::TypeOf(
+    const StructureDetector& detector) const {
+  for (const auto& [type, its_detector] : detectors_) {
+    if (its_detector->name() == detector.name()) return type;
+  }
+  return nullptr;
+}
+
 bool SupportPolicy::MayBeAdded(const StructureDetector& detector, FeatureId id,
                                const FeatureSupport& support) const {
   if (!IsEnough(detector, support)) return false;
@@ -90,7 +99,7 @@ bool SupportPolicy::MayBeAdded(const StructureDetector& detector, FeatureId id,
 
 // Null when it is none of the hierarchy's.
 const StructureDetector* SupportPolicy::MakerOf(const Feature& feature) const {
-  const auto found = detectors_.find(feature.source);
+  const auto found = detectors_.find(feature.maker);
   return found == detectors_.end() ? nullptr : found->second;
 }
 

@@ -3,10 +3,10 @@
 
 #include <plumbline/core/graph.h>
 #include <plumbline/core/hierarchy.h>
+#include <plumbline/core/registry.h>
 
 #include <map>
 #include <set>
-#include <string>
 #include <vector>
 
 namespace plumbline {
@@ -36,8 +36,10 @@ struct FeatureSupport {
 /// and dropped for ever.
 class SupportPolicy {
  public:
-  /// Neither is owned; both must outlive the policy.
-  SupportPolicy(Graph* graph, const Hierarchy& hierarchy);
+  /// None is owned; all must outlive the policy. Throws Error when a detector
+  /// is not registered.
+  SupportPolicy(Graph* graph, const Hierarchy& hierarchy,
+                const Registry& registry);
 
   /// A live constraint was broken or removed: the virtual features on it are
   /// looked at by the next DropUnsupported.
@@ -54,6 +56,10 @@ class SupportPolicy {
   /// were any.
   bool DropUnsupported();
 
+  /// What a feature made by this detector of the hierarchy has for its maker;
+  /// null when the hierarchy has no such detector.
+  const DetectorType* TypeOf(const StructureDetector& detector) const;
+
   /// Whether a virtual feature of this detector may be added with such support.
   /// `id` is the one that the constraints have for it.
   bool MayBeAdded(const StructureDetector& detector, FeatureId id,
@@ -64,7 +70,8 @@ class SupportPolicy {
   FeatureSupport SupportOf(const Feature& feature) const;
 
   Graph* graph_;
-  std::map<std::string, const StructureDetector*> detectors_;
+  // Of the hierarchy, by type.
+  std::map<const DetectorType*, const StructureDetector*> detectors_;
   // Virtual features that lost a constraint.
   std::set<FeatureId> lost_support_;
   // Features and the relations through which each alone made a virtual feature

@@ -126,6 +126,79 @@ void BindClusters(ParameterBinder* parameters, CenterClusterOptions* options) {
                     "fewest circles that make a common centre");
 }
 
+// Whether a live constraint ties the circle to a common centre one level up.
+bool HasCenter(const Graph& graph, const Feature& circle) {
+  for (const ConstraintId id : graph.ConstraintsOf(circle.id)) {
+    const Constraint& constraint = graph.GetConstraint(id);
+    if (constraint.state != ConstraintState::kLive ||
+        constraint.kind != ConstraintClass::kStructure ||
+        !constraint.type->Is(RelationRole::kCoincidence)) {
+      continue;
+    }
+    for (const FeatureId other_id : constraint.features) {
+      const Feature& other = graph.GetFeature(other_id);
+      if (other.is_virtual && other.level == circle.level + 1) return true;
+    }
+  }
+  return false;
+}
+
+// Circles of the scope that have no common centre yet.
+std::vector<Circle> CirclesWithoutCenter(const Graph& graph,
+                                         const DetectionScope& scope,
+                                         double gate) {
+  std::vector<Circle> circles;
+  for (const Feature* feature : FeaturesInScope(graph, scope)) {
+    if (!feature->type->Is(FeatureRole::kCircle) || HasCenter(graph, *feature))
+      continue;
+    Circle circle;
+    circle.id = feature->id;
+    circle.center = {feature->parameters[0], feature->parameters[1]};
+    // Columns side by side are not concentric.
+    circle.gate = std::min(gate, 0.5 * std::abs(feature->parameters[2]));
+    if (!circle.center.allFinite() || !std::isfinite(circle.gate)) continue;
+    circles.push_back(circle);
+  }
+  return circles;
+}
+
+// Centres that are in the graph, with their features.
+struct KnownCenters {
+  std::vector<FeatureId> ids;
+  std::vector<Eigen::Vector2d> positions;
+};
+
+KnownCenters ReadCenters(const Graph& graph, int level) {
+  KnownCenters known;
+  for (const FeatureId id : graph.VirtualFeatures(level)) {
+    const Feature& feature = graph.GetFeature(id);
+    const Eigen::Vector2d position(feature.parameters[0],
+                                   feature.parameters[1]);
+    if (!feature.type->Is(FeatureRole::kPoint) || !position.allFinite()) {
+      continue;
+    }
+    known.ids.push_back(id);
+    known.positions.push_back(position);
+  }
+  return known;
+}
+
+// Gives circles without a centre the nearest within their gates; `members`
+// counts the circles of each centre. True when there was one.
+bool Assign(const Centers& centers, std::vector<Circle>* circles,
+            std::vector<int>* members) {
+  bool has_assigned = false;
+  members->resize(static_cast<std::size_t>(centers.size()), 0);
+  for (Circle& circle : *circles) {
+    if (circle.common >= 0) continue;
+    circle.common = centers.FindNearest(circle.center, circle.gate);
+    if (circle.common < 0) continue;
+    ++(*members)[static_cast<std::size_t>(circle.common)];
+    has_assigned = true;
+  }
+  return has_assigned;
+}
+
 }  // namespace
 
 CenterCluster::CenterCluster(std::string name,
@@ -134,73 +207,19 @@ CenterCluster::CenterCluster(std::string name,
 
 Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
                                   const DetectionScope& scope) const {
-  std::vector<Circle> circles;
-  const auto consider = [&](const Feature& feature) {
-    if (feature.level != scope.level || !feature.type->Is(FeatureRole::kCircle))
-      return;
-    for (const ConstraintId id : graph.ConstraintsOf(feature.id)) {
-      const Constraint& constraint = graph.GetConstraint(id);
-      if (constraint.state != ConstraintState::kLive ||
-          constraint.kind != ConstraintClass::kStructure ||
-          !constraint.type->Is(RelationRole::kCoincidence)) {
-        continue;
-      }
-      for (const FeatureId other_id : constraint.features) {
-        const Feature& other = graph.GetFeature(other_id);
-        if (other.is_virtual && other.level == scope.level + 1) return;
-      }
-    }
-    Circle circle;
-    circle.id = feature.id;
-    circle.center = {feature.parameters[0], feature.parameters[1]};
-    // Columns side by side are not concentric.
-    circle.gate =
-        std::min(options_.gate, 0.5 * std::abs(feature.parameters[2]));
-    if (!circle.center.allFinite() || !std::isfinite(circle.gate)) return;
-    circles.push_back(circle);
-  };
-  if (scope.features != nullptr) {
-    for (const FeatureId id : *scope.features) {
-      const Feature* feature = graph.FindFeature(id);
-      if (feature != nullptr) consider(*feature);
-    }
-  } else if (scope.level > 0) {
-    for (const FeatureId id : graph.VirtualFeatures(scope.level)) {
-      consider(graph.GetFeature(id));
-    }
-  } else {
-    for (const Feature* feature : graph.Features()) consider(*feature);
-  }
   Transaction transaction;
+  std::vector<Circle> circles =
+      CirclesWithoutCenter(graph, scope, options_.gate);
   if (circles.empty()) return transaction;
 
+  KnownCenters known = ReadCenters(graph, scope.level + 1);
   Centers centers(options_.gate);
-  std::vector<FeatureId> ids;
-  for (const FeatureId id : graph.VirtualFeatures(scope.level + 1)) {
-    const Feature& feature = graph.GetFeature(id);
-    const Eigen::Vector2d position(feature.parameters[0],
-                                   feature.parameters[1]);
-    if (!feature.type->Is(FeatureRole::kPoint) || !position.allFinite()) {
-      continue;
-    }
+  for (const Eigen::Vector2d& position : known.positions) {
     centers.Add(position);
-    ids.push_back(id);
   }
   const int num_existing = centers.size();
-  std::vector<int> members(ids.size(), 0);
-  const auto assign = [&] {
-    bool has_assigned = false;
-    members.resize(static_cast<std::size_t>(centers.size()), 0);
-    for (Circle& circle : circles) {
-      if (circle.common >= 0) continue;
-      circle.common = centers.FindNearest(circle.center, circle.gate);
-      if (circle.common < 0) continue;
-      ++members[static_cast<std::size_t>(circle.common)];
-      has_assigned = true;
-    }
-    return has_assigned;
-  };
-  assign();
+  std::vector<int> members;
+  Assign(centers, &circles, &members);
   // Until nothing is left that a later call would find.
   for (bool has_assigned = true; has_assigned;) {
     for (const Eigen::Vector2d& mean :
@@ -208,10 +227,11 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
                  static_cast<std::size_t>(options_.minimum_support))) {
       centers.Add(mean);
     }
-    has_assigned = assign();
+    has_assigned = Assign(centers, &circles, &members);
   }
 
   std::int64_t small = 0;
+  std::vector<FeatureId> ids = std::move(known.ids);
   ids.resize(static_cast<std::size_t>(centers.size()), kNoId);
   for (int i = num_existing; i < centers.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -237,15 +257,11 @@ Transaction CenterCluster::Detect(const Graph& graph, const Registry& registry,
       ++alone;
       continue;
     }
-    Constraint constraint;
-    constraint.type = &registry.GetRelation("point_point_coincidence");
-    constraint.features = {circle.id, common};
-    constraint.expected = Eigen::VectorXd::Zero(2);
-    constraint.information =
-        Eigen::MatrixXd::Identity(2, 2) / (options_.sigma * options_.sigma);
-    constraint.kind = ConstraintClass::kStructure;
-    constraint.source = name_;
-    transaction.AddConstraint(std::move(constraint));
+    transaction.AddConstraint(MakeStructure(
+        registry.GetRelation("point_point_coincidence"), {circle.id, common},
+        Eigen::Vector2d::Zero(),
+        InformationFromSigmas(Eigen::Vector2d::Constant(options_.sigma)),
+        name_));
   }
   scope.Count("circles", static_cast<std::int64_t>(circles.size()));
   scope.Count("circles refused: no centre in common", alone);

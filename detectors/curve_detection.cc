@@ -90,16 +90,12 @@ class CurveDetection {
       std::vector<int> joining = entry.joining;
       std::sort(joining.begin(), joining.end());
       for (const int i : joining) {
-        Constraint constraint;
-        constraint.type = &registry.GetRelation(
-            is_line ? "point_line_distance" : "point_circle_distance");
-        constraint.features = {points_.id(i), id};
-        constraint.expected = Eigen::VectorXd::Zero(1);
-        constraint.information = Eigen::MatrixXd::Constant(
-            1, 1, 1.0 / (options_.sigma * options_.sigma));
-        constraint.kind = ConstraintClass::kStructure;
-        constraint.source = source;
-        transaction.AddConstraint(std::move(constraint));
+        transaction.AddConstraint(MakeStructure(
+            registry.GetRelation(is_line ? "point_line_distance"
+                                         : "point_circle_distance"),
+            {points_.id(i), id}, Eigen::VectorXd::Zero(1),
+            InformationFromSigmas(Eigen::VectorXd::Constant(1, options_.sigma)),
+            source));
       }
     }
     return transaction;

@@ -2,9 +2,9 @@
 #define PLUMBLINE_DETECTORS_DEFAULT_HIERARCHY_H_
 
 #include <plumbline/core/hierarchy_spec.h>
+#include <plumbline/core/registry.h>
 
-#include <set>
-#include <string>
+#include <vector>
 
 namespace plumbline {
 
@@ -15,14 +15,19 @@ constexpr double kPointsLoopTolerance = 3e-4;
 /// The hierarchy that is looked for in a graph with these types of raw features
 /// when nothing is asked for (core/method.md, section 5):
 ///
-///   point          line_ransac,circle_ransac /
-///                  center_cluster,orientation_mixture / orientation_relation
-///   segment, line  orientation_mixture / orientation_relation
-///   circle         center_cluster
+///   points   line_ransac,circle_ransac /
+///            center_cluster,orientation_mixture / orientation_relation
+///   walls    orientation_mixture / orientation_relation
+///   circles  center_cluster
 ///
-/// Those of several types are laid over each other, level by level. Empty when
-/// no type has structure of its own (poses).
-HierarchySpec DefaultHierarchy(const std::set<std::string>& raw_feature_types);
+/// What a type is, its role says (FeatureTraits); one that the detectors of
+/// level 0 do not read counts as nothing. The hierarchies of several types are
+/// laid over each other, level by level. Empty when no type has structure of
+/// its own (poses). Throws Error when the built-in detectors are not
+/// registered.
+HierarchySpec DefaultHierarchy(
+    const std::vector<const FeatureType*>& raw_feature_types,
+    const Registry& registry);
 
 }  // namespace plumbline
 

@@ -1,6 +1,7 @@
+#include <plumbline/core/constraint_evaluation.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/detectors/map_directions.h>
-#include <plumbline/factors/information.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <memory>
 #include <set>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -50,8 +52,7 @@ struct Difference {
   double information = 0.0;
 };
 
-Difference DirectionOf(const Constraint& constraint, const Feature& first,
-                       const Feature& second) {
+Difference DirectionOf(const Graph& graph, const Constraint& constraint) {
   using RowMajor =
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Difference difference;
@@ -61,16 +62,15 @@ Difference DirectionOf(const Constraint& constraint, const Feature& first,
     difference.information = WithoutPosition(constraint.information);
     return difference;
   }
-  RelationArguments arguments;
-  arguments.expected = constraint.expected;
-  arguments.sqrt_information = SqrtInformation(constraint.information);
-  arguments.features = {&first, &second};
-  const auto cost = constraint.type->make_cost(arguments);
-  const double* parameters[] = {first.data(), second.data()};
+  const std::vector<const Feature*> features = FeaturesOf(graph, constraint);
+  const Feature& first = *features[0];
+  const Feature& second = *features[1];
+  const auto cost =
+      MakeCost(constraint, SqrtInformation(constraint.information), features);
   Eigen::VectorXd residual(constraint.type->residual_size);
   RowMajor jacobian(constraint.type->residual_size, second.type->size);
   double* jacobians[] = {nullptr, jacobian.data()};
-  if (!cost->Evaluate(parameters, residual.data(), jacobians) ||
+  if (!Evaluate(graph, constraint, *cost, residual.data(), jacobians) ||
       !residual.allFinite() || !jacobian.allFinite()) {
     return difference;
   }
@@ -130,8 +130,7 @@ MapDirections CollectDirections(const Graph& graph,
       }
       const auto second = result.nodes.find(constraint.features[1]);
       if (second == result.nodes.end() || second->second == node) continue;
-      const Difference difference = DirectionOf(
-          constraint, graph.GetFeature(id), graph.GetFeature(second->first));
+      const Difference difference = DirectionOf(graph, constraint);
       if (difference.information <= 0.0) continue;
       const double variance = 1.0 / difference.information;
       if (!(variance < DirectionNetwork::kUnknownVariance)) continue;

@@ -308,16 +308,12 @@ Transaction OrientationMixture::Detect(const Graph& graph,
     const RelationType* relation = registry.FindRelation(
         RelationRole::kDirection, *wall.type, orientation_type);
     if (relation == nullptr) return;
-    Constraint constraint;
-    constraint.type = relation;
-    constraint.features = {wall.id, orientation};
-    constraint.expected = Eigen::VectorXd::Constant(1, expected);
     const double variance =
         options_.sigma * options_.sigma + own_sigma * own_sigma;
-    constraint.information = Eigen::MatrixXd::Constant(1, 1, 1.0 / variance);
-    constraint.kind = ConstraintClass::kStructure;
-    constraint.source = kName;
-    transaction.AddConstraint(std::move(constraint));
+    transaction.AddConstraint(
+        MakeStructure(*relation, {wall.id, orientation},
+                      Eigen::VectorXd::Constant(1, expected),
+                      Eigen::MatrixXd::Constant(1, 1, 1.0 / variance), kName));
   };
   const auto add_orientation = [&](double angle) {
     Feature orientation;

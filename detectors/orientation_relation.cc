@@ -66,6 +66,78 @@ void Bind(ParameterBinder* parameters, OrientationRelationOptions* options) {
   if (!expected.empty()) options->angles = std::move(expected);
 }
 
+// Orientations of the scope's level: all virtual ones, and raw ones of the
+// scope, as files may have them.
+std::vector<const Feature*> OrientationsOf(const Graph& graph,
+                                           const DetectionScope& scope) {
+  std::set<FeatureId> ids(graph.VirtualFeatures(scope.level).begin(),
+                          graph.VirtualFeatures(scope.level).end());
+  for (const Feature* feature : FeaturesInScope(graph, scope)) {
+    ids.insert(feature->id);
+  }
+  std::vector<const Feature*> orientations;
+  for (const FeatureId id : ids) {
+    const Feature& feature = graph.GetFeature(id);
+    if (feature.type->Is(FeatureRole::kDirection)) {
+      orientations.push_back(&feature);
+    }
+  }
+  return orientations;
+}
+
+// Features that live constraints relate to an orientation at an angle, itself
+// included.
+std::set<FeatureId> RelatedTo(const Graph& graph, FeatureId orientation) {
+  std::set<FeatureId> related;
+  for (const ConstraintId id : graph.ConstraintsOf(orientation)) {
+    const Constraint& constraint = graph.GetConstraint(id);
+    if (constraint.state == ConstraintState::kLive &&
+        constraint.type->Is(RelationRole::kAngle)) {
+      related.insert(constraint.features.begin(), constraint.features.end());
+    }
+  }
+  return related;
+}
+
+// Judges relations by their innovation, where the poses that saw the walls are
+// in the graph: a small difference that is known well is one all the same.
+class RelationJudge {
+ public:
+  RelationJudge(const Graph& graph, const DetectionScope& scope,
+                const OrientationRelationOptions& options)
+      : gate_(options.innovation_gate) {
+    if (scope.features != nullptr) return;
+    map_ = CollectDirections(graph, nullptr, options.links);
+    if (!map_.has_sightings) return;
+    AddOrientations(graph, options.own_direction_noise, &map_);
+    map_.network.Solve();
+  }
+
+  // Whether the measurements are against two orientations being at this angle
+  // to this tolerance (rad).
+  bool Contradicts(const Feature& first, const Feature& second, double angle,
+                   double sigma) {
+    if (!map_.has_sightings) return false;
+    const auto a = map_.nodes.find(first.id);
+    const auto b = map_.nodes.find(second.id);
+    if (a == map_.nodes.end() || b == map_.nodes.end()) return false;
+    const double difference = NormalizeAxial(
+        map_.network.Angle(b->second) - map_.network.Angle(a->second) - angle);
+    Eigen::VectorXd& column = columns_[b->second];
+    if (column.size() == 0) column = map_.network.CovarianceColumn(b->second);
+    const double variance =
+        map_.network.Variance(a->second) + map_.network.Variance(b->second) -
+        2.0 * column[static_cast<Eigen::Index>(a->second)] + sigma * sigma;
+    return difference * difference > gate_ * variance;
+  }
+
+ private:
+  double gate_;
+  MapDirections map_;
+  // Of the covariance, as far as they were asked for.
+  std::map<std::size_t, Eigen::VectorXd> columns_;
+};
+
 }  // namespace
 
 OrientationRelation::OrientationRelation(OrientationRelationOptions options)
@@ -94,78 +166,24 @@ const std::string& OrientationRelation::name() const {
 Transaction OrientationRelation::Detect(const Graph& graph,
                                         const Registry& registry,
                                         const DetectionScope& scope) const {
-  std::vector<const Feature*> orientations;
-  const auto consider = [&](const Feature& feature) {
-    if (feature.level == scope.level &&
-        feature.type->Is(FeatureRole::kDirection)) {
-      orientations.push_back(&feature);
-    }
-  };
-  std::set<FeatureId> ids(graph.VirtualFeatures(scope.level).begin(),
-                          graph.VirtualFeatures(scope.level).end());
-  if (scope.features != nullptr) {
-    ids.insert(scope.features->begin(), scope.features->end());
-    for (const FeatureId id : ids) {
-      const Feature* feature = graph.FindFeature(id);
-      if (feature != nullptr) consider(*feature);
-    }
-  } else if (scope.level > 0) {
-    for (const FeatureId id : ids) consider(graph.GetFeature(id));
-  } else {
-    // Orientations that were read from a file may be raw.
-    for (const Feature* feature : graph.Features()) consider(*feature);
-  }
-
+  const std::vector<const Feature*> orientations = OrientationsOf(graph, scope);
+  RelationJudge judge(graph, scope, options_);
   std::int64_t pairs = 0;
   std::int64_t no_angle = 0;
   std::int64_t there = 0;
   std::int64_t contradicted = 0;
-  // Where poses that saw the walls are in the graph, a relation is judged by
-  // its innovation: a small difference that is known well is one all the same.
-  MapDirections map;
-  if (scope.features == nullptr) {
-    map = CollectDirections(graph, nullptr, options_.links);
-    if (map.has_sightings) {
-      AddOrientations(graph, options_.own_direction_noise, &map);
-      map.network.Solve();
-    }
-  }
-  std::map<std::size_t, Eigen::VectorXd> columns;
-  const auto contradicts = [&](const Feature& first, const Feature& second,
-                               double angle, double sigma) {
-    if (!map.has_sightings) return false;
-    const auto a = map.nodes.find(first.id);
-    const auto b = map.nodes.find(second.id);
-    if (a == map.nodes.end() || b == map.nodes.end()) return false;
-    const double difference = NormalizeAxial(
-        map.network.Angle(b->second) - map.network.Angle(a->second) - angle);
-    Eigen::VectorXd& column = columns[b->second];
-    if (column.size() == 0) column = map.network.CovarianceColumn(b->second);
-    const double variance =
-        map.network.Variance(a->second) + map.network.Variance(b->second) -
-        2.0 * column[static_cast<Eigen::Index>(a->second)] + sigma * sigma;
-    return difference * difference > options_.innovation_gate * variance;
-  };
-
   Transaction transaction;
   for (std::size_t j = 1; j < orientations.size(); ++j) {
     const Feature& second = *orientations[j];
-    std::set<FeatureId> related;
-    for (const ConstraintId id : graph.ConstraintsOf(second.id)) {
-      const Constraint& constraint = graph.GetConstraint(id);
-      if (constraint.state != ConstraintState::kLive ||
-          !constraint.type->Is(RelationRole::kAngle)) {
-        continue;
-      }
-      related.insert(constraint.features.begin(), constraint.features.end());
-    }
+    const std::set<FeatureId> related = RelatedTo(graph, second.id);
     int relations = 0;
     for (std::size_t i = 0; i < j && relations < options_.max_relations; ++i) {
       ++pairs;
       const Feature& first = *orientations[i];
-      const double angle =
-          NormalizeAxial(second.parameters[0] - first.parameters[0]);
-      const int nearest = NearestAxial(options_.angles, angle, options_.gate);
+      const int nearest = NearestAxial(
+          options_.angles,
+          NormalizeAxial(second.parameters[0] - first.parameters[0]),
+          options_.gate);
       if (nearest < 0) {
         ++no_angle;
         continue;
@@ -177,24 +195,17 @@ Transaction OrientationRelation::Detect(const Graph& graph,
         ++there;
         continue;
       }
-      if (contradicts(first, second, options_.angles[nearest],
-                      options_.angle_sigmas[nearest])) {
+      const double angle = options_.angles[static_cast<std::size_t>(nearest)];
+      const double sigma =
+          options_.angle_sigmas[static_cast<std::size_t>(nearest)];
+      if (judge.Contradicts(first, second, angle, sigma)) {
         ++contradicted;
         continue;
       }
-      Constraint constraint;
-      constraint.type = &registry.GetRelation(RelationRole::kAngle, *first.type,
-                                              *second.type);
-      constraint.features = {first.id, second.id};
-      constraint.expected =
-          Eigen::VectorXd::Constant(1, options_.angles[nearest]);
-      const double sigma =
-          options_.angle_sigmas[static_cast<std::size_t>(nearest)];
-      constraint.information =
-          Eigen::MatrixXd::Constant(1, 1, 1.0 / (sigma * sigma));
-      constraint.kind = ConstraintClass::kStructure;
-      constraint.source = kName;
-      transaction.AddConstraint(std::move(constraint));
+      transaction.AddConstraint(MakeStructure(
+          registry.GetRelation(RelationRole::kAngle, *first.type, *second.type),
+          {first.id, second.id}, Eigen::VectorXd::Constant(1, angle),
+          InformationFromSigmas(Eigen::VectorXd::Constant(1, sigma)), kName));
     }
   }
   scope.Count("orientations", static_cast<std::int64_t>(orientations.size()));

@@ -687,24 +687,12 @@ Transaction RectangleDetector::Detect(const Graph& graph,
                                       const Registry& registry,
                                       const DetectionScope& scope) const {
   std::vector<Face> walls;
-  const auto consider = [&](const Feature& feature) {
+  for (const Feature* feature : FeaturesInScope(graph, scope)) {
     Face wall;
-    if (feature.level == scope.level && MakeFace(feature, &wall) &&
+    if (MakeFace(*feature, &wall) &&
         2.0 * wall.half_length >= options_.min_length) {
       walls.push_back(wall);
     }
-  };
-  if (scope.features != nullptr) {
-    for (const FeatureId id : *scope.features) {
-      const Feature* feature = graph.FindFeature(id);
-      if (feature != nullptr) consider(*feature);
-    }
-  } else if (scope.level > 0) {
-    for (const FeatureId id : graph.VirtualFeatures(scope.level)) {
-      consider(graph.GetFeature(id));
-    }
-  } else {
-    for (const Feature* feature : graph.Features()) consider(*feature);
   }
   Transaction transaction;
   if (walls.empty()) return transaction;
@@ -739,17 +727,12 @@ Transaction RectangleDetector::Detect(const Graph& graph,
         const RelationType* relation = registry.FindRelation(
             RelationRole::kSide, *member.feature->type, rectangle_type);
         if (relation == nullptr) continue;
-        Constraint constraint;
-        constraint.type = relation;
-        constraint.features = {member.feature->id, id};
-        constraint.expected = Eigen::Vector2d(0.0, kSides[side]);
-        constraint.information =
-            Eigen::Vector2d(1.0 / (options_.sigma * options_.sigma),
-                            1.0 / (options_.sigma_angle * options_.sigma_angle))
-                .asDiagonal();
-        constraint.kind = ConstraintClass::kStructure;
-        constraint.source = kName;
-        transaction.AddConstraint(std::move(constraint));
+        transaction.AddConstraint(
+            MakeStructure(*relation, {member.feature->id, id},
+                          Eigen::Vector2d(0.0, kSides[side]),
+                          InformationFromSigmas(Eigen::Vector2d(
+                              options_.sigma, options_.sigma_angle)),
+                          kName));
       }
     }
   }

@@ -90,16 +90,14 @@ Transaction SameWall::Detect(const Graph& graph, const Registry& registry,
   scope.Count("walls", walls.size());
   const double narrow = options_.match.narrow + options_.match.tolerance;
   for (const ClosureCandidate& candidate : candidates.Choose(narrow, scope)) {
-    Constraint constraint;
-    constraint.type = &registry.GetRelation(kSameWallRelation);
-    constraint.features = {walls.wall(candidate.pair.first).id,
-                           walls.wall(candidate.pair.second).id};
-    constraint.expected = Eigen::VectorXd::Zero(2);
-    constraint.information = CollinearityInformation(
-        options_.sigma_offset, options_.sigma_angle, candidate.along);
-    constraint.kind = ConstraintClass::kStructure;
-    constraint.source = kName;
-    transaction.AddConstraint(std::move(constraint));
+    transaction.AddConstraint(MakeStructure(
+        registry.GetRelation(kSameWallRelation),
+        {walls.wall(candidate.pair.first).id,
+         walls.wall(candidate.pair.second).id},
+        Eigen::VectorXd::Zero(2),
+        CollinearityInformation(options_.sigma_offset, options_.sigma_angle,
+                                candidate.along),
+        kName));
   }
   return transaction;
 }

@@ -174,16 +174,11 @@ JointAdjustment::JointAdjustment(
       motion = Compose(motion, records_[k].motion);
     }
     motion = Compose(motion, records_[end].motion);
-    Constraint constraint;
-    constraint.type = &pose_pose;
-    constraint.features =
-        std::vector<FeatureId>{provisional[before], provisional[p]};
-    constraint.expected = motion.mean;
     places_[p].since_previous = motion.mean;
     const Eigen::Matrix3d information = motion.covariance.inverse();
-    constraint.information = 0.5 * (information + information.transpose());
-    constraint.source = kSource;
-    transaction.AddConstraint(std::move(constraint));
+    transaction.AddConstraint(MakeMeasurement(
+        pose_pose, {provisional[before], provisional[p]}, motion.mean,
+        0.5 * (information + information.transpose()), kSource));
   }
   const TransactionResult places = graph_->Apply(std::move(transaction));
   poses_ = places.features;
@@ -227,15 +222,12 @@ std::map<FeatureId, std::size_t> JointAdjustment::HoldAlong(
   for (const auto& [wall, most] : most_votes) {
     const std::size_t k = most.second;
     places_of.emplace(wall, k);
-    Constraint constraint;
-    constraint.type = &registry_.GetRelation("pose_pose");
-    constraint.features = std::vector<FeatureId>{wall, poses_[k]};
-    constraint.expected = Between(PoseOf(graph_->GetFeature(wall)), poses[k]);
-    constraint.information =
-        Eigen::Vector3d(1.0 / (kAlongSigma * kAlongSigma), 0.0, 0.0)
-            .asDiagonal();
-    constraint.source = kSource;
-    change->AddConstraint(std::move(constraint));
+    const Eigen::Vector3d information(1.0 / (kAlongSigma * kAlongSigma), 0.0,
+                                      0.0);
+    change->AddConstraint(
+        MakeMeasurement(registry_.GetRelation("pose_pose"), {wall, poses_[k]},
+                        Between(PoseOf(graph_->GetFeature(wall)), poses[k]),
+                        information.asDiagonal(), kSource));
   }
   return places_of;
 }
@@ -265,14 +257,9 @@ void JointAdjustment::Match() {
   relations_ = finder_->Find(PlacePoses(), stop_);
   const RelationType& pose_pose = registry_.GetRelation("pose_pose");
   for (const ScanRelation& relation : relations_) {
-    Constraint constraint;
-    constraint.type = &pose_pose;
-    constraint.features =
-        std::vector<FeatureId>{poses_[relation.from], poses_[relation.to]};
-    constraint.expected = relation.mean;
-    constraint.information = relation.information;
-    constraint.source = kSource;
-    transaction.AddConstraint(std::move(constraint));
+    transaction.AddConstraint(
+        MakeMeasurement(pose_pose, {poses_[relation.from], poses_[relation.to]},
+                        relation.mean, relation.information, kSource));
   }
   relation_constraints_ = graph_->Apply(std::move(transaction)).constraints;
 }
@@ -285,13 +272,9 @@ void JointAdjustment::Vote() {
       CollectWallVotes(*graph_, places_, PlacePoses(), options_.votes);
   for (std::size_t k = 0; k < votes.size(); ++k) {
     for (const WallVote& vote : votes[k]) {
-      Constraint constraint;
-      constraint.type = &relation;
-      constraint.features = std::vector<FeatureId>{poses_[k], vote.wall};
-      constraint.expected = Eigen::Vector3d::Zero();
-      constraint.information = vote.information;
-      constraint.source = kSource;
-      transaction.AddConstraint(std::move(constraint));
+      transaction.AddConstraint(
+          MakeMeasurement(relation, {poses_[k], vote.wall},
+                          Eigen::Vector3d::Zero(), vote.information, kSource));
     }
   }
   votes_ = graph_->Apply(std::move(transaction)).constraints;

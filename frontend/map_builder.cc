@@ -57,6 +57,197 @@ double DistanceTo(const Feature& feature, const Eigen::Vector2d& point) {
   return std::hypot(beyond, across);
 }
 
+// Makes features of what a scan sees that the map does not have yet: bound to
+// what the robot is linked to, and to each other.
+class Growth {
+ public:
+  // All must outlive it. `fixes_gauge`: the best segment becomes fixed.
+  Growth(const Graph& graph, const Registry& registry, const RobotLinks& robot,
+         const MapBuilderOptions& options,
+         std::vector<const SegmentObservation*> fresh, bool fixes_gauge)
+      : graph_(graph),
+        segment_(registry.GetFeature("segment")),
+        relation_(registry.GetRelation("pose_pose")),
+        robot_(robot),
+        options_(options),
+        fresh_(std::move(fresh)),
+        gauge_(fixes_gauge ? Longest() : fresh_.size()),
+        anchors_(BestLinks()) {}
+
+  Transaction Run() {
+    for (std::size_t k = 0; k < fresh_.size(); ++k) {
+      const SegmentObservation& observation = *fresh_[k];
+      const Pose2 pose = Compose(robot_.pose(), observation.pose);
+      // Another piece of a wall that this scan has just made a feature of
+      // (there is something in front of its middle).
+      owner_.push_back(PieceOf(observation));
+      if (owner_[k] != k) {
+        Extend(pose, k);
+        continue;
+      }
+      const FeatureId id = AddWall(pose, k);
+      BindToMap(observation, pose, id);
+      BindWithinScan(k, id);
+    }
+    return std::move(transaction_);
+  }
+
+  std::size_t size() const { return fresh_.size(); }
+  const SegmentObservation& observation(std::size_t k) const {
+    return *fresh_[k];
+  }
+  // Index among the added features.
+  std::size_t FeatureOf(std::size_t k) const {
+    return Transaction::ProvisionalIndex(ids_[k]);
+  }
+  // Whether the feature was made of this observation, not just extended by it.
+  bool IsOwner(std::size_t k) const { return owner_[k] == k; }
+
+ private:
+  std::size_t Longest() const {
+    std::size_t longest = 0;
+    for (std::size_t k = 1; k < fresh_.size(); ++k) {
+      if (fresh_[k]->length > fresh_[longest]->length) longest = k;
+    }
+    return longest;
+  }
+
+  // The links that tell most about where the robot is.
+  std::vector<FeatureId> BestLinks() const {
+    std::vector<std::pair<double, FeatureId>> links;
+    for (const auto& [id, c] : robot_.links()) {
+      links.emplace_back(c(0, 0) + c(1, 1) + 9.0 * c(2, 2), id);
+    }
+    std::sort(links.begin(), links.end());
+    if (static_cast<int>(links.size()) > options_.links_per_feature) {
+      links.resize(options_.links_per_feature);
+    }
+    std::vector<FeatureId> best;
+    for (const auto& link : links) best.push_back(link.second);
+    return best;
+  }
+
+  // The observation before it, an owner, that it is a piece of the same wall
+  // with; its own place when there is none.
+  std::size_t PieceOf(const SegmentObservation& observation) const {
+    const std::size_t self = owner_.size();
+    for (std::size_t j = 0; j < self; ++j) {
+      if (owner_[j] != j) continue;
+      const SegmentObservation& other = *fresh_[j];
+      AssociationCandidate candidate;
+      candidate.pose = other.pose;
+      candidate.extent_begin = -0.5 * other.length;
+      candidate.extent_end = 0.5 * other.length;
+      // The other piece's own errors, its direction with the lever between the
+      // two.
+      const double lever =
+          Between(other.pose, observation.pose).head<2>().norm();
+      AssociationOptions options = options_.association;
+      options.feature_offset_sigma = std::sqrt(
+          other.covariance(0, 0) + lever * lever * other.covariance(1, 1));
+      options.feature_angle_sigma = std::sqrt(other.covariance(1, 1));
+      options.max_offset = options_.same_scan_offset;
+      if (!Associate(Pose2::Zero(), {observation}, {candidate}, options)
+               .empty()) {
+        return j;
+      }
+    }
+    return self;
+  }
+
+  // Makes the wall that the k-th is a piece of longer.
+  void Extend(const Pose2& pose, std::size_t k) {
+    const FeatureId id = ids_[owner_[k]];
+    Feature& wall =
+        transaction_.added_features()[Transaction::ProvisionalIndex(id)];
+    // The gauge is that of the whole wall.
+    wall.fixed = wall.fixed || k == gauge_;
+    const Pose2 relative = Between(PoseOf(wall), pose);
+    const double half = 0.5 * fresh_[k]->length;
+    wall.extent_begin = std::min(wall.extent_begin, relative[0] - half);
+    wall.extent_end = std::max(wall.extent_end, relative[0] + half);
+    ids_.push_back(id);
+  }
+
+  FeatureId AddWall(const Pose2& pose, std::size_t k) {
+    Feature wall;
+    wall.type = &segment_;
+    wall.parameters = {pose[0], pose[1], pose[2]};
+    wall.extent_begin = -0.5 * fresh_[k]->length;
+    wall.extent_end = 0.5 * fresh_[k]->length;
+    wall.observations = 1;
+    wall.source = kSource;
+    wall.fixed = k == gauge_;
+    ids_.push_back(transaction_.AddFeature(std::move(wall)));
+    return ids_.back();
+  }
+
+  // Relations to what the robot is linked to share the robot's error: each gets
+  // its share of the information, so together they do not claim more than one
+  // (covariance intersection).
+  void BindToMap(const SegmentObservation& observation, const Pose2& pose,
+                 FeatureId id) {
+    const Eigen::Matrix3d of_observation =
+        ObservationCovariance(observation, options_.along_sigma);
+    const Eigen::Matrix3d j1 =
+        ComposeJacobianFirst(robot_.pose(), observation.pose);
+    const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_.pose());
+    for (const FeatureId anchor : anchors_) {
+      const Pose2 other = PoseOf(graph_.GetFeature(anchor));
+      const Eigen::Matrix3d covariance =
+          j1 * robot_.links().at(anchor) * j1.transpose() +
+          j2 * of_observation * j2.transpose();
+      transaction_.AddConstraint(
+          MakeMeasurement(relation_, {anchor, id}, Between(other, pose),
+                          Symmetric(ToFrame(covariance, other[2]).inverse()) /
+                              static_cast<double>(anchors_.size()),
+                          kSource));
+    }
+  }
+
+  // Relations within the scan have no robot in between.
+  void BindWithinScan(std::size_t k, FeatureId id) {
+    const SegmentObservation& observation = *fresh_[k];
+    std::vector<std::pair<double, std::size_t>> neighbors;
+    for (std::size_t j = 0; j < k; ++j) {
+      if (owner_[j] != j) continue;
+      neighbors.emplace_back(
+          (fresh_[j]->pose.head<2>() - observation.pose.head<2>()).norm(), j);
+    }
+    std::sort(neighbors.begin(), neighbors.end());
+    if (static_cast<int>(neighbors.size()) > options_.links_within_scan) {
+      neighbors.resize(options_.links_within_scan);
+    }
+    const UncertainPose2 second{
+        observation.pose,
+        ObservationCovariance(observation, options_.along_sigma)};
+    for (const auto& neighbor : neighbors) {
+      const SegmentObservation& other = *fresh_[neighbor.second];
+      const UncertainPose2 first{
+          other.pose, ObservationCovariance(other, options_.along_sigma)};
+      const UncertainPose2 between = Compose(Inverse(first), second);
+      transaction_.AddConstraint(MakeMeasurement(
+          relation_, {ids_[neighbor.second], id}, between.mean,
+          Symmetric(between.covariance.inverse()) / 2.0, kSource));
+    }
+  }
+
+  const Graph& graph_;
+  const FeatureType& segment_;
+  const RelationType& relation_;
+  const RobotLinks& robot_;
+  const MapBuilderOptions& options_;
+  std::vector<const SegmentObservation*> fresh_;
+  // Among the observations; their number when nothing is to be fixed.
+  std::size_t gauge_;
+  std::vector<FeatureId> anchors_;
+  Transaction transaction_;
+  // By observation: the provisional id of its feature, and the observation that
+  // the feature was made of: itself, mostly.
+  std::vector<FeatureId> ids_;
+  std::vector<std::size_t> owner_;
+};
+
 }  // namespace
 
 MapBuilder::MapBuilder(Graph* graph, const Registry& registry,
@@ -199,167 +390,25 @@ void MapBuilder::SecondLook(const std::vector<FeatureMatch>& matches) {
   }
 }
 
-std::size_t MapBuilder::PieceOf(
-    const SegmentObservation& observation,
-    const std::vector<SegmentObservation>& observations,
-    const std::vector<int>& fresh,
-    const std::vector<std::size_t>& owner) const {
-  const std::size_t self = owner.size();
-  for (std::size_t j = 0; j < self; ++j) {
-    if (owner[j] != j) continue;
-    const SegmentObservation& other = observations[fresh[j]];
-    AssociationCandidate candidate;
-    candidate.pose = other.pose;
-    candidate.extent_begin = -0.5 * other.length;
-    candidate.extent_end = 0.5 * other.length;
-    // The other piece's own errors, its direction with the lever between the
-    // two.
-    const double lever = Between(other.pose, observation.pose).head<2>().norm();
-    AssociationOptions options = options_.association;
-    options.feature_offset_sigma = std::sqrt(
-        other.covariance(0, 0) + lever * lever * other.covariance(1, 1));
-    options.feature_angle_sigma = std::sqrt(other.covariance(1, 1));
-    options.max_offset = options_.same_scan_offset;
-    if (!Associate(Pose2::Zero(), {observation}, {candidate}, options)
-             .empty()) {
-      return j;
-    }
-  }
-  return self;
-}
-
 void MapBuilder::Grow(const std::vector<SegmentObservation>& observations,
                       const std::vector<bool>& used, KeyScanRecord* record) {
-  std::vector<int> fresh;
+  std::vector<const SegmentObservation*> fresh;
   for (std::size_t i = 0; i < observations.size(); ++i) {
-    if (!used[i]) fresh.push_back(static_cast<int>(i));
+    if (!used[i]) fresh.push_back(&observations[i]);
   }
   if (fresh.empty()) return;
-  const FeatureType& segment_type = registry_.GetFeature("segment");
-  const RelationType& relation = registry_.GetRelation("pose_pose");
-
-  // The links that tell most about where the robot is.
-  std::vector<std::pair<double, FeatureId>> anchors;
-  for (const auto& link : robot_.links()) {
-    const Eigen::Matrix3d& c = link.second;
-    anchors.emplace_back(c(0, 0) + c(1, 1) + 9.0 * c(2, 2), link.first);
-  }
-  std::sort(anchors.begin(), anchors.end());
-  if (static_cast<int>(anchors.size()) > options_.links_per_feature) {
-    anchors.resize(options_.links_per_feature);
-  }
-
-  Transaction transaction;
-  std::vector<FeatureId> provisional;
-  // For each fresh observation the one whose feature it is: itself, mostly.
-  std::vector<std::size_t> owner;
   // The first scan's best segment fixes the gauge.
-  int gauge = -1;
-  if (robot_.links().empty() && num_created_ == 0) {
-    for (int index : fresh) {
-      if (gauge < 0 ||
-          observations[index].length > observations[gauge].length) {
-        gauge = index;
-      }
-    }
-  }
-  for (std::size_t k = 0; k < fresh.size(); ++k) {
-    const SegmentObservation& observation = observations[fresh[k]];
-    const Pose2 pose = Compose(robot_.pose(), observation.pose);
-    // Another piece of a wall that this scan has just made a feature of (there
-    // is something in front of its middle).
-    const std::size_t piece_of =
-        PieceOf(observation, observations, fresh, owner);
-    owner.push_back(piece_of);
-    if (piece_of != k) {
-      Feature& wall =
-          transaction.added_features()[Transaction::ProvisionalIndex(
-              provisional[piece_of])];
-      // The gauge is that of the whole wall.
-      wall.fixed = wall.fixed || fresh[k] == gauge;
-      const Pose2 relative = Between(
-          Pose2(wall.parameters[0], wall.parameters[1], wall.parameters[2]),
-          pose);
-      wall.extent_begin =
-          std::min(wall.extent_begin, relative[0] - 0.5 * observation.length);
-      wall.extent_end =
-          std::max(wall.extent_end, relative[0] + 0.5 * observation.length);
-      provisional.push_back(provisional[piece_of]);
-      continue;
-    }
-    Feature feature;
-    feature.type = &segment_type;
-    feature.parameters = {pose[0], pose[1], pose[2]};
-    feature.extent_begin = -0.5 * observation.length;
-    feature.extent_end = 0.5 * observation.length;
-    feature.observations = 1;
-    feature.source = kSource;
-    feature.fixed = fresh[k] == gauge;
-    const FeatureId id = transaction.AddFeature(feature);
-    const Eigen::Matrix3d observation_covariance =
-        ObservationCovariance(observation, options_.along_sigma);
-
-    // Relations to what the robot is linked to share the robot's error: each
-    // gets its share of the information, so together they do not claim more
-    // than one (covariance intersection).
-    for (const auto& anchor : anchors) {
-      const Eigen::Matrix3d& link = robot_.links().at(anchor.second);
-      const Pose2 other = PoseOf(graph_->GetFeature(anchor.second));
-      const Eigen::Matrix3d j1 =
-          ComposeJacobianFirst(robot_.pose(), observation.pose);
-      const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_.pose());
-      const Eigen::Matrix3d covariance =
-          j1 * link * j1.transpose() +
-          j2 * observation_covariance * j2.transpose();
-      Constraint constraint;
-      constraint.type = &relation;
-      constraint.features = std::vector<FeatureId>{anchor.second, id};
-      constraint.expected = Between(other, pose);
-      constraint.information =
-          Symmetric(ToFrame(covariance, other[2]).inverse()) /
-          static_cast<double>(anchors.size());
-      constraint.source = kSource;
-      transaction.AddConstraint(std::move(constraint));
-    }
-    // Relations within the scan have no robot in between.
-    std::vector<std::pair<double, std::size_t>> neighbors;
-    for (std::size_t j = 0; j < k; ++j) {
-      if (owner[j] != j) continue;
-      neighbors.emplace_back(
-          (observations[fresh[j]].pose.head<2>() - observation.pose.head<2>())
-              .norm(),
-          j);
-    }
-    std::sort(neighbors.begin(), neighbors.end());
-    if (static_cast<int>(neighbors.size()) > options_.links_within_scan) {
-      neighbors.resize(options_.links_within_scan);
-    }
-    for (const auto& neighbor : neighbors) {
-      const SegmentObservation& other = observations[fresh[neighbor.second]];
-      const UncertainPose2 first{
-          other.pose, ObservationCovariance(other, options_.along_sigma)};
-      const UncertainPose2 second{observation.pose, observation_covariance};
-      const UncertainPose2 between = Compose(Inverse(first), second);
-      Constraint constraint;
-      constraint.type = &relation;
-      constraint.features =
-          std::vector<FeatureId>{provisional[neighbor.second], id};
-      constraint.expected = between.mean;
-      constraint.information = Symmetric(between.covariance.inverse()) / 2.0;
-      constraint.source = kSource;
-      transaction.AddConstraint(std::move(constraint));
-    }
-    provisional.push_back(id);
-  }
-  const TransactionResult result = graph_->Apply(std::move(transaction));
-  for (std::size_t k = 0; k < fresh.size(); ++k) {
-    const SegmentObservation& observation = observations[fresh[k]];
+  const bool is_first = robot_.links().empty() && num_created_ == 0;
+  Growth growth(*graph_, registry_, robot_, options_, std::move(fresh),
+                is_first);
+  const TransactionResult result = graph_->Apply(growth.Run());
+  for (std::size_t k = 0; k < growth.size(); ++k) {
+    const SegmentObservation& observation = growth.observation(k);
     FeatureMatch match;
-    match.feature =
-        result.features[Transaction::ProvisionalIndex(provisional[k])];
+    match.feature = result.features[growth.FeatureOf(k)];
     match.observation = observation;
     record->matches.push_back(std::move(match));
-    if (owner[k] != k) continue;
+    if (!growth.IsOwner(k)) continue;
     // The robot relative to the new feature: only the observation's error.
     const Eigen::Matrix3d j2 = ComposeJacobianSecond(robot_.pose());
     const Eigen::Matrix3d j1 =
@@ -380,15 +429,11 @@ void MapBuilder::WriteRobot() {
     std::vector<Constraint> constraints;
     for (const auto& link : robot_.links()) {
       const Pose2 other = PoseOf(graph_->GetFeature(link.first));
-      Constraint constraint;
-      constraint.type = &relation;
-      constraint.features = std::vector<FeatureId>{link.first, robot};
-      constraint.expected = Between(other, robot_.pose());
-      constraint.information =
+      constraints.push_back(MakeMeasurement(
+          relation, {link.first, robot}, Between(other, robot_.pose()),
           Symmetric(ToFrame(link.second, other[2]).inverse()) /
-          static_cast<double>(robot_.links().size());
-      constraint.source = kSource;
-      constraints.push_back(std::move(constraint));
+              static_cast<double>(robot_.links().size()),
+          kSource));
     }
     return constraints;
   });

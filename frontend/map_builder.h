@@ -66,12 +66,6 @@ class MapBuilder final : public GraphBuilder {
 
  private:
   void SecondLook(const std::vector<FeatureMatch>& matches);
-  // Index in `fresh` of the first observation whose feature this one is a piece
-  // of; the number of entries in `owner` when there is none.
-  std::size_t PieceOf(const SegmentObservation& observation,
-                      const std::vector<SegmentObservation>& observations,
-                      const std::vector<int>& fresh,
-                      const std::vector<std::size_t>& owner) const;
   void Grow(const std::vector<SegmentObservation>& observations,
             const std::vector<bool>& used, KeyScanRecord* record);
 

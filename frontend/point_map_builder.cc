@@ -299,21 +299,10 @@ void PointMapBuilder::Grow(const std::vector<NewPoint>& points,
   const std::size_t old = others.size();
 
   // The gauge: two points of the first scan, as far apart as there are.
-  std::pair<std::size_t, std::size_t> gauge(points.size(), points.size());
-  if (robot_.links().empty() && num_created_ == 0) {
-    gauge = {0, 0};
-    double farthest = 0.0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j) {
-        const double distance =
-            (points[i].position - points[j].position).norm();
-        if (distance > farthest) {
-          farthest = distance;
-          gauge = {j, i};
-        }
-      }
-    }
-  }
+  const bool is_first = robot_.links().empty() && num_created_ == 0;
+  const std::pair<std::size_t, std::size_t> gauge =
+      is_first ? FarthestPair(points)
+               : std::make_pair(points.size(), points.size());
 
   Transaction transaction;
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -345,14 +334,9 @@ void PointMapBuilder::Grow(const std::vector<NewPoint>& points,
       }
       variance =
           std::max(variance, options_.distance_floor * options_.distance_floor);
-      Constraint constraint;
-      constraint.type = &relation;
-      constraint.features = {others[i], id};
-      constraint.expected = Eigen::VectorXd::Constant(1, distance);
-      constraint.information =
-          Eigen::MatrixXd::Constant(1, 1, weight / variance);
-      constraint.source = kSource;
-      transaction.AddConstraint(std::move(constraint));
+      transaction.AddConstraint(MakeMeasurement(
+          relation, {others[i], id}, Eigen::VectorXd::Constant(1, distance),
+          Eigen::MatrixXd::Constant(1, 1, weight / variance), kSource));
     }
     others.push_back(id);
     positions.push_back(point.position);
@@ -370,20 +354,37 @@ void PointMapBuilder::Grow(const std::vector<NewPoint>& points,
     record->points.push_back(match);
     directions_[match.feature] =
         NormalizeAngle(robot_.pose()[2] + point.direction);
-    // The robot relative to the scan that made the point is where it is; the
-    // point's own error is the robot's, seen from the point.
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    const double c = std::cos(robot_.pose()[2]);
-    const double s = std::sin(robot_.pose()[2]);
-    Eigen::Matrix2d axes;
-    axes << c, -s, s, c;
-    covariance.topLeftCorner<2, 2>() =
-        axes * point.covariance * axes.transpose();
-    const double angle = options_.extraction.angle_bias_sigma;
-    covariance(2, 2) = angle * angle;
-    robot_.Add(match.feature, Symmetric(covariance));
+    robot_.Add(match.feature, CovarianceFrom(point));
     ++num_created_;
   }
+}
+
+std::pair<std::size_t, std::size_t> PointMapBuilder::FarthestPair(
+    const std::vector<NewPoint>& points) {
+  std::pair<std::size_t, std::size_t> pair(0, 0);
+  double farthest = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const double distance = (points[i].position - points[j].position).norm();
+      if (distance > farthest) {
+        farthest = distance;
+        pair = {j, i};
+      }
+    }
+  }
+  return pair;
+}
+
+Eigen::Matrix3d PointMapBuilder::CovarianceFrom(const NewPoint& point) const {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  const double c = std::cos(robot_.pose()[2]);
+  const double s = std::sin(robot_.pose()[2]);
+  Eigen::Matrix2d axes;
+  axes << c, -s, s, c;
+  covariance.topLeftCorner<2, 2>() = axes * point.covariance * axes.transpose();
+  const double angle = options_.extraction.angle_bias_sigma;
+  covariance(2, 2) = angle * angle;
+  return Symmetric(covariance);
 }
 
 void PointMapBuilder::WriteRobot() {
@@ -399,14 +400,11 @@ void PointMapBuilder::WriteRobot() {
       const Eigen::Matrix2d covariance =
           jacobian * link.second * jacobian.transpose();
       const Eigen::Matrix2d information = covariance.inverse();
-      Constraint constraint;
-      constraint.type = &relation;
-      constraint.features = std::vector<FeatureId>{robot, link.first};
-      constraint.expected = seen;
-      constraint.information = 0.5 * (information + information.transpose()) /
-                               static_cast<double>(robot_.links().size());
-      constraint.source = kSource;
-      constraints.push_back(std::move(constraint));
+      constraints.push_back(
+          MakeMeasurement(relation, {robot, link.first}, seen,
+                          0.5 * (information + information.transpose()) /
+                              static_cast<double>(robot_.links().size()),
+                          kSource));
     }
     return constraints;
   });

@@ -93,6 +93,12 @@ class PointMapBuilder final : public GraphBuilder {
       const std::vector<PointAssociation>& associations,
       const Eigen::Vector2d& laser) const;
   void Grow(const std::vector<NewPoint>& points, KeyScanRecord* record);
+  // Indices, the smaller first.
+  static std::pair<std::size_t, std::size_t> FarthestPair(
+      const std::vector<NewPoint>& points);
+  // Of the robot relative to a point that it has just made: the robot is where
+  // it is, and the point's own error is the robot's, seen from the point.
+  Eigen::Matrix3d CovarianceFrom(const NewPoint& point) const;
 
   PointMapBuilderOptions options_;
   // Direction of the surface that each point was last seen on, map frame, by

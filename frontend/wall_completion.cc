@@ -607,19 +607,17 @@ class Completion {
     const FeatureId id = transaction_.AddFeature(feature);
     for (std::size_t k = 0; k < links; ++k) {
       const IndexedWall& wall = *nearest[k].second;
-      Constraint constraint;
-      constraint.type = &registry_.GetRelation("pose_pose");
-      constraint.features = std::vector<FeatureId>{wall.id, id};
-      constraint.expected = Between(wall.pose(), pose);
       const double offset =
           options_.link_offset_sigma * options_.link_offset_sigma;
       const double angle =
           options_.link_angle_sigma * options_.link_angle_sigma;
-      constraint.information =
-          Eigen::Vector3d(1.0 / offset, 1.0 / offset, 1.0 / angle).asDiagonal();
-      constraint.information /= static_cast<double>(links);
-      constraint.source = "wall_completion";
-      transaction_.AddConstraint(std::move(constraint));
+      const Eigen::Vector3d information(1.0 / offset, 1.0 / offset,
+                                        1.0 / angle);
+      transaction_.AddConstraint(MakeMeasurement(
+          registry_.GetRelation("pose_pose"), {wall.id, id},
+          Between(wall.pose(), pose),
+          (information / static_cast<double>(links)).asDiagonal(),
+          "wall_completion"));
     }
     index_.Insert({id, MakeWall(pose, -0.5 * length, 0.5 * length)});
   }

@@ -105,19 +105,15 @@ Eigen::Vector2d PositionOf(const Feature& feature) {
   return {feature.parameters[0], feature.parameters[1]};
 }
 
-Constraint MakeStructure(const Registry& registry, const std::string& relation,
-                         std::vector<FeatureId> features, double expected,
-                         double sigma) {
-  Constraint constraint;
-  constraint.type = &registry.GetRelation(relation);
-  constraint.features = std::move(features);
-  const int size = constraint.type->residual_size;
-  constraint.expected = Eigen::VectorXd::Constant(size, expected);
-  constraint.information =
-      Eigen::MatrixXd::Identity(size, size) / (sigma * sigma);
-  constraint.kind = ConstraintClass::kStructure;
-  constraint.source = "truth";
-  return constraint;
+Constraint TrueRelation(const Registry& registry, const std::string& relation,
+                        std::vector<FeatureId> features, double expected,
+                        double sigma) {
+  const RelationType& type = registry.GetRelation(relation);
+  return MakeStructure(type, std::move(features),
+                       Eigen::VectorXd::Constant(type.residual_size, expected),
+                       InformationFromSigmas(Eigen::VectorXd::Constant(
+                           type.residual_size, sigma)),
+                       "truth");
 }
 
 Feature MakeVirtual(const Registry& registry, const std::string& type,
@@ -262,10 +258,10 @@ void AddTrueStructure(const SyntheticTruth& truth,
     orientations.push_back(transaction.AddFeature(feature));
     if (orientations.size() > 1) {
       transaction.AddConstraint(
-          MakeStructure(registry, "orientation_orientation",
-                        {orientations.front(), orientations.back()},
-                        NormalizeAxial(angle - truth.orientations.front()),
-                        tolerances.relation));
+          TrueRelation(registry, "orientation_orientation",
+                       {orientations.front(), orientations.back()},
+                       NormalizeAxial(angle - truth.orientations.front()),
+                       tolerances.relation));
     }
   }
   for (const SyntheticLine& line : truth.lines) {
@@ -278,12 +274,12 @@ void AddTrueStructure(const SyntheticTruth& truth,
     feature.extent_begin = -feature.extent_end;
     const FeatureId id = transaction.AddFeature(feature);
     for (const FeatureId point : line.points) {
-      transaction.AddConstraint(MakeStructure(
+      transaction.AddConstraint(TrueRelation(
           registry, "point_line_distance", {point, id}, 0.0, tolerances.line));
     }
-    transaction.AddConstraint(MakeStructure(
-        registry, "line_orientation", {id, orientations[line.orientation]}, 0.0,
-        tolerances.orientation));
+    transaction.AddConstraint(TrueRelation(registry, "line_orientation",
+                                           {id, orientations[line.orientation]},
+                                           0.0, tolerances.orientation));
   }
   std::vector<FeatureId> centers;
   for (const Eigen::Vector2d& center : truth.centers) {
@@ -299,12 +295,12 @@ void AddTrueStructure(const SyntheticTruth& truth,
     feature.parameters = {p.x(), p.y(), circle.radius};
     const FeatureId id = transaction.AddFeature(feature);
     for (const FeatureId point : circle.points) {
-      transaction.AddConstraint(MakeStructure(registry, "point_circle_distance",
-                                              {point, id}, 0.0,
-                                              tolerances.circle));
+      transaction.AddConstraint(TrueRelation(registry, "point_circle_distance",
+                                             {point, id}, 0.0,
+                                             tolerances.circle));
     }
     if (circle.common_center >= 0) {
-      transaction.AddConstraint(MakeStructure(
+      transaction.AddConstraint(TrueRelation(
           registry, "point_point_coincidence",
           {centers[circle.common_center], id}, 0.0, tolerances.center));
     }

@@ -2,16 +2,22 @@
 #include <plumbline/pipeline/graph_solver.h>
 #include <plumbline/pipeline/raw_features.h>
 
-#include <set>
+#include <algorithm>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace plumbline {
 namespace {
 
-std::set<std::string> RawTypes(const Graph& graph) {
-  std::set<std::string> types;
+// In the order in which they come up.
+std::vector<const FeatureType*> RawTypes(const Graph& graph) {
+  std::vector<const FeatureType*> types;
   for (const Feature* feature : graph.Features()) {
-    if (feature->level == 0) types.insert(feature->type->name);
+    if (feature->level == 0 &&
+        std::find(types.begin(), types.end(), feature->type) == types.end()) {
+      types.push_back(feature->type);
+    }
   }
   return types;
 }
@@ -40,10 +46,13 @@ EmOptions EmOf(const GraphSolverOptions& options, const Graph& graph) {
 Hierarchy MakeGraphHierarchy(const GraphSolverOptions& options,
                              const Graph& graph, const Registry& registry) {
   if (!options.structure) return {};
-  const std::set<std::string> raw = RawTypes(graph);
-  return MakeHierarchy(
-      options.hierarchy.empty() ? DefaultHierarchy(raw) : options.hierarchy,
-      registry, {raw.begin(), raw.end()}, options.detector_parameters);
+  const std::vector<const FeatureType*> raw = RawTypes(graph);
+  std::vector<std::string> names;
+  for (const FeatureType* type : raw) names.push_back(type->name);
+  return MakeHierarchy(options.hierarchy.empty()
+                           ? DefaultHierarchy(raw, registry)
+                           : options.hierarchy,
+                       registry, names, options.detector_parameters);
 }
 
 GraphSolver::GraphSolver(const Registry& registry,

@@ -81,8 +81,9 @@ LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
 LogSolver::~LogSolver() = default;
 
 HierarchySpec LogSolver::HierarchyOfOptions() const {
-  return options_.hierarchy.empty() ? DefaultHierarchy({profile_.feature_type})
-                                    : options_.hierarchy;
+  if (!options_.hierarchy.empty()) return options_.hierarchy;
+  return DefaultHierarchy({&registry_.GetFeature(profile_.feature_type)},
+                          registry_);
 }
 
 Hierarchy LogSolver::MakeDetectors(const HierarchySpec& spec) const {

@@ -112,13 +112,16 @@ template <typename Archive>
 void ExchangeFeature(Archive& archive, const Registry& registry,
                      Feature& feature) {
   auto& [id, type, level, is_virtual, fixed, parameters, anchor, begin, end,
-         observations, source] = feature;
+         observations, maker, source] = feature;
   ExchangeType(
       archive, type, [&](const std::string& name) -> const auto& {
         return registry.GetFeature(name);
       });
+  // No name stands for none.
+  std::string maker_name = maker == nullptr ? std::string() : maker->name;
   ExchangeAll(archive, id, level, is_virtual, fixed, parameters, anchor, begin,
-              end, observations, source);
+              end, observations, maker_name, source);
+  if constexpr (Archive::kReads) maker = registry.FindDetector(maker_name);
 }
 
 template <typename Archive>

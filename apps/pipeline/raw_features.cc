@@ -56,11 +56,11 @@ const RawFeatureProfile& ProfileOf(RawFeatures kind) {
 }
 
 const RawFeatureProfile& ProfileOf(
-    const std::set<std::string>& raw_feature_types) {
-  const RawFeatureProfile& points = ProfileOf(RawFeatures::kPoints);
-  return raw_feature_types.count(points.feature_type) > 0
-             ? points
-             : ProfileOf(RawFeatures::kSegments);
+    const std::vector<const FeatureType*>& raw_feature_types) {
+  const bool has_points = std::any_of(
+      raw_feature_types.begin(), raw_feature_types.end(),
+      [](const FeatureType* type) { return type->Is(FeatureRole::kPoint); });
+  return ProfileOf(has_points ? RawFeatures::kPoints : RawFeatures::kSegments);
 }
 
 LogSolverOptions WithProfile(const RawFeatureProfile& profile,

@@ -8,8 +8,8 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
+#include <vector>
 
 namespace plumbline {
 
@@ -54,7 +54,7 @@ const RawFeatureProfile& ProfileOf(RawFeatures kind);
 /// The profile of a graph with raw features of these types: that of points
 /// where there are any.
 const RawFeatureProfile& ProfileOf(
-    const std::set<std::string>& raw_feature_types);
+    const std::vector<const FeatureType*>& raw_feature_types);
 
 /// The options as this kind of raw features can be solved with: what it cannot
 /// do is off, and its parameters of detectors are filled in.

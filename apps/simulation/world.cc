@@ -8,8 +8,11 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <sstream>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -185,84 +188,128 @@ void RotateWorld(double degrees, World* world) {
   for (Vector2d& point : world->path) rotate(&point);
 }
 
-World ReadWorld(std::istream& input, const std::string& name) {
+namespace {
+
+// Reads a world line by line; the doors are cut once all walls are there.
+class WorldReader {
+ public:
+  explicit WorldReader(const std::string& name) { world_.name = name; }
+
+  World Read(std::istream& input) {
+    std::string text;
+    while (std::getline(input, text)) {
+      ++line_;
+      ReadLine(text.substr(0, text.find('#')));
+    }
+    if (input.bad()) throw Error(world_.name, line_, "reading failed", "");
+    for (const Door& door : doors_) {
+      if (CutDoor(door.position, door.width, &world_) == 0) {
+        throw Error(world_.name, door.line, "the door is in no wall",
+                    "a position inside a wall");
+      }
+    }
+    return std::move(world_);
+  }
+
+ private:
   struct Door {
     Vector2d position;
     double width;
     int line;
   };
-  World world;
-  world.name = name;
-  std::vector<Door> doors;
-  std::string text;
-  int line = 0;
-  while (std::getline(input, text)) {
-    ++line;
-    std::istringstream words(text.substr(0, text.find('#')));
-    std::string keyword;
-    if (!(words >> keyword)) continue;
-    std::vector<double> values;
+
+  void ReadLine(const std::string& text) {
+    std::istringstream words(text);
+    if (!(words >> keyword_)) return;
+    values_.clear();
     for (std::string word; words >> word;) {
       double value = 0.0;
       if (!ParseNumber(word, &value)) {
-        throw Error(name, line, "'" + PrintableUtf8(word) + "' is not a number",
+        throw Error(world_.name, line_,
+                    "'" + PrintableUtf8(word) + "' is not a number",
                     "a finite number");
       }
-      values.push_back(value);
+      values_.push_back(value);
     }
-    const auto require = [&](bool holds, const std::string& expected) {
-      if (!holds) throw Error(name, line, "bad '" + keyword + "'", expected);
-    };
-    if (keyword == "wall") {
-      require(values.size() == 4 || values.size() == 5,
-              "wall x1 y1 x2 y2 [thickness]");
-      const WorldWall wall{{values[0], values[1]},
-                           {values[2], values[3]},
-                           values.size() == 5 ? values[4] : 0.0};
-      require((wall.end - wall.begin).norm() > 0.0 && wall.thickness >= 0.0,
-              "two different points and a thickness of at least 0");
-      world.walls.push_back(wall);
-    } else if (keyword == "door") {
-      require(values.size() == 3 && values[2] > 0.0,
-              "door x y width with a width above 0");
-      doors.push_back({{values[0], values[1]}, values[2], line});
-    } else if (keyword == "circle") {
-      require(values.size() == 3 && values[2] > 0.0,
-              "circle x y radius with a radius above 0");
-      world.circles.push_back({{values[0], values[1]}, values[2], 0.0, 360.0});
-    } else if (keyword == "arc") {
-      require(values.size() == 5 && values[2] > 0.0 && values[4] > values[3] &&
-                  values[4] - values[3] <= 360.0,
-              "arc x y radius begin_deg end_deg with a radius above 0 and an "
-              "end at most 360 degrees after the begin");
-      world.circles.push_back({{values[0], values[1]},
-                               values[2],
-                               values[3],
-                               values[4] - values[3]});
-    } else if (keyword == "box") {
-      require(values.size() == 5 && values[2] > 0.0 && values[3] > 0.0,
-              "box x y length width angle_deg with sides above 0");
-      world.boxes.push_back(
-          {{values[0], values[1]}, values[2], values[3], values[4]});
-    } else if (keyword == "path") {
-      require(!values.empty() && values.size() % 2 == 0,
-              "path x1 y1 [x2 y2 ...]");
-      for (std::size_t i = 0; i < values.size(); i += 2) {
-        world.path.emplace_back(values[i], values[i + 1]);
-      }
-    } else {
-      throw Error(name, line, "'" + PrintableUtf8(keyword) + "' is unknown",
+    static const std::map<std::string, void (WorldReader::*)()> readers = {
+        {"wall", &WorldReader::ReadWall},     {"door", &WorldReader::ReadDoor},
+        {"circle", &WorldReader::ReadCircle}, {"arc", &WorldReader::ReadArc},
+        {"box", &WorldReader::ReadBox},       {"path", &WorldReader::ReadPath}};
+    const auto reader = readers.find(keyword_);
+    if (reader == readers.end()) {
+      throw Error(world_.name, line_,
+                  "'" + PrintableUtf8(keyword_) + "' is unknown",
                   "wall, door, circle, arc, box or path");
     }
+    (this->*reader->second)();
   }
-  if (input.bad()) throw Error(name, line, "reading failed", "");
-  for (const Door& door : doors) {
-    if (CutDoor(door.position, door.width, &world) == 0) {
-      throw Error(name, door.line, "the door is in no wall",
-                  "a position inside a wall");
+
+  void Require(bool holds, const std::string& expected) const {
+    if (holds) return;
+    throw Error(world_.name, line_, "bad '" + keyword_ + "'", expected);
+  }
+
+  Vector2d Point(std::size_t first) const {
+    return {values_[first], values_[first + 1]};
+  }
+
+  void ReadWall() {
+    Require(values_.size() == 4 || values_.size() == 5,
+            "wall x1 y1 x2 y2 [thickness]");
+    const WorldWall wall{Point(0), Point(2),
+                         values_.size() == 5 ? values_[4] : 0.0};
+    Require((wall.end - wall.begin).norm() > 0.0 && wall.thickness >= 0.0,
+            "two different points and a thickness of at least 0");
+    world_.walls.push_back(wall);
+  }
+
+  void ReadDoor() {
+    Require(values_.size() == 3 && values_[2] > 0.0,
+            "door x y width with a width above 0");
+    doors_.push_back({Point(0), values_[2], line_});
+  }
+
+  void ReadCircle() {
+    Require(values_.size() == 3 && values_[2] > 0.0,
+            "circle x y radius with a radius above 0");
+    world_.circles.push_back({Point(0), values_[2], 0.0, 360.0});
+  }
+
+  void ReadArc() {
+    Require(values_.size() == 5 && values_[2] > 0.0 &&
+                values_[4] > values_[3] && values_[4] - values_[3] <= 360.0,
+            "arc x y radius begin_deg end_deg with a radius above 0 and an "
+            "end at most 360 degrees after the begin");
+    world_.circles.push_back(
+        {Point(0), values_[2], values_[3], values_[4] - values_[3]});
+  }
+
+  void ReadBox() {
+    Require(values_.size() == 5 && values_[2] > 0.0 && values_[3] > 0.0,
+            "box x y length width angle_deg with sides above 0");
+    world_.boxes.push_back({Point(0), values_[2], values_[3], values_[4]});
+  }
+
+  void ReadPath() {
+    Require(!values_.empty() && values_.size() % 2 == 0,
+            "path x1 y1 [x2 y2 ...]");
+    for (std::size_t i = 0; i < values_.size(); i += 2) {
+      world_.path.push_back(Point(i));
     }
   }
-  return world;
+
+  World world_;
+  std::vector<Door> doors_;
+  // The line that is being read.
+  int line_ = 0;
+  std::string keyword_;
+  std::vector<double> values_;
+};
+
+}  // namespace
+
+World ReadWorld(std::istream& input, const std::string& name) {
+  return WorldReader(name).Read(input);
 }
 
 void WriteWorld(const World& world, std::ostream& output) {

@@ -11,7 +11,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
+#include <string>
 #include <thread>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -84,73 +87,92 @@ std::string Describe(int status) {
   return "exit status " + std::to_string(WEXITSTATUS(status));
 }
 
+[[noreturn]] void ThrowCannotRun(const ChildOptions& options) {
+  throw Error(options.command[0], 0,
+              std::string("cannot be run: ") + std::strerror(errno), "");
+}
+
+// Where the child's output goes; -1 when it stays ours.
+int OpenLog(const std::string& path) {
+  if (path.empty()) return -1;
+  const int log =
+      open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (log < 0) {
+    throw Error(path, 0,
+                std::string("cannot be written: ") + std::strerror(errno),
+                "a writable place");
+  }
+  return log;
+}
+
+// Why the child did not become the program (an errno), from its end of the
+// pipe; 0 when it did.
+int ReadFailure(int pipe) {
+  int reason = 0;
+  ssize_t count;
+  do {
+    count = read(pipe, &reason, sizeof(reason));
+  } while (count < 0 && errno == EINTR);
+  return count == sizeof(reason) ? reason : 0;
+}
+
+// Waits until the child has ended, which is left unburied, so that its number
+// stays its own. Asked to stop, it gets some time to end by itself; true when
+// it was.
+bool WaitForEnd(pid_t child, const std::function<bool()>& stop) {
+  bool is_stopped = false;
+  std::chrono::steady_clock::time_point kill_time;
+  for (;;) {
+    siginfo_t ended = {};
+    if (waitid(P_PID, static_cast<id_t>(child), &ended,
+               WEXITED | WNOHANG | WNOWAIT) == 0 &&
+        ended.si_pid == child) {
+      return is_stopped;
+    }
+    const auto now = std::chrono::steady_clock::now();
+    if (!is_stopped && stop && stop()) {
+      is_stopped = true;
+      kill(-child, SIGTERM);
+      kill_time = now + kGrace;
+    } else if (is_stopped && now >= kill_time) {
+      kill(-child, SIGKILL);
+      kill_time = now + kGrace;
+    }
+    std::this_thread::sleep_for(kPause);
+  }
+}
+
 }  // namespace
 
 ChildResult RunChild(const ChildOptions& options) {
   if (options.command.empty()) {
     throw PLUMBLINE_ERROR("there is no program to run", "a command");
   }
-  Descriptor output(-1);
-  if (!options.log.empty()) {
-    output.number = open(options.log.c_str(),
-                         O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-    if (output.number < 0) {
-      throw Error(options.log, 0,
-                  std::string("cannot be written: ") + std::strerror(errno),
-                  "a writable place");
-    }
-  }
-  Descriptor input(OpenInput(options.input));
+  const Descriptor output(OpenLog(options.log));
+  const Descriptor input(OpenInput(options.input));
   int failure[2] = {-1, -1};
   if (input.number < 0 || pipe2(failure, O_CLOEXEC) != 0) {
-    throw Error(options.command[0], 0,
-                std::string("cannot be run: ") + std::strerror(errno), "");
+    ThrowCannotRun(options);
   }
-  Descriptor failure_read(failure[0]);
+  const Descriptor failure_read(failure[0]);
   Descriptor failure_write(failure[1]);
   const pid_t parent = getpid();
   const pid_t child = fork();
-  if (child < 0) {
-    throw Error(options.command[0], 0,
-                std::string("cannot be run: ") + std::strerror(errno), "");
-  }
+  if (child < 0) ThrowCannotRun(options);
   if (child == 0) {
     Become(options, input.number, output.number, failure_write.number, parent);
   }
   // By both, so that the group is there whoever comes first.
   setpgid(child, child);
   failure_write.Close();
-  int reason = 0;
-  ssize_t count;
-  do {
-    count = read(failure_read.number, &reason, sizeof(reason));
-  } while (count < 0 && errno == EINTR);
+  const int reason = ReadFailure(failure_read.number);
 
   ChildResult result;
+  result.stopped = WaitForEnd(child, options.stop);
   int status = 0;
-  std::chrono::steady_clock::time_point kill_time;
-  for (;;) {
-    // Left unburied for now, so that its number stays its own.
-    siginfo_t ended = {};
-    if (waitid(P_PID, static_cast<id_t>(child), &ended,
-               WEXITED | WNOHANG | WNOWAIT) == 0 &&
-        ended.si_pid == child) {
-      break;
-    }
-    const auto now = std::chrono::steady_clock::now();
-    if (!result.stopped && options.stop && options.stop()) {
-      result.stopped = true;
-      kill(-child, SIGTERM);
-      kill_time = now + kGrace;
-    } else if (result.stopped && now >= kill_time) {
-      kill(-child, SIGKILL);
-      kill_time = now + kGrace;
-    }
-    std::this_thread::sleep_for(kPause);
-  }
   kill(-child, SIGKILL);
   waitpid(child, &status, 0);
-  if (count == sizeof(reason)) {
+  if (reason != 0) {
     result.failure = std::string("cannot be run: ") + std::strerror(reason);
   } else if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     result.failure = Describe(status);

@@ -182,7 +182,9 @@ Row Measure(int points, bool has_phases, const Registry& registry) {
     options.loop_tolerance = kPointsLoopTolerance;
     EmOrchestrator em(
         city.graph(), &session, registry,
-        MakeHierarchy(DefaultHierarchy({"point"}), registry, {"point"}, {}),
+        MakeHierarchy(
+            DefaultHierarchy({&registry.GetFeature("point")}, registry),
+            registry, {"point"}, {}),
         options);
     if (has_phases) em.SetTrace(PhasePrinter(session));
     report = em.Run();

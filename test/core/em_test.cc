@@ -83,6 +83,7 @@ class EmTest : public WallsTest {
            TestDetector::Function detect) {
     const auto size = static_cast<std::size_t>(level) + 1;
     if (hierarchy_.size() < size) hierarchy_.resize(size);
+    RegisterTestDetector(name, &registry_);
     hierarchy_[size - 1].push_back(
         std::make_unique<TestDetector>(name, support, std::move(detect)));
   }
@@ -623,6 +624,7 @@ TEST_F(EmTest, AFeatureThatSaysNothingIsDroppedOnce) {
 TEST_F(EmTest, AFollowerStaysWhereItsDetectorSaysSo) {
   const FeatureId wall = AddSegment(0.0);
   hierarchy_.resize(1);
+  RegisterTestDetector("directions", &registry_);
   hierarchy_[0].push_back(std::make_unique<TestDetector>(
       "directions", 1, DirectionDetector({0.0}), true));
   EXPECT_TRUE(Make().Run().converged);

@@ -7,6 +7,7 @@
 #include <plumbline/factors/angle.h>
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +39,21 @@ class TestDetector : public StructureDetector {
   bool keeps_followers_;
   Function detect_;
 };
+
+// Registers a detector of this name, unless there is one. Tests make theirs by
+// hand.
+inline const DetectorType& RegisterTestDetector(const std::string& name,
+                                                Registry* registry) {
+  const DetectorType* const there = registry->FindDetector(name);
+  if (there != nullptr) return *there;
+  DetectorType type;
+  type.name = name;
+  type.reads = {"segment"};
+  type.make = [name](const DetectorParameters&) {
+    return std::make_unique<TestDetector>(name, 1, nullptr);
+  };
+  return registry->Register(std::move(type));
+}
 
 inline Feature Orientation(const Registry& registry, double angle,
                            int level = 1) {
@@ -121,10 +137,10 @@ class WallsTest : public ::testing::Test {
   // An orientation of level 1 at this direction, with constraints to these
   // walls, tolerance 0.5 degrees, as a detector of this name makes it.
   FeatureId AddOrientation(double degrees, const std::vector<FeatureId>& walls,
-                           const std::string& source = "directions") {
+                           const std::string& maker = "directions") {
     Transaction transaction;
     Feature orientation = Orientation(registry_, DegToRad(degrees));
-    orientation.source = source;
+    orientation.maker = &RegisterTestDetector(maker, &registry_);
     const FeatureId id = transaction.AddFeature(orientation);
     for (const FeatureId wall : walls) {
       transaction.AddConstraint(

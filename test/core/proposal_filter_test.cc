@@ -20,8 +20,18 @@ class ProposalFilterTest : public WallsTest {
  protected:
   ProposalFilterTest()
       : detector_("directions", 2, nullptr),
+        hierarchy_(MakeTestHierarchy()),
         memory_(&graph_, EmOptions()),
-        support_(&graph_, hierarchy_) {}
+        support_(&graph_, hierarchy_, registry_) {}
+
+  // Has a detector of the name of detector_.
+  Hierarchy MakeTestHierarchy() {
+    RegisterTestDetector("directions", &registry_);
+    Hierarchy hierarchy(1);
+    hierarchy[0].push_back(
+        std::make_unique<TestDetector>("directions", 2, nullptr));
+    return hierarchy;
+  }
 
   Transaction Filter(Transaction proposal) const {
     return ProposalFilter(&graph_, priors_, &memory_, &support_)
@@ -54,6 +64,8 @@ TEST_F(ProposalFilterTest, ANewProposalPassesWithItsMakersName) {
   ASSERT_EQ(accepted.added_features().size(), 1u);
   EXPECT_TRUE(accepted.added_features()[0].is_virtual);
   EXPECT_EQ(accepted.added_features()[0].source, "directions");
+  EXPECT_EQ(accepted.added_features()[0].maker,
+            registry_.FindDetector("directions"));
   ASSERT_EQ(accepted.added_constraints().size(), 2u);
   EXPECT_EQ(accepted.added_constraints()[1].source, "directions");
   graph_.Apply(accepted);

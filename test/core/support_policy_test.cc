@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <plumbline/core/error.h>
 #include <plumbline/core/support_policy.h>
 
 #include <memory>
@@ -21,6 +22,7 @@ class SupportPolicyTest : public WallsTest {
   }
 
   void Add(const std::string& name, int support, bool keeps_followers) {
+    RegisterTestDetector(name, &registry_);
     hierarchy_[0].push_back(std::make_unique<TestDetector>(
         name, support, nullptr, keeps_followers));
   }
@@ -46,7 +48,7 @@ class SupportPolicyTest : public WallsTest {
 TEST_F(SupportPolicyTest, LooksOnlyAtWhatLostSomething) {
   const FeatureId wall = AddSegment(0.0);
   const FeatureId lonely = AddOrientation(0.0, {wall}, "two");
-  SupportPolicy policy(&graph_, hierarchy_);
+  SupportPolicy policy(&graph_, hierarchy_, registry_);
   EXPECT_FALSE(policy.DropUnsupported());
   EXPECT_TRUE(IsThere(lonely));
   policy.RecheckAll();
@@ -60,12 +62,35 @@ TEST_F(SupportPolicyTest, TheMinimumIsTheDetectors) {
   const FeatureId b = AddSegment(0.0);
   const FeatureId c = AddSegment(0.0);
   const FeatureId orientation = AddOrientation(0.0, {a, b, c}, "two");
-  SupportPolicy policy(&graph_, hierarchy_);
+  SupportPolicy policy(&graph_, hierarchy_, registry_);
   Lose(&policy, a, orientation);
   EXPECT_FALSE(policy.DropUnsupported());
   Lose(&policy, b, orientation);
   EXPECT_TRUE(policy.DropUnsupported());
   EXPECT_FALSE(IsThere(orientation));
+}
+
+// Who made a feature is in its maker; a source is a label.
+TEST_F(SupportPolicyTest, ALabelDecidesNothing) {
+  const FeatureId a = AddSegment(0.0);
+  const FeatureId b = AddSegment(0.0);
+  const FeatureId follower = AddOrientation(0.0, {a, b}, "follower");
+  graph_.GetFeature(follower).source = "two";
+  const FeatureId labelled = AddOrientation(0.0, {a, b}, "two");
+  graph_.GetFeature(labelled).source = "follower";
+  SupportPolicy policy(&graph_, hierarchy_, registry_);
+  EXPECT_EQ(policy.TypeOf(Detector("two")), registry_.FindDetector("two"));
+  Break(Between(a, follower));
+  Break(Between(a, labelled));
+  policy.RecheckAll();
+  EXPECT_TRUE(policy.DropUnsupported());
+  EXPECT_TRUE(IsThere(follower));
+  EXPECT_FALSE(IsThere(labelled));
+}
+
+TEST_F(SupportPolicyTest, RefusesADetectorThatIsNotRegistered) {
+  hierarchy_[0].push_back(std::make_unique<TestDetector>("nobody", 1, nullptr));
+  EXPECT_THROW(SupportPolicy(&graph_, hierarchy_, registry_), Error);
 }
 
 TEST_F(SupportPolicyTest, FixedMeasuredAndFollowersStay) {
@@ -83,7 +108,7 @@ TEST_F(SupportPolicyTest, FixedMeasuredAndFollowersStay) {
   const FeatureId follower = AddOrientation(0.0, {wall}, "follower");
   const FeatureId silent = AddOrientation(0.0, {wall}, "one");
   const FeatureId stranger = AddOrientation(0.0, {wall, AddSegment(0.0)}, "x");
-  SupportPolicy policy(&graph_, hierarchy_);
+  SupportPolicy policy(&graph_, hierarchy_, registry_);
   policy.RecheckAll();
   policy.DropUnsupported();
   EXPECT_TRUE(IsThere(added.features[0]));
@@ -96,7 +121,7 @@ TEST_F(SupportPolicyTest, FixedMeasuredAndFollowersStay) {
 TEST_F(SupportPolicyTest, WhatSaidNothingIsNotFoundAgain) {
   const FeatureId wall = AddSegment(0.0);
   const FeatureId silent = AddOrientation(0.0, {wall}, "one");
-  SupportPolicy policy(&graph_, hierarchy_);
+  SupportPolicy policy(&graph_, hierarchy_, registry_);
   const FeatureId provisional = Transaction::ProvisionalId(0);
   const Constraint to_wall =
       Structure(registry_, "segment_orientation", wall, provisional, 0.0, 0.5);
@@ -130,7 +155,7 @@ TEST_F(SupportPolicyTest, DroppingGoesUpTheLevels) {
       AddOrientation(30.0, {AddSegment(30.0), AddSegment(30.0)}, "two");
   Transaction transaction;
   Feature high = Orientation(registry_, 0.0, 2);
-  high.source = "two";
+  high.maker = &registry_.GetDetector("two");
   const FeatureId provisional = transaction.AddFeature(high);
   for (const FeatureId id : {low, other}) {
     transaction.AddConstraint(Structure(registry_, "orientation_orientation",
@@ -152,7 +177,7 @@ TEST_F(SupportPolicyTest, DroppingGoesUpTheLevels) {
     }
     SupportPolicy* policy;
   };
-  SupportPolicy policy(&graph_, hierarchy_);
+  SupportPolicy policy(&graph_, hierarchy_, registry_);
   Listener listener(&policy);
   graph_.AddListener(&listener);
   Break(Between(a, low));

@@ -3,18 +3,32 @@
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/default_hierarchy.h>
 
-#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
 namespace {
 
-std::string TextFor(const std::set<std::string>& raw) {
-  return FormatHierarchy(DefaultHierarchy(raw));
-}
+class DefaultHierarchyTest : public ::testing::Test {
+ protected:
+  DefaultHierarchyTest() { RegisterBuiltins(&registry_); }
 
-TEST(DefaultHierarchyTest, ByRawFeatures) {
+  HierarchySpec For(const std::vector<std::string>& raw) const {
+    std::vector<const FeatureType*> types;
+    for (const std::string& name : raw) {
+      types.push_back(&registry_.GetFeature(name));
+    }
+    return DefaultHierarchy(types, registry_);
+  }
+  std::string TextFor(const std::vector<std::string>& raw) const {
+    return FormatHierarchy(For(raw));
+  }
+
+  Registry registry_;
+};
+
+TEST_F(DefaultHierarchyTest, ByRawFeatures) {
   EXPECT_EQ(TextFor({}), "");
   EXPECT_EQ(TextFor({"pose"}), "");
   EXPECT_EQ(TextFor({"segment", "pose"}),
@@ -30,19 +44,25 @@ TEST(DefaultHierarchyTest, ByRawFeatures) {
             "orientation_relation");
 }
 
-TEST(DefaultHierarchyTest, EveryOneCanBeMade) {
-  Registry registry;
-  RegisterBuiltins(&registry);
+TEST_F(DefaultHierarchyTest, ATypeThatNoDetectorReadsHasNone) {
+  FeatureType fence = registry_.GetFeature("segment");
+  fence.name = "fence";
+  fence.g2o_tag = "FENCE";
+  fence.other_g2o_formats.clear();
+  registry_.Register(std::move(fence));
+  EXPECT_EQ(TextFor({"fence"}), "");
+}
+
+TEST_F(DefaultHierarchyTest, EveryOneCanBeMade) {
   const std::vector<std::string> types = {"point", "pose",   "segment",
                                           "line",  "circle", "orientation"};
   for (unsigned subset = 0; subset < 1u << types.size(); ++subset) {
-    std::set<std::string> raw;
+    std::vector<std::string> raw;
     for (std::size_t i = 0; i < types.size(); ++i) {
-      if ((subset >> i) % 2 == 1) raw.insert(types[i]);
+      if ((subset >> i) % 2 == 1) raw.push_back(types[i]);
     }
     SCOPED_TRACE(TextFor(raw));
-    EXPECT_NO_THROW(MakeHierarchy(DefaultHierarchy(raw), registry,
-                                  {raw.begin(), raw.end()}, {}));
+    EXPECT_NO_THROW(MakeHierarchy(For(raw), registry_, raw, {}));
   }
 }
 

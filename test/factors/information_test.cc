@@ -14,10 +14,13 @@ namespace {
 
 using testing::Random;
 
-template <typename Matrix>
+// Sizes are known at run time wherever a test does not ask for another: the
+// decompositions of each fixed size take seconds to compile.
+using Matrix = Eigen::MatrixXd;
+
 void ExpectUpperRoot(const Matrix& information, double tolerance = 1e-12) {
   const Matrix root = SqrtInformation(information);
-  EXPECT_LT((root.transpose() * root - information).norm(),
+  EXPECT_LT((root.transpose().lazyProduct(root) - information).norm(),
             tolerance * (1.0 + information.norm()))
       << root;
   for (Eigen::Index i = 0; i < root.rows(); ++i) {
@@ -28,9 +31,9 @@ void ExpectUpperRoot(const Matrix& information, double tolerance = 1e-12) {
 
 TEST(SqrtInformationTest, FullMatrixByHand) {
   // [4 2; 2 5] = L' L with L = [2 1; 0 2].
-  Eigen::Matrix2d information;
+  Matrix information(2, 2);
   information << 4.0, 2.0, 2.0, 5.0;
-  const Eigen::Matrix2d root = SqrtInformation(information);
+  const Matrix root = SqrtInformation(information);
   EXPECT_DOUBLE_EQ(root(0, 0), 2.0);
   EXPECT_DOUBLE_EQ(root(0, 1), 1.0);
   EXPECT_EQ(root(1, 0), 0.0);
@@ -44,7 +47,7 @@ TEST(SqrtInformationTest, FullMatrixByHand) {
 }
 
 TEST(SqrtInformationTest, ThreeByThreeKeepsTheQuadraticForm) {
-  Eigen::Matrix3d information;
+  Matrix information(3, 3);
   information << 4.0, 1.0, 0.5,  //
       1.0, 3.0, -0.5,            //
       0.5, -0.5, 2.0;
@@ -60,26 +63,29 @@ TEST(SqrtInformationTest, ThreeByThreeKeepsTheQuadraticForm) {
   ExpectUpperRoot(information);
 }
 
-TEST(SqrtInformationTest, FixedDynamicAndScalar) {
-  Eigen::MatrixXd dynamic(2, 2);
-  dynamic << 4.0, 2.0, 2.0, 5.0;
-  ExpectUpperRoot(dynamic);
-  const Eigen::Matrix<double, 1, 1> scalar(9.0);
-  EXPECT_DOUBLE_EQ(SqrtInformation(scalar)(0, 0), 3.0);
-  // An expression.
-  EXPECT_DOUBLE_EQ(SqrtInformation(4.0 * Eigen::Matrix2d::Identity())(1, 1),
-                   2.0);
+TEST(SqrtInformationTest, FixedSizeAndExpression) {
+  using Scalar = Eigen::Matrix<double, 1, 1>;
+  const Scalar scalar(9.0);
+  const Scalar root = SqrtInformation(scalar);
+  EXPECT_DOUBLE_EQ(root(0, 0), 3.0);
+  EXPECT_DOUBLE_EQ(SqrtInformation(4.0 * scalar)(0, 0), 6.0);
+  Eigen::Matrix2d covariance;
+  covariance << 5.0, 0.5, 0.5, 0.25;
+  const Eigen::Matrix2d of_covariance =
+      SqrtInformationFromCovariance(covariance);
+  EXPECT_EQ(Matrix(of_covariance),
+            SqrtInformationFromCovariance(Matrix(covariance)));
 }
 
 TEST(SqrtInformationTest, RandomMatricesOfAllRanks) {
   Random random(31);
   for (int size = 1; size <= 6; ++size) {
     for (int rank = 0; rank <= size; ++rank) {
-      Eigen::MatrixXd rows(rank, size);
+      Matrix rows(rank, size);
       for (int i = 0; i < rank; ++i) {
         for (int j = 0; j < size; ++j) rows(i, j) = random.Uniform(-2.0, 2.0);
       }
-      const Eigen::MatrixXd information = rows.transpose() * rows;
+      const Matrix information = rows.transpose().lazyProduct(rows);
       EXPECT_TRUE(IsValidInformation(information));
       EXPECT_EQ(InformationRank(information), rank);
       ExpectUpperRoot(information, 1e-9);
@@ -90,46 +96,46 @@ TEST(SqrtInformationTest, RandomMatricesOfAllRanks) {
 TEST(SqrtInformationTest, WallSaysNothingAlongIt) {
   // Information 100 across a wall at 30 degrees, none along it.
   const Eigen::Vector2d normal(-0.5, std::sqrt(0.75));
-  const Eigen::Matrix2d information = 100.0 * normal * normal.transpose();
+  const Matrix information = 100.0 * normal * normal.transpose();
   EXPECT_EQ(InformationRank(information), 1);
-  const Eigen::Matrix2d root = SqrtInformation(information);
+  const Matrix root = SqrtInformation(information);
   EXPECT_NEAR((root * normal).norm(), 10.0, 1e-6);
   EXPECT_NEAR((root * Eigen::Vector2d(std::sqrt(0.75), 0.5)).norm(), 0.0, 1e-6);
 }
 
 TEST(SqrtInformationTest, ZeroIsValid) {
-  EXPECT_TRUE(IsValidInformation(Eigen::Matrix3d::Zero()));
-  EXPECT_EQ(InformationRank(Eigen::Matrix3d::Zero()), 0);
-  EXPECT_EQ(SqrtInformation(Eigen::Matrix3d::Zero()), Eigen::Matrix3d::Zero());
+  EXPECT_TRUE(IsValidInformation(Matrix::Zero(3, 3)));
+  EXPECT_EQ(InformationRank(Matrix::Zero(3, 3)), 0);
+  EXPECT_EQ(SqrtInformation(Matrix::Zero(3, 3)), Matrix::Zero(3, 3));
 }
 
 TEST(SqrtInformationTest, RankDoesNotDependOnUnits) {
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Matrix information = Matrix::Zero(3, 3);
   information.diagonal() << 1e-9, 1e9, 1.0;
   EXPECT_EQ(InformationRank(information), 3);
   ExpectUpperRoot(information);
   information(2, 2) = 0.0;
   EXPECT_EQ(InformationRank(information), 2);
-  const Eigen::Matrix3d root = SqrtInformation(information);
+  const Matrix root = SqrtInformation(information);
   EXPECT_NEAR(root(0, 0), std::sqrt(1e-9), 1e-15);
   EXPECT_NEAR(root(1, 1), std::sqrt(1e9), 1e-6);
   EXPECT_EQ(root(2, 2), 0.0);
 }
 
 TEST(SqrtInformationTest, RefusesWhatIsNoInformation) {
-  Eigen::Matrix2d asymmetric;
+  Matrix asymmetric(2, 2);
   asymmetric << 1.0, 0.5, 0.0, 1.0;
-  Eigen::Matrix2d indefinite;
+  Matrix indefinite(2, 2);
   indefinite << 1.0, 2.0, 2.0, 1.0;
-  Eigen::Matrix2d negative;
+  Matrix negative(2, 2);
   negative << 1.0, 0.0, 0.0, -1e-3;
-  Eigen::Matrix2d off_zero;
+  Matrix off_zero(2, 2);
   off_zero << 0.0, 0.1, 0.1, 1.0;
-  Eigen::Matrix2d nan = Eigen::Matrix2d::Identity();
+  Matrix nan = Matrix::Identity(2, 2);
   nan(1, 1) = std::numeric_limits<double>::quiet_NaN();
-  Eigen::Matrix2d infinite = Eigen::Matrix2d::Identity();
+  Matrix infinite = Matrix::Identity(2, 2);
   infinite(0, 0) = std::numeric_limits<double>::infinity();
-  for (const Eigen::Matrix2d& matrix :
+  for (const Matrix& matrix :
        {asymmetric, indefinite, negative, off_zero, nan, infinite}) {
     EXPECT_FALSE(IsValidInformation(matrix)) << matrix;
     EXPECT_THROW(SqrtInformation(matrix), std::invalid_argument) << matrix;
@@ -138,26 +144,25 @@ TEST(SqrtInformationTest, RefusesWhatIsNoInformation) {
         << matrix;
   }
   // Every pair is possible, all three together are not.
-  Eigen::Matrix3d triple;
+  Matrix triple(3, 3);
   triple << 1.0, 0.9, 0.9,  //
       0.9, 1.0, -0.9,       //
       0.9, -0.9, 1.0;
   EXPECT_FALSE(IsValidInformation(triple));
   EXPECT_THROW(SqrtInformation(triple), std::invalid_argument);
 
-  EXPECT_FALSE(IsValidInformation(Eigen::MatrixXd::Identity(2, 3)));
-  EXPECT_FALSE(IsValidInformation(Eigen::MatrixXd(0, 0)));
-  EXPECT_THROW(
-      SqrtInformation(Eigen::MatrixXd(Eigen::MatrixXd::Identity(2, 3))),
-      std::invalid_argument);
+  EXPECT_FALSE(IsValidInformation(Matrix::Identity(2, 3)));
+  EXPECT_FALSE(IsValidInformation(Matrix(0, 0)));
+  EXPECT_THROW(SqrtInformation(Matrix(Matrix::Identity(2, 3))),
+               std::invalid_argument);
 }
 
 TEST(SqrtInformationTest, ToleratesRounding) {
-  Eigen::Matrix2d information;
+  Matrix information(2, 2);
   information << 4.0, 2.0 + 1e-12, 2.0, 5.0;
   EXPECT_TRUE(IsValidInformation(information));
   // Singular, and by a rounding error indefinite.
-  Eigen::Matrix2d singular;
+  Matrix singular(2, 2);
   singular << 1.0, 1.0 + 1e-13, 1.0 + 1e-13, 1.0;
   EXPECT_TRUE(IsValidInformation(singular));
   EXPECT_EQ(InformationRank(singular), 1);
@@ -166,9 +171,9 @@ TEST(SqrtInformationTest, ToleratesRounding) {
 
 TEST(SqrtInformationFromCovarianceTest, ByHand) {
   // covariance = U U' with U = [2 1; 0 0.5], so L = inverse(U) = [0.5 -1; 0 2].
-  Eigen::Matrix2d covariance;
+  Matrix covariance(2, 2);
   covariance << 5.0, 0.5, 0.5, 0.25;
-  const Eigen::Matrix2d root = SqrtInformationFromCovariance(covariance);
+  const Matrix root = SqrtInformationFromCovariance(covariance);
   EXPECT_NEAR(root(0, 0), 0.5, 1e-14);
   EXPECT_NEAR(root(0, 1), -1.0, 1e-14);
   EXPECT_EQ(root(1, 0), 0.0);
@@ -178,26 +183,26 @@ TEST(SqrtInformationFromCovarianceTest, ByHand) {
 TEST(SqrtInformationFromCovarianceTest, AgreesWithTheInverse) {
   Random random(32);
   for (int size = 1; size <= 6; ++size) {
-    Eigen::MatrixXd rows(size, size);
+    Matrix rows(size, size);
     for (int i = 0; i < size; ++i) {
       for (int j = 0; j < size; ++j) rows(i, j) = random.Uniform(-2.0, 2.0);
     }
-    const Eigen::MatrixXd covariance =
-        rows.transpose() * rows + 0.1 * Eigen::MatrixXd::Identity(size, size);
-    const Eigen::MatrixXd root = SqrtInformationFromCovariance(covariance);
-    EXPECT_LT((root.transpose() * root * covariance -
-               Eigen::MatrixXd::Identity(size, size))
-                  .norm(),
-              1e-11);
+    const Matrix covariance =
+        rows.transpose().lazyProduct(rows) + 0.1 * Matrix::Identity(size, size);
+    const Matrix root = SqrtInformationFromCovariance(covariance);
+    EXPECT_LT(
+        (root.transpose() * root * covariance - Matrix::Identity(size, size))
+            .norm(),
+        1e-11);
     EXPECT_LT((root - SqrtInformation(covariance.inverse().eval())).norm(),
               1e-9);
   }
 }
 
 TEST(SqrtInformationFromCovarianceTest, RefusesSingularCovariance) {
-  EXPECT_THROW(SqrtInformationFromCovariance(Eigen::Matrix2d::Zero()),
+  EXPECT_THROW(SqrtInformationFromCovariance(Matrix::Zero(2, 2)),
                std::invalid_argument);
-  EXPECT_THROW(SqrtInformationFromCovariance(Eigen::Matrix2d::Ones()),
+  EXPECT_THROW(SqrtInformationFromCovariance(Matrix::Ones(2, 2)),
                std::invalid_argument);
 }
 

@@ -49,7 +49,9 @@ TEST_F(GraphSolverTest, IsTheLoopWithWhatThePointsAskFor) {
   em_options.loop_tolerance = kPointsLoopTolerance;
   EmOrchestrator em(
       &by_hand, &session, registry_,
-      MakeHierarchy(DefaultHierarchy({"point"}), registry_, {"point"}, {}),
+      MakeHierarchy(
+          DefaultHierarchy({&registry_.GetFeature("point")}, registry_),
+          registry_, {"point"}, {}),
       em_options);
   const EmReport expected = em.Run();
 

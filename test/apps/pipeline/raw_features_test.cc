@@ -3,6 +3,8 @@
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/raw_features.h>
 
+#include <vector>
+
 namespace plumbline {
 namespace {
 
@@ -30,9 +32,16 @@ TEST(RawFeaturesTest, ProfilesNameTheirOwnKind) {
 }
 
 TEST(RawFeaturesTest, OfAGraph) {
-  EXPECT_EQ(ProfileOf(std::set<std::string>{}).kind, RawFeatures::kSegments);
-  EXPECT_EQ(ProfileOf({"segment", "pose"}).kind, RawFeatures::kSegments);
-  EXPECT_EQ(ProfileOf({"point", "segment"}).kind, RawFeatures::kPoints);
+  Registry registry;
+  RegisterBuiltins(&registry);
+  const auto kind = [&](const std::vector<const char*>& names) {
+    std::vector<const FeatureType*> types;
+    for (const char* name : names) types.push_back(&registry.GetFeature(name));
+    return ProfileOf(types).kind;
+  };
+  EXPECT_EQ(kind({}), RawFeatures::kSegments);
+  EXPECT_EQ(kind({"segment", "pose"}), RawFeatures::kSegments);
+  EXPECT_EQ(kind({"point", "segment"}), RawFeatures::kPoints);
 }
 
 TEST(RawFeaturesTest, WhatAKindCannotDoIsOff) {

@@ -66,16 +66,11 @@ int main() {
     wall.fixed = false;
     const plumbline::FeatureId id = transaction.AddFeature(wall);
 
-    plumbline::Constraint measurement;
-    measurement.type = &registry.GetRelation("pose_pose");
-    measurement.features = {previous, id};
-    measurement.expected = step;
-    measurement.information =
-        Eigen::Vector3d(1.0 / kPositionSigma, 1.0 / kPositionSigma,
-                        1.0 / kHeadingSigma)
-            .cwiseAbs2()
-            .asDiagonal();
-    transaction.AddConstraint(measurement);
+    transaction.AddConstraint(plumbline::MakeMeasurement(
+        registry.GetRelation("pose_pose"), {previous, id}, step,
+        plumbline::InformationFromSigmas(
+            Eigen::Vector3d(kPositionSigma, kPositionSigma, kHeadingSigma)),
+        "example"));
     previous = id;
   }
   graph.Apply(std::move(transaction));
@@ -93,7 +88,7 @@ int main() {
 
   int orientations = 0;
   for (const plumbline::Feature* feature : graph.Features()) {
-    if (feature->type->name == "orientation") ++orientations;
+    if (feature->type->Is(plumbline::FeatureRole::kDirection)) ++orientations;
   }
   const double after = WorstDirection(graph);
   std::printf(

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -42,11 +43,10 @@ plumbline::Transaction EqualRadiusDetector::Detect(
       registry.GetRelation(EqualRadius::kName);
   plumbline::Transaction transaction;
   std::vector<const plumbline::Feature*> before;
-  for (const plumbline::Feature* circle : graph.Features()) {
-    if (!circle->type->Is(plumbline::FeatureRole::kCircle) ||
-        circle->level != scope.level) {
-      continue;
-    }
+  std::int64_t refused = 0;
+  for (const plumbline::Feature* circle :
+       plumbline::FeaturesInScope(graph, scope)) {
+    if (!circle->type->Is(plumbline::FeatureRole::kCircle)) continue;
     const plumbline::Feature* nearest = nullptr;
     double nearest_gap = options_.gate;
     for (const plumbline::Feature* other : before) {
@@ -57,18 +57,16 @@ plumbline::Transaction EqualRadiusDetector::Detect(
       }
     }
     before.push_back(circle);
+    refused += nearest == nullptr;
     if (nearest == nullptr || IsTied(graph, *circle, relation)) continue;
-
-    plumbline::Constraint constraint;
-    constraint.type = &relation;
-    constraint.features = {nearest->id, circle->id};
-    constraint.expected = Eigen::VectorXd::Zero(1);
-    constraint.information = Eigen::MatrixXd::Constant(
-        1, 1, 1.0 / (options_.sigma * options_.sigma));
-    constraint.kind = plumbline::ConstraintClass::kStructure;
-    constraint.source = name();
-    transaction.AddConstraint(std::move(constraint));
+    transaction.AddConstraint(plumbline::MakeStructure(
+        relation, {nearest->id, circle->id}, Eigen::VectorXd::Zero(1),
+        plumbline::InformationFromSigmas(
+            Eigen::VectorXd::Constant(1, options_.sigma)),
+        name()));
   }
+  scope.Count("circles", static_cast<std::int64_t>(before.size()));
+  scope.Count("circles refused: no other of this radius", refused);
   return transaction;
 }
 //! [detector]

@@ -12,7 +12,7 @@
 
 namespace plumbline {
 
-/// What a constraint says, as a cost function: r = root (f(x) (-) expected).
+/// The cost function of a constraint: r = root (f(x) (-) expected).
 /// `features` are those that it is between, in its order: types and anchors
 /// are read, parameters are not. Throws Error when they do not fit.
 std::unique_ptr<ceres::CostFunction> MakeCost(
@@ -52,7 +52,7 @@ struct LinearizedConstraint {
 LinearizedConstraint Linearize(const Graph& graph, const Constraint& constraint,
                                const ceres::CostFunction& cost);
 
-/// The same with residual and Jacobians times a weight.
+/// The model with residual and Jacobians multiplied by a weight.
 LinearizedConstraint Weighted(LinearizedConstraint linearized, double weight);
 
 }  // namespace plumbline

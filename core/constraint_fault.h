@@ -8,8 +8,8 @@
 
 namespace plumbline {
 
-/// What Graph::Apply refuses in a constraint, for readers that name the place
-/// in a file.
+/// A fault for which Graph::Apply refuses a constraint: for readers, which add
+/// the place in a file.
 struct ConstraintFault {
   /// Empty when there is nothing wrong.
   std::string what;

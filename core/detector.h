@@ -13,12 +13,12 @@
 
 namespace plumbline {
 
-/// What a detector searched, refused and why, by name ("pairs searched",
+/// Counts of what a detector searched and refused, by name ("pairs searched",
 /// "pairs refused: no overlap"): for traces and whoever wonders why something
 /// was not found.
 using DetectionCounts = std::map<std::string, std::int64_t>;
 
-/// Where to look for structure.
+/// The part of a graph in which a detector looks for structure.
 struct DetectionScope {
   /// Features that a detector reads are of this level (virtual ones that it
   /// extends are one level up).
@@ -36,7 +36,7 @@ struct DetectionScope {
   /// Asked now and then by detectors that may take longer than a second; may be
   /// empty. Once it has returned true, what Detect returns is not used.
   std::function<bool()> stop;
-  /// Where the detector counts what it does; null when nobody asks.
+  /// Counts of the detector's work; null when nobody asks.
   DetectionCounts* counts = nullptr;
 
   /// True when Detect shall return at once.
@@ -82,8 +82,8 @@ class StructureDetector {
   /// stand in a row.
   virtual bool keeps_followers() const { return false; }
 
-  /// What is seen in the scope and is not in the graph yet; empty when there is
-  /// nothing. Ids of new features are provisional.
+  /// Returns what is seen in the scope and is not in the graph yet, as an empty
+  /// transaction where there is nothing. Ids of new features are provisional.
   virtual Transaction Detect(const Graph& graph, const Registry& registry,
                              const DetectionScope& scope) const = 0;
 };

@@ -32,7 +32,7 @@ struct EmPhase {
   /// is dropped).
   int structure_constraints = 0;
   int broken_constraints = 0;
-  /// The same by relation name; of structure only.
+  /// Both by relation name; structure only.
   std::map<std::string, int> structure_by_relation;
   std::map<std::string, int> broken_by_relation;
   /// By the name of the detector, in a phase that detects: what it searched and
@@ -42,7 +42,7 @@ struct EmPhase {
   double seconds = 0.0;
 };
 
-/// What a run of EM came to.
+/// Result of a run of EM.
 struct EmReport {
   int iterations = 0;
   bool converged = false;

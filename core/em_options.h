@@ -8,7 +8,7 @@
 
 namespace plumbline {
 
-/// What is known of a relation before the building was seen.
+/// Prior knowledge of a relation, before the building was seen.
 struct RelationPrior {
   /// False: proposals of it are left out.
   bool is_expected = true;
@@ -17,7 +17,7 @@ struct RelationPrior {
   std::vector<double> sigmas;
 };
 
-/// When structure is broken, proposed again, and when the loop ends.
+/// Options of EM: when structure is broken and proposed again, and convergence.
 struct EmOptions {
   /// Structure constraints with a smaller delta are broken.
   double delta_threshold = 0.3;
@@ -27,7 +27,7 @@ struct EmOptions {
   /// largest, then solve and look again, so that what a wrong hypothesis bends
   /// is not broken with it. 0: break all at once (the paper).
   double break_share = 0.0;
-  /// What the E-step judges structure by. False: the solve under the weights of
+  /// The solve that the E-step judges structure by. False: under the weights of
   /// the E-step before. A low weight lets the residual grow, and that lowers
   /// the weight again, until what lies some 1.5 standard deviations of its
   /// measurements off is broken, however tight the tolerance: right where a
@@ -37,7 +37,7 @@ struct EmOptions {
   /// feature to within m, what is off by more than about t + m^2 / t is broken.
   /// The M-steps in between weigh by delta either way.
   bool full_weight_test = false;
-  /// The loop ends at the latest after so many iterations.
+  /// The loop ends after this many iterations at the latest.
   int max_iterations = 50;
   /// Relative change of the cost at which solves of the whole graph within the
   /// loop end; 0: the session's own tolerance. With a larger one the first
@@ -58,12 +58,12 @@ struct EmOptions {
   /// smaller graphs), and the relative change of the total cost is smaller.
   double cost_tolerance = 1e-4;
   /// A broken hypothesis may be proposed again when its error has fallen by
-  /// more than so many of its standard deviations since it was broken and the
+  /// more than this many of its standard deviations since it was broken and the
   /// map relaxed without it ...
   double reproposal_sigmas = 1.0;
-  /// ... but not after it was broken so often: this bounds the loop.
+  /// ... but not after it was broken this many times, which bounds the loop.
   int max_breaks = 3;
-  /// Nor when a raw feature has had so many hypotheses of one relation broken,
+  /// Nor when a raw feature had this many hypotheses of one relation broken,
   /// whatever their values: a virtual feature that comes back a little to the
   /// side each time would otherwise never be the same hypothesis. The same for
   /// hypotheses between virtual features that stand on the same raw ones.

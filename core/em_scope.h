@@ -22,7 +22,7 @@ struct EmScope {
 
   /// True when there is no list.
   bool is_whole() const { return features == nullptr; }
-  /// What the session's functions take: the variables, null for all.
+  /// The argument of the session's functions: the variables, null for all.
   const std::vector<FeatureId>* session_scope() const {
     return is_whole() ? nullptr : &variables;
   }

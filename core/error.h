@@ -6,7 +6,7 @@
 
 namespace plumbline {
 
-/// What the libraries throw when input or use is wrong. The message reads
+/// The exception of the libraries for wrong input or use. The message reads
 /// `file:line: what is wrong: what was expected`.
 class Error : public std::runtime_error {
  public:
@@ -19,7 +19,7 @@ class Error : public std::runtime_error {
               expected.empty() ? what_is_wrong
                                : what_is_wrong + ": expected " + expected) {}
 
-  /// The same said of another place: of the flag whose value a library found
+  /// This error at another place: at the flag whose value a library found
   /// wrong.
   Error WithPlace(const std::string& place) const {
     return Error(place, what_and_expected_);

@@ -21,7 +21,7 @@ constexpr int kMaxFeatureSize = 10;
 constexpr int kMaxAnchorSize = 3;
 
 /// Highest level of a feature: far more than any hierarchy has, so that a
-/// number which is none is refused.
+/// nonsensical number is refused.
 constexpr int kMaxLevel = 1000;
 
 struct DetectorType;  // core/registry.h
@@ -41,8 +41,8 @@ struct FeatureType;   // core/registry.h
 ///                                  and across
 ///   orientation  theta             rad
 ///
-/// What a type is called and what its parameters are is in the type, and in the
-/// files; code asks for its traits and its frame, not for its name.
+/// The name of a type and of its parameters are in the type, and in the files;
+/// code asks for its traits and its frame, not for its name.
 struct Feature {
   FeatureId id = kNoId;
   /// Owned by the registry; never null in a graph.
@@ -66,7 +66,7 @@ struct Feature {
   /// and drawing, not state.
   double extent_begin = 0.0;
   double extent_end = 0.0;
-  /// How many scans saw it (0 for virtual features).
+  /// Number of scans that saw it (0 for virtual features).
   int observations = 0;
   /// The detector whose rules of support keep it alive (SupportPolicy): the one
   /// that made it. The orchestrator and readers of files set it; null for raw

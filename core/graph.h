@@ -12,7 +12,7 @@
 
 namespace plumbline {
 
-/// Is told of every change, after it was applied, in the order of ids.
+/// A listener that is told of every change once applied, in the order of ids.
 class GraphListener {
  public:
   virtual ~GraphListener() = default;
@@ -87,7 +87,7 @@ class Graph {
   /// The levels that have virtual features, ascending.
   std::vector<int> VirtualLevels() const;
 
-  /// How many there are now; of constraints, broken ones included.
+  /// Present numbers; of constraints, broken ones included.
   std::size_t num_features() const { return num_features_; }
   std::size_t num_constraints() const { return num_constraints_; }
   /// One past the largest id ever handed out.

@@ -12,7 +12,7 @@
 
 namespace plumbline {
 
-/// How a g2o file is to be understood where writers differ.
+/// Interpretation of a g2o file where writers differ.
 struct G2oOptions {
   /// Frame in which the information of relative poses (EDGE_SE2, EDGE2) is
   /// given: that of the first pose (false: the error is inverse(p1) (+) p2
@@ -25,7 +25,7 @@ struct G2oOptions {
 
 /// A line of a g2o file.
 struct G2oLine {
-  /// What a line holds.
+  /// Content of a line.
   enum class Kind {
     /// Comments, blank lines, unknown tags, laser scans: kept verbatim.
     kText,
@@ -43,16 +43,16 @@ struct G2oLine {
   std::int64_t id = kNoId;
 };
 
-/// What a g2o file held besides the graph, kept so that it can be written back
+/// Content of a g2o file besides the graph, kept so that it can be written back
 /// byte for byte.
 struct G2oFile {
   G2oOptions options;
   /// Every line, in order.
   std::vector<G2oLine> lines;
   bool ends_with_line_feed = true;
-  /// How often each unknown tag occurred.
+  /// Number of lines with each unknown tag.
   std::map<std::string, int> unknown_tags;
-  /// How many laser scans there were; each belongs to the vertex above it.
+  /// Number of laser scans; each belongs to the vertex above it.
   int laser_scans = 0;
   /// Id in the file of each feature, by feature id; kNoId where there is none.
   std::vector<std::int64_t> file_ids;
@@ -87,8 +87,8 @@ struct G2oFile {
 ///   PLUMBLINE_CONSTRAINT class state delta source
 ///
 /// each on one line; an anchor in space has an anchor_z after anchor_y. The
-/// first belongs to the vertex with this id, the second
-/// to the edge above it; "virtual" is 0 or 1, "class" measurement or structure,
+/// first line belongs to the vertex with this id, the second to the edge above
+/// it; "virtual" is 0 or 1, "class" measurement or structure,
 /// "state" live or broken; a source is "-" when empty, with %XX for white
 /// space, '%', control characters and a lone "-". Without such a line a feature
 /// is raw and a constraint a live measurement, both from the source "g2o".

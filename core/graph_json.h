@@ -20,7 +20,7 @@ using FeatureCovariances = std::map<FeatureId, Eigen::MatrixXd>;
 /// constraints from below), and for every constraint id, type, features,
 /// expected, information (rows), class ("measurement" or "structure"), delta,
 /// state ("live" or "broken") and source. Features among the `covariances` (may
-/// be null) also have covariance (rows). One line an element. Deterministic;
+/// be null) also have covariance (rows). One line per element. Deterministic;
 /// numbers read back as the same doubles (one that is not finite becomes null,
 /// which is not read back).
 void WriteGraphJson(const Graph& graph, std::ostream& output,

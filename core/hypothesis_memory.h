@@ -13,7 +13,7 @@
 
 namespace plumbline {
 
-/// What was broken and may not simply come again.
+/// Memory of broken hypotheses, which may not simply come again.
 ///
 /// A hypothesis is remembered by what it said: relation, expected value and
 /// features. Virtual features come again under other ids, so a hypothesis on

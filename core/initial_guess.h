@@ -7,7 +7,7 @@
 
 namespace plumbline {
 
-/// Where the poses of a graph start from.
+/// Sources of the poses that a graph starts from.
 enum class InitialGuessMethod {
   /// Everything stays as it is.
   kFile,
@@ -23,17 +23,17 @@ enum class InitialGuessMethod {
   /// at these headings (Carlone et al. 2015, "Initialization techniques for 3D
   /// SLAM"). Where landmarks close the loops, headings and positions are also
   /// solved for together, and the start with the lower objective is taken.
-  /// Needs
-  /// no start and sees all closures at once.
+  /// The method needs no start of its own and takes all closures into account
+  /// at once.
   kChordal,
 };
 
-/// How MakeInitialGuess goes about it.
+/// Options of MakeInitialGuess.
 struct InitialGuessOptions {
   InitialGuessMethod method = InitialGuessMethod::kChordal;
 };
 
-/// What a start was made of.
+/// Figures of a start.
 struct InitialGuessReport {
   /// Connected parts with poses.
   int parts = 0;

@@ -10,7 +10,7 @@
 
 namespace plumbline {
 
-/// Which part of a graph covariances are taken of, and in which frame.
+/// The part of a graph that covariances are taken of, and their frame.
 struct MarginalsOptions {
   /// A connected part of the graph that nothing ties to the plane (no fixed
   /// feature, no relation of a single feature) has no covariance in the map
@@ -32,7 +32,7 @@ struct MarginalsOptions {
 /// Making it costs one evaluation of each constraint and one sparse
 /// factorization; a feature then costs the solves for its own columns, once,
 /// or, when many are asked for with Compute, its share of one pass over the
-/// factor. It is a picture of the state at construction: a later change of the
+/// factor. It is a snapshot of the state at construction: a later change of the
 /// graph does not show.
 ///
 /// Directions about which the graph says nothing at all (a segment along its
@@ -47,7 +47,7 @@ class Marginals {
   /// Error when a constraint cannot be evaluated.
   Marginals(const Graph& graph, const SolverSession& session,
             const MarginalsOptions& options = {});
-  /// The same without a session, for detectors: structure counts by the delta
+  /// Marginals without a session, for detectors: structure counts by the delta
   /// of the last E-step.
   explicit Marginals(const Graph& graph, const MarginalsOptions& options = {});
   ~Marginals();

@@ -19,7 +19,7 @@ inline void AppendNumber(double value, std::string* text) {
   text->append(buffer, result.ptr);
 }
 
-/// Appends a number with so many digits behind the point, whatever the locale;
+/// Appends a number with this many digits after the point, whatever the locale;
 /// never "-0.00". Numbers past 1e15 are written with an exponent.
 inline void AppendFixed(double value, int decimals, std::string* text) {
   char buffer[64];

@@ -76,9 +76,9 @@ struct FeatureType {
   std::vector<Quantity> parameters;
   /// How many there are; set by Registry::Register.
   int size = 0;
-  /// What it stands for, and what its parameters begin with.
+  /// Its role, and the parameters that its own begin with.
   FeatureTraits traits;
-  /// How many coordinates of Feature::anchor the parameters are relative to.
+  /// Number of coordinates of Feature::anchor that the parameters refer to.
   int anchor_size = 0;
   /// Tag of the vertex in g2o text; a tag of our own starts with PLUMBLINE_.
   std::string g2o_tag;
@@ -102,13 +102,13 @@ struct FeatureType {
 
   /// Whether features of the type stand for this.
   bool Is(FeatureRole role) const { return traits.role == role; }
-  /// How many coordinates of an anchor files hold: two where it has fewer.
+  /// Number of coordinates of an anchor in files: two where it has fewer.
   int written_anchor_size() const { return anchor_size > 2 ? anchor_size : 2; }
   /// Whether the parameters begin with a position of the plane (x, y).
   bool HasPosition() const { return traits.leading != Leading::kOther; }
 };
 
-/// What a relation's factory gets.
+/// Arguments of a relation's factory.
 struct RelationArguments {
   /// Expected value u.
   Eigen::VectorXd expected;
@@ -150,7 +150,7 @@ struct RelationType {
                      Feature* second)>
       place_second;
 
-  /// Whether it says this.
+  /// Whether the relation has this role.
   bool Is(RelationRole asked) const { return role == asked; }
   /// Whether a feature of the type fits in a place, from 0.
   bool Accepts(std::size_t place, const FeatureType& type) const;
@@ -173,14 +173,14 @@ struct LossType {
       make_loss;
 };
 
-/// A number by which a detector is told how to work.
+/// A numeric parameter of a detector.
 struct DetectorParameter {
   /// "sigma_deg".
   std::string name;
   double default_value = 0.0;
   /// "m", "deg"; empty for a pure number.
   std::string unit = {};
-  /// What it says, in a line.
+  /// Meaning, in one line.
   std::string description = {};
   /// The name is that of a list and has a number behind it, from 0: "angle_0",
   /// "angle_1", ... None is there by default.

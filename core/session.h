@@ -39,7 +39,7 @@ struct SessionOptions {
   bool fast_removal = true;
 };
 
-/// What one solve did and cost.
+/// Result and cost of one solve.
 struct SolveReport {
   bool usable = false;
   bool converged = false;
@@ -94,7 +94,7 @@ class SolverSession : public GraphListener {
   /// Parameters are left as they were when the solve fails (usable is false).
   SolveReport SolveGlobal();
 
-  /// The same to another relative change of the cost and from another radius of
+  /// SolveGlobal with another relative change of the cost and initial radius of
   /// the trust region: a coarse solve on the way to something else. It ends
   /// with a step that brings less, or is rejected and promised no more. A rise
   /// in one part of the graph that makes up for the fall in the rest does not

@@ -10,7 +10,7 @@
 
 namespace plumbline {
 
-/// When the M-step solves, for what and how far.
+/// Schedule of the M-step: when it solves, for what, and how accurately.
 ///
 /// A solve of the whole graph is left out while nothing has changed since the
 /// last one. In a coarse run (EmOptions::loop_tolerance) solves end early: the
@@ -20,10 +20,10 @@ namespace plumbline {
 /// the graph held: the next iteration begins with a solve anyway.
 class SolveSchedule {
  public:
-  /// The first solve of a coarse run is far from its end, and leaves so much of
-  /// what the others do: what is found first depends on it.
+  /// Tolerance of the first solve of a coarse run, as a share of that of the
+  /// others: what is found first depends on it.
   static constexpr double kFirstTolerances = 0.03;
-  /// The last one leaves so much of what the others do.
+  /// Tolerance of the last solve, as a share of that of the others.
   static constexpr double kFinalTolerances = 1e-3;
   /// Finds of no more than this share of the structure are settled in place.
   static constexpr double kFew = 0.01;

@@ -9,7 +9,7 @@
 
 namespace plumbline {
 
-/// How many features and structure constraints a graph has, kept up to date by
+/// Counts of the features and structure constraints of a graph, kept current by
 /// what a GraphListener is told.
 class StructureCensus {
  public:
@@ -29,7 +29,7 @@ class StructureCensus {
   int num_structure() const { return num_structure_; }
   /// Broken constraints on record.
   int num_broken() const { return static_cast<int>(broken_.size()); }
-  /// The same by relation name; of structure only.
+  /// Both by relation name; structure only.
   const std::map<std::string, int>& structure_by_relation() const {
     return structure_by_relation_;
   }

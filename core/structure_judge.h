@@ -10,7 +10,7 @@
 
 namespace plumbline {
 
-/// What a judge says of live structure.
+/// Verdict of a judge on live structure.
 struct Verdict {
   /// To be broken, in the order of ids.
   std::vector<ConstraintId> refuted;

@@ -11,7 +11,7 @@
 
 namespace plumbline {
 
-/// What holds a virtual feature: its live constraints, in the order of ids.
+/// Support of a virtual feature: its live constraints, in the order of ids.
 struct FeatureSupport {
   /// Structure constraints to features of lower levels.
   std::vector<const Constraint*> from_below;
@@ -21,7 +21,7 @@ struct FeatureSupport {
   bool is_measured = false;
 };
 
-/// Which virtual features stay.
+/// Rules by which virtual features stay.
 ///
 /// One is dropped, with its constraints, when it has fewer live structure
 /// constraints from features of lower levels than its detector's
@@ -32,8 +32,8 @@ struct FeatureSupport {
 /// stay, and one that no detector of the hierarchy has made needs one
 /// constraint from below. Dropping goes on up the levels.
 ///
-/// What made a feature that said nothing is kept in mind, or it would be found
-/// and dropped for ever.
+/// The support of a feature that said nothing is remembered: otherwise the
+/// feature would be found and dropped for ever.
 class SupportPolicy {
  public:
   /// None is owned; all must outlive the policy. Throws Error when a detector

@@ -11,7 +11,7 @@
 
 namespace plumbline {
 
-/// Where something lies along a wall, m: begin and end.
+/// An interval along a wall, m: begin and end.
 using Interval = std::pair<double, double>;
 
 /// Length that two intervals have in common, m; negative for the gap between

@@ -22,7 +22,7 @@ struct AxialSample {
   /// Standard deviation of the observation, rad: short walls have a poor
   /// direction.
   double stddev = 0.0;
-  /// How much of a building it stands for, m.
+  /// Length of wall that it stands for, m.
   double length = 0.0;
 };
 
@@ -38,7 +38,7 @@ struct AxialComponent {
   double length = 0.0;
 };
 
-/// How to tell directions of a building from clutter. Angles in rad.
+/// Options of telling a building's directions from clutter. Angles in rad.
 struct AxialMixtureOptions {
   /// A sample nearer than this to a direction belongs to it, and no further
   /// direction is made of it.
@@ -54,7 +54,7 @@ struct AxialMixtureOptions {
   /// Probability that clutter in uniformly random directions yields a
   /// component, anywhere.
   double significance = 0.01;
-  /// A component is at least so many times as dense as the clutter.
+  /// A component is at least this many times as dense as the clutter.
   double min_contrast = 2.0;
   /// A component whose K^2 test of normality has a smaller p-value is split.
   double normality_significance = 0.01;

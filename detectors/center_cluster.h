@@ -8,9 +8,9 @@
 
 namespace plumbline {
 
-/// What counts as a common centre of circles.
+/// Options of common centres of circles.
 struct CenterClusterOptions {
-  /// A circle whose centre is so near to a common centre has it, m.
+  /// Largest distance of a circle's centre from the common one, m.
   double gate = 0.4;
   /// Tolerance of a centre against the common one, m.
   double sigma = 0.05;

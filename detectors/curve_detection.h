@@ -10,7 +10,7 @@
 
 namespace plumbline {
 
-/// What line_ransac and circle_ransac have in common. Both look for lines and
+/// Common part of line_ransac and circle_ransac. Both look for lines and
 /// circles, so that neither takes one for the other, and propose their own.
 ///
 /// Points that support a curve of the graph (a live structure constraint ties

@@ -11,7 +11,7 @@
 
 namespace plumbline {
 
-/// How to find lines and circles among points. Lengths in m, angles in rad.
+/// Options of the search for curves. Lengths in m, angles in rad.
 struct CurveSearchOptions {
   /// Points farther from a curve never support it when it is found. Smaller
   /// distances are tried as well, down to a fortieth, and the one that makes
@@ -22,7 +22,7 @@ struct CurveSearchOptions {
   double sigma = 0.02;
   /// How near to a curve a connected point joins it, and to another curve a
   /// curve is the same. Wider than sigma: points are off by their measurements
-  /// too. Bends of less than half of it are none.
+  /// too. Bends of less than half of it do not count.
   double gate = 0.1;
   /// Log10 of the expected number of curves of the kind that 1,000 points would
   /// show by chance, at which one is accepted. Well below one: EM looks many
@@ -43,7 +43,7 @@ struct CurveSearchOptions {
   double min_corner = DegToRad(15.0);
   /// Larger circles are not looked for.
   double max_radius = 50.0;
-  /// Where only some of the points are to be looked at, those so many
+  /// Where only some of the points are to be looked at, those this many
   /// constraints away are taken along: they tell what a curve of theirs is. For
   /// the detectors; SearchCurves takes its points as they are.
   int reach = 8;

@@ -9,7 +9,7 @@
 
 namespace plumbline {
 
-/// How sure an assignment of walls to directions has to be. Angles in rad.
+/// Options of the assignment of walls to directions. Angles in rad.
 struct DirectionAssignmentOptions {
   /// Tolerance of a wall against its direction, and of two directions that are
   /// parallel or at a right angle against each other.
@@ -73,7 +73,7 @@ struct DirectionInnovation {
   double chi_square = 0.0;
 };
 
-/// What became of the walls.
+/// Result of the assignment.
 struct DirectionAssignment {
   /// The given directions in their order, then new ones.
   std::vector<SharedDirection> directions;

@@ -11,7 +11,7 @@
 
 namespace plumbline {
 
-/// How far the directions of a map's links are trusted.
+/// Trust in the directions of a map's links.
 struct MapDirectionsOptions {
   /// Standard deviations of links are taken this many times larger: ones that
   /// are too large cost little, ones that are too small tear directions apart.

@@ -12,7 +12,7 @@
 
 namespace plumbline {
 
-/// Which walls share a direction, and how tightly they are tied to it.
+/// Options: which walls share a direction, and how tightly they are tied to it.
 struct OrientationMixtureOptions {
   /// Tolerance of a wall against its orientation, rad.
   double sigma = DegToRad(0.1);

@@ -11,7 +11,7 @@
 
 namespace plumbline {
 
-/// Which angles between orientations are looked for, and how tightly they hold.
+/// Options: the angles that are looked for, and how tightly they hold.
 struct OrientationRelationOptions {
   /// Angles between orientations that are expected in a building, rad. The sign
   /// does not matter, nor do multiples of pi: 0 is "these are the same".
@@ -19,7 +19,7 @@ struct OrientationRelationOptions {
   /// Tolerances of the angles that have one of their own, rad; of the size of
   /// `angles` or empty, 0 for `sigma`.
   std::vector<double> angle_sigmas;
-  /// Two orientations are related when their angle is so near to an expected
+  /// Two orientations are related when their angle is this near to an expected
   /// one, rad. An orientation stands on many walls and is known to a few tenths
   /// of a degree before it is related; a relation, once it stands, is tight and
   /// pulls the orientation off its walls rather than show a residual, so a wing
@@ -27,7 +27,7 @@ struct OrientationRelationOptions {
   double gate = DegToRad(0.7);
   /// Tolerance of the relation, rad.
   double sigma = DegToRad(0.02);
-  /// An orientation is related to at most so many that stood before it. All
+  /// An orientation is related to at most this many that stood before it. All
   /// pairs of few orientations are related; many get enough for redundancy.
   int max_relations = 4;
   /// Largest chi-square (1 degree of freedom) of the innovation of a relation,

@@ -25,7 +25,7 @@ struct PlaceWall {
 
 /// Gates of matching the walls of two places.
 struct PlaceMatchOptions {
-  /// Displacements up to so many standard deviations are looked at.
+  /// Displacements up to this many standard deviations are looked at.
   double gate = 3.0;
   /// Once a place is moved onto the other, walls that are one lie this close, m
   /// ...
@@ -65,7 +65,7 @@ struct WallMatch {
   double offset = 0.0;
 };
 
-/// What MatchPlaces found.
+/// Result of MatchPlaces.
 struct PlaceMatch {
   /// Why there are no matches.
   enum class Outcome {

@@ -10,19 +10,19 @@
 
 namespace plumbline {
 
-/// Which walls make a rectangle, and how tightly they are tied to its sides.
+/// Options: which walls make a rectangle, and how tightly they are tied to it.
 struct RectangleOptions {
   /// Tolerance of a wall against its side: across it, m, and in direction, rad.
   double sigma = 0.05;
   double sigma_angle = DegToRad(0.1);
-  /// A wall is on a side when it is so near to it across, m, and in direction,
+  /// Largest distance of a wall from its side across, m, and in direction,
   /// rad: nearer than the two faces of a wall are to each other. Adjacent walls
   /// are at right angles to within the same angle.
   double gate = 0.1;
   double gate_angle = DegToRad(3.0);
   /// Walls with a shorter visible part are left out, m.
   double min_length = 0.5;
-  /// A corner is met when the wall on each side of it begins so near to it, m:
+  /// A corner is met when the wall on each side begins this near to it, m:
   /// a corner hides behind a cupboard, a door stands beside it.
   double corner_gap = 0.5;
   /// Part of each side that walls cover, at least, and the widest opening

@@ -9,15 +9,15 @@
 
 namespace plumbline {
 
-/// Which walls are taken for one, and how tightly they are tied.
+/// Options: which walls are taken for one, and how tightly they are tied.
 struct SameWallOptions {
   /// Tolerance of a wall seen twice: across (m) and direction (rad).
   double sigma_offset = 0.05;
   double sigma_angle = DegToRad(0.3);
   /// Segments with a shorter visible part are left out, m.
   double min_length = 0.4;
-  /// Places are the walls within so many measurement links and so many metres
-  /// of one wall; a new place begins this far from the last, m.
+  /// Reach of a place from the wall in its middle, in measurement links and in
+  /// m; a new place begins this far from the last, m.
   int place_links = 2;
   double place_radius = 7.0;
   double place_spacing = 3.0;
@@ -26,11 +26,11 @@ struct SameWallOptions {
   int min_links = 4;
   /// The graph's relative covariances neglect what errors have in common (only
   /// the last robot pose is kept): standard deviations are taken this many
-  /// times larger, and a drift of so much of the way between two places is
+  /// times larger, and a drift of this share of the way between two places is
   /// added, m/m.
   double covariance_scale = 2.0;
   double drift_rate = 0.005;
-  /// What two places are not better known to each other than, m and rad.
+  /// Least uncertainty of two places against each other, m and rad.
   double least_position_sigma = 0.03;
   double least_angle_sigma = DegToRad(0.2);
   /// Two walls side by side, whose relative place the graph knows to this (m),

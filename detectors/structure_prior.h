@@ -12,7 +12,7 @@
 
 namespace plumbline {
 
-/// How tightly one row of a relation (RelationType::rows) holds.
+/// Tolerance of one row of a relation (RelationType::rows).
 struct PriorTolerance {
   /// Standard deviation, > 0: degrees for an angle, else in the row's unit.
   double sigma = 0.0;
@@ -22,11 +22,11 @@ struct PriorTolerance {
   std::string unit = {};
 };
 
-/// What is known of a relation before the building was seen.
+/// Prior knowledge of a relation, before the building was seen.
 struct PriorRelation {
   /// False: it is not looked for; a detector's proposals of it are left out.
   bool is_expected = true;
-  /// One a row, in the order of the relation's rows; empty when not expected.
+  /// One per row, in the order of the relation's rows; empty when not expected.
   std::vector<PriorTolerance> tolerances;
 };
 
@@ -38,8 +38,8 @@ struct PriorAngle {
   double sigma_deg = 0.0;
 };
 
-/// What is known of the structure of a building before it was seen: as text, a
-/// statement a line, words separated by blanks, what follows a # is a comment.
+/// Prior knowledge of the structure of a building: as text, one statement on a
+/// line, words separated by blanks, what follows a # is a comment.
 ///
 ///     # Three wings at 60 degrees, built well; their walls less so.
 ///     angle 0

@@ -11,7 +11,7 @@
 
 namespace plumbline {
 
-/// How two walls lie on each other where they stand in the map; nothing when
+/// Overlap of two walls where they stand in the map; nothing when
 /// they do not: when their directions differ by more than their lengths and the
 /// tolerance allow, when they do not lie side by side, or when they are farther
 /// apart than SameWallOptions::known_offset.

@@ -25,7 +25,7 @@ inline double WrapAngle(double angle, double period) {
   return wrapped > -half ? wrapped : wrapped + period;
 }
 
-/// The same inside automatically differentiated residuals: the derivative is 1
+/// WrapAngle inside automatically differentiated residuals: the derivative is 1
 /// everywhere, the value jumps by `period` at the cut.
 template <typename T, int N>
 ceres::Jet<T, N> WrapAngle(const ceres::Jet<T, N>& angle, double period) {

@@ -12,8 +12,8 @@
 
 namespace plumbline {
 
-/// What a kind of parameter block says of itself: the base of the structs
-/// below, which give what is otherwise for them. Each has to give
+/// Self-description of a kind of parameter block: the base of the structs
+/// below, which override what differs. Each has to define
 ///
 ///   kName         its name in files and flags
 ///   kG2oTag       the tag of its vertex in g2o text
@@ -21,18 +21,18 @@ namespace plumbline {
 ///   kParameters   its parameters, in order
 struct DescribedBlock {
   static constexpr FeatureTraits kTraits = {};
-  /// How many coordinates of Feature::anchor the parameters are relative to.
+  /// Number of coordinates of Feature::anchor that the parameters refer to.
   static constexpr int kAnchorSize = 0;
   /// The manifold on which the parameters live; void when they are Euclidean.
   using Manifold = void;
 };
 
-/// How many parameters a block has.
+/// Number of parameters of a block.
 template <typename BlockType>
 constexpr int kBlockSize = static_cast<int>(std::size(BlockType::kParameters));
 
 // Poses and segments have no manifold: their residuals wrap angles, a solve
-// wraps headings when it is done, and Jacobians are cheaper so.
+// wraps headings when it is done, and Jacobians stay cheap.
 
 /// A point of the plane.
 struct PointBlock : DescribedBlock {
@@ -145,14 +145,14 @@ struct OrientationBlock : DescribedBlock {
 template <typename... BlockTypes>
 struct AnyOf {};
 
-/// What a relation takes, in order: for each of its blocks the kind, or AnyOf
+/// Blocks that a relation takes, in order: for each of them the kind, or AnyOf
 /// several. Kinds that fit in one place have anchors of one size.
 template <typename... Places>
 struct BlockList {};
 
-/// What begins with a position and is nowhere else.
+/// Blocks that begin with a position.
 using PositionBlocks = AnyOf<PointBlock, PoseBlock, CircleBlock>;
-/// What is a frame.
+/// Blocks that are a frame.
 using FrameBlocks = AnyOf<PoseBlock, SegmentBlock>;
 
 }  // namespace plumbline

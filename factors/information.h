@@ -10,7 +10,7 @@
 
 namespace plumbline {
 
-/// What is taken for rounding error in information matrices: asymmetry, and
+/// Bound of rounding errors in information matrices: asymmetry, and
 /// eigenvalues below zero, after the matrix has been scaled to a unit diagonal.
 /// The scaling makes the judgement independent of units (metres and radians in
 /// one matrix).

@@ -11,8 +11,8 @@
 
 namespace plumbline {
 
-/// How far a line lies past a side of a rectangle, at the middle of the side,
-/// and how it is turned against it.
+/// Distance of a line past a side of a rectangle, at the middle of the side,
+/// and its angle to the side.
 ///
 ///   residual:   r = L (f (-) expected), with the expected value (u0, phi),
 ///               n = (sin(theta + phi), -cos(theta + phi)) the outward normal

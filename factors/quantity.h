@@ -10,11 +10,11 @@ namespace plumbline {
 /// errors use for it. The texts are not owned: they are literals, or live as
 /// long as the process.
 struct Quantity {
-  /// What it is: "x", "offset".
+  /// Name: "x", "offset".
   std::string_view name;
   /// SI unit, "m" or "rad"; empty for a pure number.
   std::string_view unit;
-  /// What one standard deviation of it is called, in a row of a residual:
+  /// Name of one standard deviation of it, in a row of a residual:
   /// "offset tolerance". Empty for a parameter.
   std::string_view tolerance;
   /// Whether it is an angle, which people are shown in degrees. In a state,

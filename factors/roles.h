@@ -3,7 +3,7 @@
 
 namespace plumbline {
 
-/// What a feature stands for, whatever its type is called: detectors, drawings
+/// Meaning of a feature, whatever its type is called: detectors, drawings
 /// and reports ask for this. Each role but kOther says what the parameters
 /// begin with; a type may have more after that. The roles are those of the
 /// plane; a type of space is kOther until there is code that asks for it.
@@ -24,7 +24,7 @@ enum class FeatureRole {
   kDirection
 };
 
-/// What the parameters of a feature begin with.
+/// Parameters that those of a feature begin with.
 enum class Leading {
   kOther,
   /// A position of the plane: x, y.
@@ -33,7 +33,7 @@ enum class Leading {
   kFrame
 };
 
-/// What others need to know of a feature type.
+/// Traits of a feature type that other code relies on.
 struct FeatureTraits {
   FeatureRole role = FeatureRole::kOther;
   Leading leading = Leading::kOther;
@@ -42,8 +42,8 @@ struct FeatureTraits {
   bool is_one_sided = false;
 };
 
-/// What a relation says, whatever it is called: detectors look up the relation
-/// that says it of features of the types that they have, and recognize it.
+/// Meaning of a relation, whatever it is called: detectors look up the relation
+/// with this meaning between the types of features that they have.
 enum class RelationRole {
   kOther,
   /// The expected value is where the last feature is, in the frame of the first

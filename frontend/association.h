@@ -18,16 +18,16 @@ struct AssociationOptions {
   /// Whatever the uncertainty: farthest offset (m) and direction (rad).
   double max_offset = 0.5;
   double max_angle = DegToRad(12.0);
-  /// How well a feature's own place in its neighbourhood is known: offset (m)
+  /// Uncertainty of a feature's own place in its neighbourhood: offset (m)
   /// and direction (rad).
   double feature_offset_sigma = 0.03;
   double feature_angle_sigma = DegToRad(0.7);
-  /// An observation that ends so far before the feature begins may still be
+  /// An observation that ends this far before the feature begins may still be
   /// the same wall, m.
   double max_gap = 0.4;
 };
 
-/// A feature that an observation may be of.
+/// A feature that may have been observed.
 struct AssociationCandidate {
   FeatureId feature = kNoId;
   /// Map frame.

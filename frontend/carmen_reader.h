@@ -65,7 +65,7 @@ namespace plumbline {
 /// holds no scan at all; the message says what was found.
 Log ReadCarmenLog(const std::string& path, const LaserOptions& options);
 
-/// The same from an input that is open already (a peek does not hurt).
+/// Reads a log from an input that is open already (a peek does no harm).
 Log ReadCarmenLog(InputStream* input, const LaserOptions& options);
 
 /// Whether text that starts with `prefix` (a few kilobytes are plenty) is a

@@ -50,7 +50,7 @@ struct FeatureMatch {
   SegmentObservation observation;
 };
 
-/// What is remembered of a key scan: enough to find its pose again when the
+/// Record of a key scan: enough to find its pose again when the
 /// map has moved.
 struct KeyScanRecord {
   /// Index of the scan in the log.
@@ -67,7 +67,7 @@ struct KeyScanRecord {
   Pose2 pose = Pose2::Zero();
   /// Recognized segments, and those that this scan made.
   std::vector<FeatureMatch> matches;
-  /// The same of points.
+  /// Recognized points, and those that this scan made.
   std::vector<PointMatch> points;
 };
 
@@ -104,7 +104,7 @@ class GraphBuilder {
     return robot_.Neighborhood(depth);
   }
 
-  /// What was kept of key scans, in the order of the log.
+  /// Records of the key scans, in the order of the log.
   const std::vector<KeyScanRecord>& records() const { return records_; }
   /// Observations that matched a feature, and features made, so far.
   std::int64_t num_matches() const { return num_matches_; }

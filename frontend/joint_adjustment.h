@@ -22,10 +22,10 @@
 
 namespace plumbline {
 
-/// What is adjusted together, and how far it is trusted.
+/// Options of the joint adjustment.
 struct JointAdjustmentOptions {
   ScanPointsOptions points;
-  /// Every so many key scans one is a place whose pose is adjusted; what was
+  /// One in this many key scans is a place whose pose is adjusted; what was
   /// seen up to the next one is bound to it by refined odometry.
   int place_stride = 3;
   ScanRelationOptions relations;
@@ -36,10 +36,10 @@ struct JointAdjustmentOptions {
   /// Bounds of the factors by which EstimateVariances changes variances.
   double min_variance_factor = 0.1;
   double max_variance_factor = 4.0;
-  /// How often votes and weights are taken anew, each followed by a solve.
+  /// Rounds of taking votes and weights anew, each followed by a solve.
   int rounds = 3;
   /// After that places that have come near each other are matched, and all is
-  /// done again, at most so often and while a pose moves by more than this, m.
+  /// repeated, this often at most, while a pose moves by more than this, m.
   int max_passes = 5;
   double settled_distance = 0.05;
   /// The result does not depend on it.

@@ -49,7 +49,7 @@ struct LogReaderType {
   /// "carmen"
   std::string name;
   std::string description;
-  /// Whether text that starts with so much is such a log. A few kilobytes are
+  /// Whether text with this beginning is such a log. A few kilobytes are
   /// given, or all there is; unpacked where the input is compressed.
   std::function<bool(std::string_view prefix)> recognizes;
   /// Reads a log. Lines that cannot be used are passed over and counted in

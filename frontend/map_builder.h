@@ -14,7 +14,7 @@
 
 namespace plumbline {
 
-/// How the map grows as the robot goes.
+/// Options of the growth of a map of segments.
 struct MapBuilderOptions {
   /// Links from the robot to features farther away are cut, m.
   double link_radius = 10.0;
@@ -23,8 +23,8 @@ struct MapBuilderOptions {
   int association_depth = 3;
   AssociationOptions association;
   SegmentExtractionOptions extraction;
-  /// A new feature is bound to so many features that the robot is linked to,
-  /// and to so many new ones of its own scan.
+  /// Numbers of features that a new one is bound to: of those that the robot is
+  /// linked to, and of the new ones of its own scan.
   int links_per_feature = 5;
   int links_within_scan = 3;
   /// Two pieces of one scan are one wall only when they are in line to this, m.

@@ -65,7 +65,7 @@ struct TrackingOptions {
   /// Returns that lie 0.15 m apart or more that a match which leaves odometry
   /// by more than that has to have on what the reference has seen.
   int min_hits = 15;
-  /// A time between scans that is longer than this, s, and so many times the
+  /// A time between scans that is longer than this, s, and this many times the
   /// usual one is a gap.
   double gap_seconds = 1.0;
   double gap_factor = 4.0;
@@ -125,7 +125,7 @@ struct OdometryRefinementOptions {
   ScanMatcherOptions matcher;
   OdometryNoise noise;
   MatchDrift drift;
-  /// A new key scan is taken after so much motion, m and rad.
+  /// A new key scan is taken after this much motion, m and rad.
   double key_distance = 0.3;
   double key_rotation = 0.15;
   /// Key scans that a new scan is matched with.

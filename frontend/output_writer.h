@@ -15,7 +15,7 @@
 
 namespace plumbline {
 
-/// What a run came to, as an output writer sees it. A program may hand over a
+/// Result of a run, as an output writer sees it. A program may hand over a
 /// class derived from it to the writers that it brings itself.
 struct SolvedRun {
   virtual ~SolvedRun() = default;

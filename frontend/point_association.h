@@ -21,14 +21,14 @@ struct PointAssociationOptions {
   /// that is seen, rad: keeps the walls of a corner and the two faces of a thin
   /// wall apart.
   double max_angle = DegToRad(30.0);
-  /// How well a point's own place in its neighbourhood is known, m.
+  /// Uncertainty of a point's own place in its neighbourhood, m.
   double feature_sigma = 0.03;
   /// Nothing is learnt of a point's place along its surface: the standard
   /// deviation that stands for it, m.
   double along_sigma = 50.0;
 };
 
-/// Where a scan sees a point: robot's frame.
+/// A point as a scan sees it: robot's frame.
 struct PointObservation {
   /// m.
   Eigen::Vector2d position = Eigen::Vector2d::Zero();

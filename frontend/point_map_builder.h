@@ -16,7 +16,7 @@
 
 namespace plumbline {
 
-/// How a map of points grows as the robot goes.
+/// Options of the growth of a map of points.
 struct PointMapBuilderOptions {
   /// Links from the robot to points farther away are cut, m.
   double link_radius = 10.0;
@@ -29,7 +29,7 @@ struct PointMapBuilderOptions {
   /// Surfaces farther from the laser than this make no points, m: there few
   /// beams meet them, at grazing angles, and errors of heading move them most.
   double max_range = 8.0;
-  /// Points are so far from the ends of a surface where it is long enough, m.
+  /// Distance of points from the ends of a surface that is long enough, m.
   double end_margin = 0.1;
   /// Distances that a new point gets.
   int links_per_point = 5;
@@ -57,7 +57,7 @@ struct PointMapBuilderOptions {
 /// as level 0): a scan is cut into straight surfaces, points of the map near
 /// the robot are looked for on them, the robot alone is corrected, and where a
 /// surface has no points yet it gets some. The map has distances between points
-/// and nothing else, few a point; what marginalized poses knew is in them.
+/// and nothing else, a few per point; what marginalized poses knew is in them.
 class PointMapBuilder final : public GraphBuilder {
  public:
   /// The graph and registry must outlive the builder; the graph may have

@@ -10,13 +10,13 @@
 
 namespace plumbline {
 
-/// How scans are found again on the final map.
+/// Options of finding scans again on the final map.
 struct RelocalizationOptions {
-  /// How well the map's walls are in place: offset (m) and direction (rad),
+  /// Uncertainty of the map's walls: offset (m) and direction (rad),
   /// added to each observation's own covariance.
   double feature_offset_sigma = 0.03;
   double feature_angle_sigma = DegToRad(0.7);
-  /// The same of points, m.
+  /// Uncertainty of the map's points, m.
   double point_sigma = 0.03;
   /// Scale of the Cauchy loss on an observation, in sigmas.
   double loss_scale = 2.0;

@@ -48,7 +48,7 @@ struct Scan {
 
 /// Something in the input that was passed over, and how often.
 struct SkipReport {
-  /// What was wrong and what was expected: one text a kind.
+  /// What was wrong and what was expected: one text for each kind.
   std::string reason;
   std::int64_t count = 0;
   /// The first lines where it happened (at most 5), from 1; in a bag the

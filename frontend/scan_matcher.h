@@ -16,7 +16,7 @@ struct ScanMatcherOptions {
   /// Standard deviation of a return across its surface, m: noise of the
   /// laser and roughness of the wall together.
   double point_sigma = 0.03;
-  /// A return counts as so many independent ones in the covariance: returns
+  /// A return counts as this many independent ones in the covariance: returns
   /// on one surface share the surface's own errors.
   double independence = 0.3;
   /// Farthest a return may lie from the reference point it is matched with,
@@ -33,14 +33,14 @@ struct ScanMatcherOptions {
   double rotation_step = DegToRad(1.0);
 };
 
-/// What the matcher knew before: the motion model's pose and its information.
+/// Prior of the matcher: the motion model's pose and its information.
 struct MatchPrior {
   Pose2 pose = Pose2::Zero();
   /// Inverse covariance in the frame of `pose`'s parent (m, m, rad).
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
 };
 
-/// What came of matching a scan.
+/// Result of matching a scan.
 struct MatchResult {
   Pose2 pose = Pose2::Zero();
   /// Covariance from the returns and the prior together: large along a
@@ -66,7 +66,7 @@ struct Viewpoint {
   std::size_t begin = 0;
 };
 
-/// How a scan and the reference agree at a pose about what is solid and what is
+/// Agreement of a scan and the reference at a pose on what is solid and what is
 /// free, counted in returns that lie at least some way apart.
 struct ScanAgreement {
   /// Returns that lie on what the reference has seen.
@@ -98,7 +98,7 @@ class ScanMatcher {
   /// given. Points need no order. Cost: linear in the points and in the cells
   /// of their bounding box.
   void SetReference(std::vector<ScanPoint> points);
-  /// The same with the places that the points were seen from, ascending by
+  /// SetReference with the places that the points were seen from, ascending by
   /// `begin`: between them and their points the reference is free.
   void SetReference(std::vector<ScanPoint> points,
                     std::vector<Viewpoint> viewpoints);
@@ -131,7 +131,7 @@ class ScanMatcher {
 
   /// What the scan and the reference say of each other at this pose. `laser`:
   /// position of the laser in the robot's frame, m. Without viewpoints nothing
-  /// of the reference is free. `intruders`, if not null, gets one entry a
+  /// of the reference is free. `intruders`, if not null, gets one entry per
   /// return: whether it is an intruder.
   ScanAgreement Compare(const std::vector<ScanPoint>& scan, const Pose2& pose,
                         const Eigen::Vector2d& laser,

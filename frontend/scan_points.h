@@ -9,7 +9,7 @@
 
 namespace plumbline {
 
-/// Which returns of a scan are used.
+/// Options of the choice of a scan's returns.
 struct ScanPointsOptions {
   /// Returns farther away are left out, m: far beams graze the walls.
   double usable_range = 50.0;

@@ -13,12 +13,12 @@
 
 namespace plumbline {
 
-/// Which scans are matched with each other, and which matches are kept.
+/// Options: which scans are matched with each other, and which matches stay.
 struct ScanRelationOptions {
   ScanMatcherOptions matcher;
   /// Consecutive places that make one submap.
   int submap_size = 4;
-  /// How far a place may be from a submap's middle, m.
+  /// Largest distance of a place from a submap's middle, m.
   double radius = 4.0;
   /// Submaps that one place is matched with: bounds the cost where a robot
   /// stays long or comes again and again. Half of them are the nearest, the
@@ -28,7 +28,7 @@ struct ScanRelationOptions {
   /// the match.
   double min_overlap = 0.4;
   double min_inlier_ratio = 0.5;
-  /// How far the present poses are believed while matching, m and rad.
+  /// Standard deviations of the present poses while matching, m and rad.
   double prior_translation = 0.3;
   double prior_rotation = DegToRad(3.0);
   /// Two places whose relative pose has changed by more, m or rad, since they
@@ -39,7 +39,7 @@ struct ScanRelationOptions {
   int num_threads = 1;
 };
 
-/// Where the robot was, with what it saw from there.
+/// A place of the robot, with what it saw from there.
 struct Place {
   /// Returns of the place's own scan, in its frame.
   std::vector<ScanPoint> scan;

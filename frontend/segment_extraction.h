@@ -9,9 +9,9 @@
 
 namespace plumbline {
 
-/// What counts as a straight piece of wall in a scan.
+/// Options of the extraction of straight pieces of wall.
 struct SegmentExtractionOptions {
-  /// A segment has at least so many returns and is at least so long, m.
+  /// Fewest returns of a segment, and its least length, m.
   int min_points = 6;
   double min_length = 0.4;
   /// Farthest that one return may lie off its segment, m: noise of the laser.
@@ -21,7 +21,7 @@ struct SegmentExtractionOptions {
   /// line through both would be turned by degrees.
   double bend_distance = 0.01;
   int bend_window = 5;
-  /// Or so many standard deviations of that mean, where the returns are
+  /// Or this many standard deviations of that mean, where the returns are
   /// noisier.
   double bend_sigmas = 2.0;
   /// Pieces whose ends swing by more across the wall, as the direction is that

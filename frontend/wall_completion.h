@@ -13,11 +13,11 @@
 
 namespace plumbline {
 
-/// What counts as a wall among returns that no wall explains.
+/// Options: what counts as a wall among returns that no wall explains.
 struct WallCompletionOptions {
   ScanPointsOptions points;
-  /// Returns so near to a wall of the map (across, and beyond its ends, m) are
-  /// explained by it.
+  /// Returns this near to a wall of the map (across, and beyond its ends, m)
+  /// are explained by it.
   double explained_offset = 0.12;
   double explained_gap = 0.3;
   /// Way of the robot over which returns are looked at together before all are,
@@ -27,11 +27,11 @@ struct WallCompletionOptions {
   double cell_size = 0.05;
   /// Neighbourhood in which a cell's direction is fitted, m.
   double normal_radius = 0.3;
-  /// How far off a wall its returns lie (standard deviation, m), and one cell's
+  /// Scatter of a wall's returns (standard deviation, m), and turn of a cell's
   /// direction off the wall's, rad.
   double max_scatter = 0.015;
   double max_turn = DegToRad(15.0);
-  /// Where a wall turns by at least so much (rad) at one place, and by so many
+  /// Where a wall turns by at least this (rad) at one place, and by this many
   /// standard deviations of that turn, it is two walls: corridors that meet at
   /// a small angle.
   double min_kink = DegToRad(0.5);
@@ -39,15 +39,15 @@ struct WallCompletionOptions {
   /// Its ends swing by no more across it, as its direction is that uncertain
   /// (standard deviation over the whole length, m).
   double max_end_sigma = 0.0065;
-  /// A wall is at least so long (m), is made of so many returns, has no gap
-  /// longer than this (m), and returns on this share of its length (in pieces
+  /// Least length of a wall (m), fewest returns, longest gap between them (m),
+  /// and least share of its length that has returns (in pieces
   /// of 0.1 m).
   double min_length = 0.5;
   int min_returns = 20;
   double max_gap = 0.4;
   double min_coverage = 0.75;
-  /// A wall is bound to so many walls of the map, nearest first, with this
-  /// covariance: m across and along, rad.
+  /// Number of walls of the map, the nearest, that a wall is bound to, and
+  /// standard deviations of that: m across and along, rad.
   int links = 3;
   double link_offset_sigma = 0.03;
   double link_angle_sigma = DegToRad(0.7);

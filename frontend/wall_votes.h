@@ -11,10 +11,10 @@
 
 namespace plumbline {
 
-/// Which returns vote for a wall, and how far one is trusted.
+/// Options of votes: which returns vote for a wall, and how far one is trusted.
 struct WallVoteOptions {
-  /// A return votes for the wall that it lies nearest to: so near across, so
-  /// far past its ends at most (m), with a surface turned by no more (rad) and
+  /// Largest distance of a return from the wall that it votes for, the nearest:
+  /// across and past its ends (m), and in the direction of its surface (rad),
   /// seen from the wall's own side. A door set back by a hand's breadth is
   /// another wall: were its returns to vote for the wall beside it, they would
   /// tilt it.
@@ -25,7 +25,7 @@ struct WallVoteOptions {
   /// deviations at which it counts half (Cauchy).
   double point_sigma = 0.03;
   double loss_scale = 1.0;
-  /// A return counts as so many independent ones: whatever the number of
+  /// A return counts as this many independent ones: whatever the number of
   /// returns and visits, they share the wall's own errors (panels, frames,
   /// bends) and those of its poses.
   double independence = 0.5;
@@ -35,7 +35,7 @@ struct WallVoteOptions {
   int num_threads = 1;
 };
 
-/// What the returns of one place say about one wall: the information of a
+/// Vote of the returns of one place on one wall: the information of a
 /// pose_segment_points constraint (factors/pose_segment_points.h).
 struct WallVote {
   FeatureId wall = kNoId;

@@ -14,13 +14,13 @@ namespace plumbline {
 struct ConsistencyOptions {
   /// Shorter walls of the map are left out, m.
   double minimum_length = 1.0;
-  /// A wall counts when all of it lies on one true wall, so far beside it (m)
-  /// and so far beyond its ends (m) at most, and turned by so many degrees at
-  /// most: what else it may be is a question of association.
+  /// A wall counts when all of it lies on one true wall: at most this far
+  /// beside it (m), this far beyond its ends (m), and turned by this many
+  /// degrees. What else it may be is a question of association.
   double maximum_offset = 0.25;
   double end_slack = 0.1;
   double maximum_angle_deg = 4.0;
-  /// The next true wall (the other face of a thin one) is farther by so much,
+  /// The next true wall (the other face of a thin one) is this much farther,
   /// m.
   double least_margin = 0.05;
 };

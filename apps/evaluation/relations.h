@@ -88,7 +88,7 @@ RelationEvaluation EvaluateRelations(const std::vector<TimedPose>& trajectory,
                                      const std::vector<Relation>& relations,
                                      double time_tolerance = 1e-3);
 
-/// Writes a line a matched relation: line,t1,t2,error_x_m,error_y_m,
+/// Writes a line per matched relation: line,t1,t2,error_x_m,error_y_m,
 /// error_theta_deg,translation_m,rotation_deg.
 void WriteRelationErrors(const RelationEvaluation& evaluation,
                          std::ostream& output);

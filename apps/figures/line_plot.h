@@ -51,7 +51,7 @@ std::vector<double> LogTicks(double low, double high, int count);
 /// What a plot needs of its height under the x axis, px.
 int RoomUnderAxis(const LinePlot& plot);
 
-/// The plots as one SVG document, in rows of so many, below each other. The
+/// The plots as one SVG document, in rows of `columns`, below each other. The
 /// same plots give the same bytes. Throws Error when a series has sizes that
 /// disagree.
 std::string PlotSvg(const std::vector<LinePlot>& plots, int columns = 1);

@@ -28,7 +28,7 @@ struct EmTraceRow {
 /// Numbers read back as the same doubles.
 void WriteEmTrace(const std::vector<EmTraceRow>& rows, std::ostream& output);
 
-/// The same into a file, whole or not at all. Throws Error when it cannot be
+/// Writes it to a file, whole or not at all. Throws Error when it cannot be
 /// written.
 void WriteEmTrace(const std::vector<EmTraceRow>& rows, const std::string& path);
 

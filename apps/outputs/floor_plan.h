@@ -15,7 +15,7 @@
 
 namespace plumbline {
 
-/// What is one wall in a plan, and what is drawn of it.
+/// Options of a plan: which walls are one, and what is drawn.
 struct FloorPlanOptions {
   /// Faces whose directions differ by more are never one, rad.
   double merge_angle = DegToRad(3.0);
@@ -34,7 +34,7 @@ struct FloorPlanOptions {
   /// Two faces back to back, this far apart, m, are the sides of one wall.
   double min_thickness = 0.04;
   double max_thickness = 0.35;
-  /// What is shorter in the end is left out, m.
+  /// Walls that are shorter in the end are left out, m.
   double min_length = 0.3;
 };
 

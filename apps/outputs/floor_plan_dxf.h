@@ -23,7 +23,7 @@ namespace plumbline {
 /// would inherit; the tests read the drawing with it.
 void WriteFloorPlanDxf(const FloorPlan& plan, std::ostream& output);
 
-/// The same into a file, whole or not at all. Throws Error when it cannot be
+/// Writes it to a file, whole or not at all. Throws Error when it cannot be
 /// written.
 void WriteFloorPlanDxf(const FloorPlan& plan, const std::string& path);
 

@@ -26,7 +26,7 @@ namespace plumbline {
 /// Guinea.
 void WriteFloorPlanGeoJson(const FloorPlan& plan, std::ostream& output);
 
-/// The same into a file, whole or not at all. Throws Error when it cannot be
+/// Writes it to a file, whole or not at all. Throws Error when it cannot be
 /// written.
 void WriteFloorPlanGeoJson(const FloorPlan& plan, const std::string& path);
 

@@ -13,11 +13,11 @@ namespace plumbline {
 /// turned so that the direction with most wall is level, with overall
 /// dimensions, a scale bar and the scale in words. Printed without fitting it
 /// to the page, lengths can be taken off with a ruler. The group "plan" has
-/// coordinates in metres of the map, a group a direction (FloorPlanLayerName)
+/// coordinates in metres of the map, a group per direction (FloorPlanLayerName)
 /// in it, and faces carry the ids of their features.
 void WriteFloorPlanSvg(const FloorPlan& plan, std::ostream& output);
 
-/// The same into a file, whole or not at all. Throws Error when it cannot be
+/// Writes it to a file, whole or not at all. Throws Error when it cannot be
 /// written.
 void WriteFloorPlanSvg(const FloorPlan& plan, const std::string& path);
 

@@ -42,7 +42,7 @@ struct DrawnRectangle {
   FeatureId id = kNoId;
 };
 
-/// How well a position is known, m, map frame.
+/// Uncertainty of a position, m, map frame.
 struct DrawnEllipse {
   double x = 0.0;
   double y = 0.0;
@@ -80,7 +80,7 @@ struct MapDrawing {
   std::string title;
 };
 
-/// How a map is drawn.
+/// Options of drawing a map.
 struct MapDrawingOptions {
   /// Length of the picture's longer side, px, 200 to 20000. Line widths and
   /// letters grow with it.

@@ -13,7 +13,7 @@
 
 namespace plumbline {
 
-/// What a list selects: names of feature types, numbers of features (those of
+/// Selection by a list: names of feature types, numbers of features (those of
 /// map.json) and "all", separated by commas; "none" and "" nothing.
 struct MarginalsSelection {
   bool all = false;
@@ -43,7 +43,7 @@ FeatureCovariances ComputeMarginals(const Graph& graph,
                                     const MarginalsSelection& selection,
                                     bool hold_gauge);
 
-/// Ellipses of so many standard deviations of the positions of those features
+/// Ellipses of this many standard deviations of the positions of those features
 /// that have one (parameters x and y first). Left out where the graph says
 /// nothing about some direction.
 std::vector<DrawnEllipse> EllipsesOf(const Graph& graph,

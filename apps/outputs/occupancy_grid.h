@@ -15,7 +15,7 @@
 
 namespace plumbline {
 
-/// How a grid is made of scans.
+/// Options of a grid made of scans.
 struct OccupancyOptions {
   /// Side of a cell, m.
   double resolution = 0.05;
@@ -23,7 +23,7 @@ struct OccupancyOptions {
   /// hit nothing, and clear the way only so far.
   double minimum_range = 0.1;
   double usable_range = 50.0;
-  /// A cell is occupied when at least so many scans hit it, and these are at
+  /// A cell is occupied when at least this many scans hit it, and these are at
   /// least this share of the scans that hit it or saw through it. The share is
   /// the threshold at 0 of log-odds that go up by 3 for a hit and down by 1
   /// for a miss.
@@ -36,10 +36,10 @@ struct OccupancyOptions {
 };
 
 /// A grid of what is free, occupied and unknown, from the rays of laser scans.
-/// Memory is taken by tiles as they are seen: 6 bytes a cell.
+/// Memory is taken by tiles as they are seen: 6 bytes per cell.
 class OccupancyGrid {
  public:
-  /// What ROS' map_server writes for these in a PGM.
+  /// Values of ROS' map_server for these in a PGM.
   static constexpr std::uint8_t kOccupied = 0;
   static constexpr std::uint8_t kUnknown = 205;
   static constexpr std::uint8_t kFree = 254;
@@ -91,7 +91,7 @@ class OccupancyGrid {
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   std::vector<std::unique_ptr<Tile>> tiles_;
   /// Number of the present scan, from 1, modulo 2^16: a cell that was seen last
-  /// exactly so many scans ago is passed over once.
+  /// exactly this many scans ago is passed over once.
   std::uint16_t scan_ = 0;
   BeamDirections beams_;
   /// Ends of the present scan's rays.
@@ -102,7 +102,7 @@ class OccupancyGrid {
   std::vector<Ray> rays_;
 };
 
-/// The grid of all scans, one pose (map frame) a scan; poses that are not
+/// The grid of all scans, one pose (map frame) per scan; poses that are not
 /// finite are passed over. Throws as the constructor does, also when there is
 /// nothing to be seen.
 OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
@@ -113,7 +113,7 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
 /// it.
 void WriteOccupancyPgm(const OccupancyGrid& grid, std::ostream& output);
 
-/// Writes what goes with the picture: image, mode, resolution (m a pixel),
+/// Writes what goes with the picture: image, mode, resolution (m per pixel),
 /// origin (lower left corner, m, m, rad), negate, occupied_thresh, free_thresh.
 /// The thresholds are those with which 0, 205 and 254 read as occupied, unknown
 /// and free.

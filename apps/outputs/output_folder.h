@@ -28,7 +28,7 @@ class OutputFolder {
  public:
   static constexpr char kSummary[] = "summary.json";
 
-  /// What became of the files that were there.
+  /// Changes of the files that were there.
   struct Changes {
     /// Written by an earlier run and not by this one: removed.
     std::vector<std::string> removed;

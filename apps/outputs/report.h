@@ -14,7 +14,7 @@
 
 namespace plumbline {
 
-/// What report.html shows.
+/// Content of report.html.
 struct Report {
   /// Never null while it is written.
   const Graph* graph = nullptr;
@@ -39,7 +39,7 @@ struct Report {
 /// element with the id "run".
 void WriteReport(const Report& report, std::ostream& output);
 
-/// The same into a file, whole or not at all. Throws Error when it cannot be
+/// Writes it to a file, whole or not at all. Throws Error when it cannot be
 /// written.
 void WriteReport(const Report& report, const std::string& path);
 

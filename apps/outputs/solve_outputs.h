@@ -51,7 +51,7 @@ void RegisterBuiltinOutputWriters(Registry* registry);
 std::set<std::string> SelectOutputs(const std::string& list,
                                     const Registry& registry);
 
-/// What WriteSolveOutputs did.
+/// Result of WriteSolveOutputs.
 struct WrittenOutputs {
   /// Names of the files, in order.
   std::vector<std::string> files;
@@ -65,7 +65,7 @@ struct WrittenOutputs {
 std::set<std::string> FilesOfOutputs(const std::set<std::string>& names,
                                      const Registry& registry);
 
-/// Writes the files selected on so many threads; throws Error that names all
+/// Writes the files selected on this many threads; throws Error that names all
 /// files that cannot be written. `progress` (may be null) is told how many are
 /// done and how many there are, by one thread at a time.
 WrittenOutputs WriteSolveOutputs(

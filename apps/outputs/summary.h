@@ -30,7 +30,7 @@ struct WallDirection {
 /// with the most wall around it. None without any wall of at least 1 m.
 std::optional<double> OrthogonalityDeg(const std::vector<WallDirection>& walls);
 
-/// The same over the walls of a graph (MergeWalls).
+/// Orthogonality of the walls of a graph (MergeWalls).
 std::optional<double> OrthogonalityDeg(const Graph& graph);
 
 /// Most memory that the process has held so far, bytes.
@@ -40,7 +40,7 @@ std::int64_t PeakMemoryBytes();
 /// n tenth / 10 up to n (tenth + 1) / 10); none when that tenth is empty.
 std::optional<double> MeanOfTenth(const std::vector<double>& values, int tenth);
 
-/// What a run did, written as summary.json.
+/// Summary of a run, written as summary.json.
 struct Summary {
   /// Constraints of one relation.
   struct ConstraintCounts {
@@ -100,7 +100,7 @@ struct Summary {
 
   /// PeakMemoryBytes().
   std::int64_t peak_memory_bytes = 0;
-  /// How far the directions of walls are from right angles (OrthogonalityDeg).
+  /// Deviation of the directions of walls from right angles (OrthogonalityDeg).
   std::optional<double> orthogonality_deg;
 
   /// Of a graph only: what the start placed (InitialGuessReport) and all solves
@@ -169,7 +169,7 @@ void CountGraph(const Graph& graph, Summary* summary);
 /// loose [{begin, end, why}]}. Numbers that are not finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
-/// The same into a file, whole or not at all. Throws Error when it cannot be
+/// Writes it to a file, whole or not at all. Throws Error when it cannot be
 /// written.
 void WriteSummary(const Summary& summary, const std::string& path);
 

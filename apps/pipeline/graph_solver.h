@@ -16,7 +16,7 @@
 
 namespace plumbline {
 
-/// How a graph is solved.
+/// Options of solving a graph.
 struct GraphSolverOptions {
   /// Find structure. False: measurements only.
   bool structure = true;
@@ -36,7 +36,7 @@ struct GraphSolverOptions {
 Hierarchy MakeGraphHierarchy(const GraphSolverOptions& options,
                              const Graph& graph, const Registry& registry);
 
-/// What solving a graph came to; the map itself is in the graph.
+/// Result of solving a graph; the map itself is in the graph.
 struct GraphSolverResult {
   EmReport em;
   CostReport initial_cost;

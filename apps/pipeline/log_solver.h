@@ -26,7 +26,7 @@
 
 namespace plumbline {
 
-/// What the final trajectory and map are adjusted with.
+/// Means by which the final trajectory and map are adjusted.
 enum class Refinement {
   /// The trajectory is what it was when each scan came in.
   kNone,
@@ -36,9 +36,9 @@ enum class Refinement {
   kFull,
 };
 
-/// How a log is turned into a map.
+/// Options of turning a log into a map.
 struct LogSolverOptions {
-  /// What a kind cannot do is off, whatever stands below (RawFeatureProfile).
+  /// What a kind cannot do is off, whatever the options below say.
   RawFeatures features = RawFeatures::kSegments;
   /// Find structure. False: measurements only.
   bool structure = true;
@@ -84,9 +84,9 @@ struct LogSolverOptions {
   int small_map = 150;
 };
 
-/// What solving a log came to; the map itself is the solver's graph.
+/// Result of solving a log; the map itself is the solver's graph.
 struct LogSolverResult {
-  /// One a scan of the log, map frame.
+  /// One pose per scan of the log, map frame.
   std::vector<Pose2> trajectory;
   EmReport em;
   CostReport initial_cost;
@@ -110,7 +110,7 @@ struct LogSolverResult {
   std::int64_t key_scans = 0;
   std::int64_t wide_searches = 0;
   std::int64_t refused_matches = 0;
-  /// How often the robot was lost, and the parts of the track that hang loosely
+  /// Number of times that the robot was lost, and parts of the track that hang
   /// on the rest of the map or contradict it, in the order of scans.
   std::int64_t lost_tracks = 0;
   std::vector<LooseTrack> loose;

@@ -7,7 +7,7 @@
 
 namespace plumbline {
 
-/// What is asked and told while a log or a graph is solved. Each may be null.
+/// Callbacks while a log or a graph is solved. Each may be null.
 struct RunControl {
   /// Told the scans done and the scans in all, after every scan.
   std::function<void(std::size_t done, std::size_t total)> progress;

@@ -14,7 +14,7 @@
 
 namespace plumbline {
 
-/// Where the raw features of a graph lie by its measurements alone: the same
+/// Positions of the raw features of a graph by its measurements alone: the same
 /// features and live measurements solved without any structure constraint,
 /// started from the graph's present state. Empty when there is no live
 /// structure to leave out, a number is not finite, or the solve fails. The

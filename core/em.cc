@@ -107,8 +107,14 @@ struct EmOrchestrator::Impl final : public GraphListener {
     return report;
   }
 
-  // One turn of the loop on these features, or the whole graph when null; true
-  // when something came or went.
+  // One turn of the loop on these features, or the whole graph when null:
+  //
+  // 1. optimize, for the structure that is there;
+  // 2. weigh it, break what is refuted, drop what has lost its support,
+  //    optimize without that;
+  // 3. for each level find structure, add it, optimize with it.
+  //
+  // True when something came or went.
   bool Iterate(const std::vector<FeatureId>* features, bool detects) {
     ++totals.iterations;
     EmScope scope = MakeEmScope(*graph, features);

@@ -105,6 +105,33 @@ double VarianceFactor(std::vector<double> chi_squares, double redundancy,
                   (links + prior_links));
 }
 
+// How the robot came to a place: from which one, and by what motion.
+struct Arrival {
+  std::size_t from;
+  UncertainPose2 motion;
+};
+
+// `begins`: the record that each place begins with; `place`: not the first.
+Arrival ArrivalAt(const std::vector<KeyScanRecord>& records,
+                  const std::vector<std::size_t>& begins, std::size_t place) {
+  const std::size_t end = begins[place];
+  Arrival arrival{place - 1, {}};
+  std::size_t until = end - 1;
+  // Its first record's motion counts from another place when the robot was lost
+  // and found.
+  if (records[end].from >= 0) {
+    until = static_cast<std::size_t>(records[end].from);
+    arrival.from = static_cast<std::size_t>(
+        std::upper_bound(begins.begin(), begins.end(), until) - begins.begin() -
+        1);
+  }
+  for (std::size_t k = begins[arrival.from] + 1; k <= until; ++k) {
+    arrival.motion = Compose(arrival.motion, records[k].motion);
+  }
+  arrival.motion = Compose(arrival.motion, records[end].motion);
+  return arrival;
+}
+
 }  // namespace
 
 JointAdjustment::JointAdjustment(
@@ -158,22 +185,7 @@ JointAdjustment::JointAdjustment(
     provisional.push_back(transaction.AddFeature(feature));
   }
   for (std::size_t p = 1; p < poses.size(); ++p) {
-    // Its first record's motion counts from another place when the robot was
-    // lost and found.
-    const std::size_t end = begins_[p];
-    const int from = records_[end].from;
-    const std::size_t before =
-        from < 0 ? p - 1
-                 : std::upper_bound(begins_.begin(), begins_.end(),
-                                    static_cast<std::size_t>(from)) -
-                       begins_.begin() - 1;
-    const std::size_t until =
-        from < 0 ? end - 1 : static_cast<std::size_t>(from);
-    UncertainPose2 motion;
-    for (std::size_t k = begins_[before] + 1; k <= until; ++k) {
-      motion = Compose(motion, records_[k].motion);
-    }
-    motion = Compose(motion, records_[end].motion);
+    const auto [before, motion] = ArrivalAt(records_, begins_, p);
     places_[p].since_previous = motion.mean;
     const Eigen::Matrix3d information = motion.covariance.inverse();
     transaction.AddConstraint(MakeMeasurement(

@@ -9,113 +9,146 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <map>
+#include <utility>
+#include <vector>
 
 namespace plumbline {
+
+namespace {
+
+// The poses of key scans as unknowns among features that stay where they are.
+class KeyScanProblem {
+ public:
+  // All must outlive it.
+  KeyScanProblem(const Graph& graph, const std::vector<KeyScanRecord>& records,
+                 const RelocalizationOptions& options)
+      : graph_(graph),
+        options_(options),
+        loss_(options.loss_scale),
+        problem_(ProblemOptions()) {
+    poses_.reserve(records.size());
+    for (const KeyScanRecord& record : records) poses_.push_back(record.pose);
+    for (std::size_t k = 0; k < records.size(); ++k) Add(records[k], k);
+    for (auto& entry : segments_) {
+      problem_.SetParameterBlockConstant(entry.second.data());
+    }
+    for (auto& entry : points_) {
+      problem_.SetParameterBlockConstant(entry.second.data());
+    }
+  }
+
+  // The poses; as odometry has them where there is nothing to find them on.
+  std::vector<Pose2> Solve() {
+    if (!is_anchored_) return std::move(poses_);
+    ceres::Solver::Options solver;
+    solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    solver.max_num_iterations = options_.max_iterations;
+    solver.num_threads = options_.num_threads;
+    solver.initial_trust_region_radius = 1e8;
+    solver.function_tolerance = 1e-7;
+    solver.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, &problem_, &summary);
+    if (!summary.IsSolutionUsable()) {
+      throw PLUMBLINE_ERROR("relocalization failed: " + summary.message,
+                            "a usable solution");
+    }
+    for (Pose2& pose : poses_) pose[2] = NormalizeAngle(pose[2]);
+    return std::move(poses_);
+  }
+
+ private:
+  static ceres::Problem::Options ProblemOptions() {
+    ceres::Problem::Options options;
+    options.disable_all_safety_checks = true;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+
+  void Add(const KeyScanRecord& record, std::size_t k) {
+    problem_.AddParameterBlock(poses_[k].data(), 3);
+    if (k > 0) {
+      const std::size_t from =
+          record.from >= 0 ? static_cast<std::size_t>(record.from) : k - 1;
+      problem_.AddResidualBlock(
+          PosePose::Create(record.motion.mean, SqrtInformationFromCovariance(
+                                                   record.motion.covariance)),
+          nullptr, poses_[from].data(), poses_[k].data());
+    }
+    for (const FeatureMatch& match : record.matches) {
+      const Feature* feature = graph_.FindFeature(match.feature);
+      if (feature != nullptr) AddSegment(*feature, match.observation, k);
+    }
+    for (const PointMatch& match : record.points) {
+      const Feature* feature = graph_.FindFeature(match.feature);
+      if (feature != nullptr) AddPoint(*feature, match.observation, k);
+    }
+  }
+
+  void AddSegment(const Feature& feature, const SegmentObservation& observation,
+                  std::size_t k) {
+    Pose2& segment = segments_
+                         .emplace(feature.id, Pose2(feature.parameters[0],
+                                                    feature.parameters[1],
+                                                    feature.parameters[2]))
+                         .first->second;
+    // The observed line in the robot's frame: offset of the robot's origin from
+    // it, and heading of the robot against it (Eq. 20).
+    const Pose2 inverse = Inverse(observation.pose);
+    const Eigen::Vector2d expected(inverse[1], inverse[2]);
+    Eigen::Matrix2d covariance = observation.covariance;
+    covariance(0, 0) +=
+        options_.feature_offset_sigma * options_.feature_offset_sigma;
+    covariance(1, 1) +=
+        options_.feature_angle_sigma * options_.feature_angle_sigma;
+    // Offset and direction are independent at the middle of the piece; at the
+    // robot's foot point the direction moves the offset.
+    Eigen::Matrix2d lever;
+    lever << 1.0, inverse[0], 0.0, 1.0;
+    const Eigen::Matrix2d at_robot = lever * covariance * lever.transpose();
+    problem_.AddResidualBlock(
+        PoseSegmentCollinearity::Create(
+            expected, SqrtInformationFromCovariance(at_robot)),
+        &loss_, poses_[k].data(), segment.data());
+    is_anchored_ = true;
+  }
+
+  void AddPoint(const Feature& feature, const PointObservation& observation,
+                std::size_t k) {
+    Eigen::Vector2d& point =
+        points_
+            .emplace(feature.id, Eigen::Vector2d(feature.parameters[0],
+                                                 feature.parameters[1]))
+            .first->second;
+    Eigen::Matrix2d covariance = observation.covariance;
+    covariance.diagonal().array() +=
+        options_.point_sigma * options_.point_sigma;
+    covariance /= observation.share;
+    problem_.AddResidualBlock(
+        PosePoint::Create(observation.position,
+                          SqrtInformationFromCovariance(covariance)),
+        &loss_, poses_[k].data(), point.data());
+    is_anchored_ = true;
+  }
+
+  const Graph& graph_;
+  const RelocalizationOptions& options_;
+  std::vector<Pose2> poses_;
+  std::map<FeatureId, Pose2> segments_;
+  std::map<FeatureId, Eigen::Vector2d> points_;
+  bool is_anchored_ = false;
+  // The problem points at all of these: it comes last.
+  ceres::CauchyLoss loss_;
+  ceres::Problem problem_;
+};
+
+}  // namespace
 
 std::vector<Pose2> RelocalizeKeyScans(const Graph& graph,
                                       const std::vector<KeyScanRecord>& records,
                                       const RelocalizationOptions& options) {
-  std::vector<Pose2> poses;
-  poses.reserve(records.size());
-  for (const KeyScanRecord& record : records) poses.push_back(record.pose);
-  if (records.empty()) return poses;
-
-  std::map<FeatureId, Pose2> features;
-  std::map<FeatureId, Eigen::Vector2d> points;
-  ceres::Problem::Options problem_options;
-  problem_options.disable_all_safety_checks = true;
-  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ceres::Problem problem(problem_options);
-  ceres::CauchyLoss loss(options.loss_scale);
-
-  bool anchored = false;
-  for (std::size_t k = 0; k < records.size(); ++k) {
-    const KeyScanRecord& record = records[k];
-    problem.AddParameterBlock(poses[k].data(), 3);
-    if (k > 0) {
-      problem.AddResidualBlock(
-          PosePose::Create(record.motion.mean, SqrtInformationFromCovariance(
-                                                   record.motion.covariance)),
-          nullptr,
-          poses[record.from >= 0 ? static_cast<std::size_t>(record.from)
-                                 : k - 1]
-              .data(),
-          poses[k].data());
-    }
-    for (const FeatureMatch& match : record.matches) {
-      const Feature* feature = graph.FindFeature(match.feature);
-      if (feature == nullptr) continue;
-      const auto inserted = features.emplace(
-          match.feature, Pose2(feature->parameters[0], feature->parameters[1],
-                               feature->parameters[2]));
-      Pose2& segment = inserted.first->second;
-      // The observed line in the robot's frame: offset of the robot's origin
-      // from it, and heading of the robot against it (Eq. 20).
-      const Pose2& observed = match.observation.pose;
-      const Pose2 inverse = Inverse(observed);
-      const Eigen::Vector2d expected(inverse[1], inverse[2]);
-      Eigen::Matrix2d covariance = match.observation.covariance;
-      covariance(0, 0) +=
-          options.feature_offset_sigma * options.feature_offset_sigma;
-      covariance(1, 1) +=
-          options.feature_angle_sigma * options.feature_angle_sigma;
-      // Offset and direction are independent at the middle of the piece; at
-      // the robot's foot point the direction moves the offset.
-      Eigen::Matrix2d lever;
-      lever << 1.0, inverse[0], 0.0, 1.0;
-      const Eigen::Matrix2d at_robot = lever * covariance * lever.transpose();
-      problem.AddResidualBlock(
-          PoseSegmentCollinearity::Create(
-              expected, SqrtInformationFromCovariance(at_robot)),
-          &loss, poses[k].data(), segment.data());
-      anchored = true;
-    }
-    for (const PointMatch& match : record.points) {
-      const Feature* feature = graph.FindFeature(match.feature);
-      if (feature == nullptr) continue;
-      Eigen::Vector2d& point =
-          points
-              .emplace(match.feature, Eigen::Vector2d(feature->parameters[0],
-                                                      feature->parameters[1]))
-              .first->second;
-      const PointObservation& observation = match.observation;
-      Eigen::Matrix2d covariance = observation.covariance;
-      covariance.diagonal().array() +=
-          options.point_sigma * options.point_sigma;
-      covariance /= observation.share;
-      problem.AddResidualBlock(
-          PosePoint::Create(observation.position,
-                            SqrtInformationFromCovariance(covariance)),
-          &loss, poses[k].data(), point.data());
-      anchored = true;
-    }
-  }
-  for (auto& entry : features) {
-    problem.SetParameterBlockConstant(entry.second.data());
-  }
-  for (auto& entry : points) {
-    problem.SetParameterBlockConstant(entry.second.data());
-  }
-  if (!anchored) {
-    // Nothing to find the poses on: odometry as it stands.
-    return poses;
-  }
-
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  solver.max_num_iterations = options.max_iterations;
-  solver.num_threads = options.num_threads;
-  solver.initial_trust_region_radius = 1e8;
-  solver.function_tolerance = 1e-7;
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  if (!summary.IsSolutionUsable()) {
-    throw PLUMBLINE_ERROR("relocalization failed: " + summary.message,
-                          "a usable solution");
-  }
-  for (Pose2& pose : poses) pose[2] = NormalizeAngle(pose[2]);
-  return poses;
+  if (records.empty()) return {};
+  return KeyScanProblem(graph, records, options).Solve();
 }
 
 std::vector<Pose2> InterpolateScans(const std::vector<RefinedScan>& refined,

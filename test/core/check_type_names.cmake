@@ -1,6 +1,6 @@
-# Fails when a source file of the libraries or apps in FOLDER asks a feature or a
-# relation for its name to find out what it is, or takes a unit apart: that is
-# what traits, roles and quantities say. Readers and writers of files are left
+# Fails when a source file of the libraries, apps or examples in FOLDER asks a
+# feature or a relation for its name to find out what it is, or takes a unit
+# apart: that is what traits, roles and quantities say. Readers and writers of files are left
 # out, and so is the registry, where names are looked up.
 cmake_minimum_required(VERSION 3.21)
 set(may_compare
@@ -16,15 +16,18 @@ set(patterns
   # count(feature->type->name), std::find(..., feature.type->name)
   "count\\([a-z_.>()*-]*type(->|\\.)name\\)"
   "std::find\\([^;]*type(->|\\.)name"
+  # types.insert(feature->type->name), to ask for the set of names later
+  "(types|raw)\\.insert\\([a-z_.>()*-]*type(->|\\.)name\\)"
   # unit == "rad"
   "unit *[!=]= *\"")
 
 file(GLOB_RECURSE sources RELATIVE ${FOLDER}
   ${FOLDER}/core/*.cc ${FOLDER}/core/*.h ${FOLDER}/detectors/*.cc ${FOLDER}/detectors/*.h
-  ${FOLDER}/frontend/*.cc ${FOLDER}/frontend/*.h ${FOLDER}/apps/*.cc ${FOLDER}/apps/*.h)
+  ${FOLDER}/frontend/*.cc ${FOLDER}/frontend/*.h ${FOLDER}/apps/*.cc ${FOLDER}/apps/*.h
+  ${FOLDER}/test/consumer/*.cc ${FOLDER}/test/consumer/*.h)
 list(LENGTH sources count)
 if(count LESS 100)
-  message(FATAL_ERROR "${FOLDER}: ${count} source files: expected those of core, detectors, frontend and apps")
+  message(FATAL_ERROR "${FOLDER}: ${count} source files: expected those of core, detectors, frontend, apps and test/consumer")
 endif()
 set(found)
 foreach(source ${sources})

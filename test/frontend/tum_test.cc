@@ -8,31 +8,17 @@
 #include <string>
 #include <vector>
 
+#include "frontend/timed_poses.h"
+#include "refusal.h"
+
 namespace plumbline {
 namespace {
 
 using ::testing::HasSubstr;
 
-TimedPose At(double timestamp, double x, double y, double theta) {
-  TimedPose timed;
-  timed.timestamp = timestamp;
-  timed.pose = Pose2(x, y, theta);
-  return timed;
-}
-
 std::vector<TimedPose> ParseTum(const std::string& text) {
   InputStream input("path.tum", text);
   return ReadTum(&input);
-}
-
-template <typename Function>
-std::string Refusal(const Function& function) {
-  try {
-    function();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "accepted";
 }
 
 TEST(TumTest, Writes) {

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <string>
 
+#include "refusal.h"
+
 namespace plumbline {
 namespace {
 
@@ -23,16 +25,6 @@ MapTruth ParseTruth(const std::string& text) {
 StraightMap ParseMap(const std::string& text) {
   InputStream input("map.json", text);
   return ReadStraightMap(&input);
-}
-
-template <typename Function>
-std::string Refusal(const Function& function) {
-  try {
-    function();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "accepted";
 }
 
 TruthWall MakeWall(int id, double x1, double y1, double x2, double y2,

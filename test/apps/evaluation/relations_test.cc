@@ -10,17 +10,13 @@
 #include <sstream>
 #include <string>
 
+#include "frontend/timed_poses.h"
+#include "refusal.h"
+
 namespace plumbline {
 namespace {
 
 using ::testing::HasSubstr;
-
-TimedPose At(double timestamp, double x, double y, double theta) {
-  TimedPose timed;
-  timed.timestamp = timestamp;
-  timed.pose = Pose2(x, y, theta);
-  return timed;
-}
 
 Relation Displacement(double time1, double time2, double x, double y,
                       double theta) {
@@ -34,16 +30,6 @@ Relation Displacement(double time1, double time2, double x, double y,
 std::vector<Relation> ParseRelations(const std::string& text) {
   InputStream input("file.relations", text);
   return ReadRelations(&input);
-}
-
-template <typename Function>
-std::string Refusal(const Function& function) {
-  try {
-    function();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "accepted";
 }
 
 TEST(RelationsTest, OrderOfComposition) {

@@ -8,39 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "detectors/closed_walls.h"
+
 namespace plumbline {
 namespace {
 
-class MergedWallsOutputsTest : public ::testing::Test {
- protected:
-  MergedWallsOutputsTest() { RegisterBuiltins(&registry_); }
-
-  FeatureId AddSegment(double x, double y, double length) {
-    Feature feature;
-    feature.type = &registry_.GetFeature("segment");
-    feature.parameters = {x, y, 0.0};
-    feature.extent_end = length;
-    feature.observations = 3;
-    Transaction transaction;
-    transaction.AddFeature(feature);
-    return graph_.Apply(std::move(transaction)).features[0];
-  }
-
-  ConstraintId Close(FeatureId first, FeatureId second) {
-    Constraint constraint;
-    constraint.type = &registry_.GetRelation(kSameWallRelation);
-    constraint.features = {first, second};
-    constraint.expected = Eigen::VectorXd::Zero(2);
-    constraint.information = Eigen::MatrixXd::Identity(2, 2);
-    constraint.kind = ConstraintClass::kStructure;
-    Transaction transaction;
-    transaction.AddConstraint(constraint);
-    return graph_.Apply(std::move(transaction)).constraints[0];
-  }
-
-  Registry registry_;
-  Graph graph_;
-};
+using MergedWallsOutputsTest = ClosedWallsTest;
 
 TEST_F(MergedWallsOutputsTest, OutputsShowOneWall) {
   const FeatureId a = AddSegment(0.0, 0.0, 4.0);

@@ -27,7 +27,7 @@ constexpr double kHeadingSigma = DegToRad(0.5);  // rad
 double WorstDirection(const plumbline::Graph& graph) {
   double worst = 0.0;
   for (const plumbline::Feature* feature : graph.Features()) {
-    if (feature->type->name != "segment") continue;
+    if (!feature->type->Is(plumbline::FeatureRole::kWall)) continue;
     const double degrees = RadToDeg(feature->parameters[2]);
     worst = std::max(worst, std::abs(std::remainder(degrees, 90.0)));
   }

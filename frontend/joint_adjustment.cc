@@ -1,12 +1,15 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/factors/information.h>
 #include <plumbline/frontend/joint_adjustment.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -90,16 +93,49 @@ double ChiSquare(const Graph& graph, FeatureId from, FeatureId to,
   return error.dot(information * error);
 }
 
-// How much larger than 1 the variance of unit weight of a group of links of
-// three rows is, of which so large a share is redundant.
-double VarianceFactor(std::vector<double> chi_squares, double redundancy,
-                      double prior_links) {
+// Chi-square of what a vote's returns alone say of the wall's place against
+// where it is (offset and direction).
+double VoteChiSquare(const Graph& graph, const Constraint& vote) {
+  using RowMajor =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const Feature& pose = graph.GetFeature(vote.features[0]);
+  const Feature& wall = graph.GetFeature(vote.features[1]);
+  RelationArguments arguments;
+  arguments.expected = vote.expected;
+  arguments.sqrt_information = SqrtInformation(vote.information);
+  arguments.features = {&pose, &wall};
+  const auto cost = vote.type->make_cost(arguments);
+  const double* parameters[] = {pose.data(), wall.data()};
+  Eigen::VectorXd residual(vote.type->residual_size);
+  RowMajor jacobian(vote.type->residual_size, wall.type->size);
+  double* jacobians[] = {nullptr, jacobian.data()};
+  if (!cost->Evaluate(parameters, residual.data(), jacobians)) return 0.0;
+  const Eigen::Matrix3d information = jacobian.transpose() * jacobian;
+  const Eigen::Vector3d gradient = jacobian.transpose() * residual;
+  // Along itself the wall may lie anywhere.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
+  double chi_square = 0.0;
+  for (int i = 1; i < 3; ++i) {
+    const double value = solver.eigenvalues()[i];
+    if (value <= 1e-9 * solver.eigenvalues()[2]) continue;
+    const double along = solver.eigenvectors().col(i).dot(gradient);
+    chi_square += along * along / value;
+  }
+  return chi_square;
+}
+
+// Medians of chi-square with two and three degrees of freedom.
+constexpr double kMedianOf2 = 1.386;
+constexpr double kMedianOf3 = 2.366;
+
+// How much larger than 1 the variance of unit weight of a group of links is, of
+// which so large a share is redundant. `expected`: median of their chi-square.
+double VarianceFactor(std::vector<double> chi_squares, double expected,
+                      double redundancy, double prior_links) {
   if (chi_squares.empty() || redundancy <= 0.0) return 1.0;
   const auto middle = chi_squares.begin() + chi_squares.size() / 2;
   std::nth_element(chi_squares.begin(), middle, chi_squares.end());
-  // Median of chi-square with three degrees of freedom.
-  constexpr double kMedian = 2.366;
-  const double factor = *middle / (kMedian * redundancy);
+  const double factor = *middle / (expected * redundancy);
   const double links = redundancy * static_cast<double>(chi_squares.size());
   return std::exp(std::log(std::max(factor, 1e-12)) * links /
                   (links + prior_links));
@@ -284,9 +320,9 @@ void JointAdjustment::Vote() {
       CollectWallVotes(*graph_, places_, PlacePoses(), options_.votes);
   for (std::size_t k = 0; k < votes.size(); ++k) {
     for (const WallVote& vote : votes[k]) {
-      transaction.AddConstraint(
-          MakeMeasurement(relation, {poses_[k], vote.wall},
-                          Eigen::Vector3d::Zero(), vote.information, kSource));
+      transaction.AddConstraint(MakeMeasurement(
+          relation, {poses_[k], vote.wall}, Eigen::Vector3d::Zero(),
+          vote.information / vote_factor_, kSource));
     }
   }
   votes_ = graph_->Apply(std::move(transaction)).constraints;
@@ -327,17 +363,38 @@ void JointAdjustment::EstimateVariances() {
                                      poses_[relation.to], relation.mean,
                                      relation.information));
   }
-  // Odometry alone ties the poses; every match is redundant.
-  const std::size_t links = of_motions.size() + of_relations.size();
-  if (links == 0) return;
-  const double redundancy = static_cast<double>(of_relations.size()) / links;
-  const auto factor = [&](std::vector<double> chi_squares) {
-    return std::clamp(
-        VarianceFactor(std::move(chi_squares), redundancy, kPriorLinks),
-        options_.min_variance_factor, options_.max_variance_factor);
+  std::vector<double> of_votes;
+  std::set<FeatureId> walls;
+  for (const ConstraintId id : votes_) {
+    const Constraint& vote = graph_->GetConstraint(id);
+    of_votes.push_back(vote_factor_ * VoteChiSquare(*graph_, vote));
+    walls.insert(vote.features[1]);
+  }
+  const auto rows = static_cast<double>(
+      3 * (of_motions.size() + of_relations.size()) + 2 * of_votes.size());
+  if (rows == 0.0) return;
+  // Odometry alone ties the poses, and one vote each the walls.
+  const double redundancy =
+      static_cast<double>(3 * of_relations.size() +
+                          2 * (of_votes.size() - walls.size())) /
+      rows;
+  const auto factor = [&](std::vector<double> chi_squares, double expected) {
+    return std::clamp(VarianceFactor(std::move(chi_squares), expected,
+                                     redundancy, kPriorLinks),
+                      options_.min_variance_factor,
+                      options_.max_variance_factor);
   };
-  motion_factor_ = factor(std::move(of_motions));
-  relation_factor_ = factor(std::move(of_relations));
+  motion_factor_ = factor(std::move(of_motions), kMedianOf3);
+  relation_factor_ = factor(std::move(of_relations), kMedianOf3);
+  const double vote_factor = factor(std::move(of_votes), kMedianOf2);
+  for (const ConstraintId id : votes_) {
+    const Constraint& vote = graph_->GetConstraint(id);
+    const Eigen::VectorXd expected = vote.expected;
+    const Eigen::MatrixXd information =
+        vote.information * (vote_factor_ / vote_factor);
+    graph_->UpdateConstraint(id, expected, information);
+  }
+  vote_factor_ = vote_factor;
   for (const auto& [id, information] : motions_) {
     const Eigen::VectorXd expected = graph_->GetConstraint(id).expected;
     graph_->UpdateConstraint(id, expected, information / motion_factor_);

@@ -91,19 +91,21 @@ class JointAdjustment {
   /// submap until then.
   void MatchAnew();
 
-  /// Scales the variances of refined odometry and those of the matches of scans
-  /// by one factor each to what their residuals show (variance components,
-  /// Foerstner 1979, by the median, since some matches are wrong), then solves
-  /// once. Scans promise too much or too little by what surfaces and a laser
-  /// are; links that are given too much room let structure bend the map. Few
-  /// links say little: kPriorLinks more with a factor of 1 are counted. Throws
-  /// Error when the solve fails.
+  /// Scales the variances of refined odometry, of the matches of scans and of
+  /// the votes for walls by one factor each to what their residuals show
+  /// (variance components, Foerstner 1979, by the median, since some matches
+  /// are wrong), then solves once. Of a vote the innovation counts: where its
+  /// returns alone would have the wall. Scans promise too much or too little by
+  /// what surfaces and a laser are; links that are given too much room let
+  /// structure bend the map. Few links say little: kPriorLinks more with a
+  /// factor of 1 are counted. Throws Error when the solve fails.
   void EstimateVariances();
   static constexpr double kPriorLinks = 10.0;
 
   /// The factors: 1 until they are estimated.
   double motion_variance_factor() const { return motion_factor_; }
   double relation_variance_factor() const { return relation_factor_; }
+  double vote_variance_factor() const { return vote_factor_; }
 
   /// Adds walls (segments of level 0 without constraints, as they lie among the
   /// poses at present), each bound to the poses by the votes of its returns;
@@ -159,6 +161,7 @@ class JointAdjustment {
   std::vector<std::pair<ConstraintId, Eigen::Matrix3d>> motions_;
   double motion_factor_ = 1.0;
   double relation_factor_ = 1.0;
+  double vote_factor_ = 1.0;
   // Live vote constraints.
   std::vector<ConstraintId> votes_;
 };

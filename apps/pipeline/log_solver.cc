@@ -408,6 +408,7 @@ void LogSolver::MakeSecondMap(Context* context) {
   if (context->IsStopped()) return;
   context->Begin("joint adjustment of poses and walls");
   adjustment.Adjust();
+  if (!context->IsStopped()) adjustment.EstimateVariances();
   TakeTrajectory(context);
   result.scan_relations = adjustment.num_relations();
   result.wall_votes = adjustment.num_votes();

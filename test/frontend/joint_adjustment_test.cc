@@ -254,6 +254,53 @@ TEST_F(JointAdjustmentTest, VariancesComeFromResiduals) {
   EXPECT_GE(bounded_relation, options_.min_variance_factor);
 }
 
+// The same for what returns say of walls.
+TEST_F(JointAdjustmentTest, VariancesOfVotesComeFromResiduals) {
+  JointAdjustmentOptions options = options_;
+  options.min_variance_factor = 1e-6;
+  options.max_variance_factor = 1e6;
+  const auto estimate = [&](double independence) {
+    options.votes.independence = independence;
+    Graph graph;
+    SolverSession session(&graph, registry_, {});
+    JointAdjustment adjustment(&graph, &session, registry_, scans_, refined_,
+                               records_, keys_, kNoId, options);
+    adjustment.Adjust();
+    Transaction walls;
+    for (const FeatureId id : walls_) {
+      Feature wall = std::as_const(graph_).GetFeature(id);
+      wall.fixed = false;
+      walls.AddFeature(wall);
+    }
+    adjustment.AddWalls(std::move(walls));
+    adjustment.Adjust();
+    const auto information = [&graph] {
+      for (const Constraint* constraint : std::as_const(graph).Constraints()) {
+        if (constraint->type->name == "pose_segment_points") {
+          return constraint->information(2, 2);
+        }
+      }
+      return 0.0;
+    };
+    const double before = information();
+    EXPECT_GT(before, 0.0);
+    EXPECT_EQ(adjustment.vote_variance_factor(), 1.0);
+    adjustment.EstimateVariances();
+    EXPECT_NEAR(information() * adjustment.vote_variance_factor() / before, 1.0,
+                1e-9);
+    // A second time nothing is scaled twice.
+    const double factor = adjustment.vote_variance_factor();
+    adjustment.EstimateVariances();
+    EXPECT_NEAR(std::log(adjustment.vote_variance_factor() / factor), 0.0, 0.7);
+    return factor;
+  };
+  const double factor = estimate(0.5);
+  EXPECT_LT(factor, 0.5);
+  EXPECT_GT(factor, 1e-4);
+  // Votes that count less are found to be better than they say.
+  EXPECT_LT(estimate(0.05), 0.5 * factor);
+}
+
 // A map that is bent between two places does not keep its bend: scans are
 // matched with submaps as odometry has them.
 TEST_F(JointAdjustmentTest, ABentStartComesStraight) {

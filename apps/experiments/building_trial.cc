@@ -47,7 +47,9 @@ BuildingTrial RunBuildingTrial(const World& world,
   const MapTruth truth = ReadMapTruth(&truth_text);
 
   LogSolver solver(registry, options);
-  const LogSolverResult result = solver.Run(log, {nullptr, stop, nullptr});
+  RunControl control;
+  control.stop = stop;
+  const LogSolverResult result = solver.Run(log, control);
   if (result.interrupted) {
     trial.is_stopped = true;
     return trial;

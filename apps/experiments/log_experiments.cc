@@ -53,8 +53,9 @@ void RunLog(const std::string& log_file, const std::string& relations_file,
       solver_options.em.seed = options.seed;
       LogSolver solver(registry, solver_options);
       const Stopwatch watch;
-      const LogSolverResult solved =
-          solver.Run(log, {nullptr, options.stop, nullptr});
+      RunControl control;
+      control.stop = options.stop;
+      const LogSolverResult solved = solver.Run(log, control);
       const double seconds = watch.Seconds();
       if (solved.interrupted) return;
       std::vector<TimedPose> trajectory(solved.trajectory.size());

@@ -29,7 +29,7 @@ foreach(component factors core detectors frontend pipeline plan outputs)
   if(NOT EXISTS ${SOURCE}/${component})
     set(folder apps/${component})
   endif()
-  file(GLOB in_tree RELATIVE ${SOURCE}/${folder} ${SOURCE}/${folder}/*.h)
+  file(GLOB_RECURSE in_tree RELATIVE ${SOURCE}/${folder} ${SOURCE}/${folder}/*.h)
   file(GLOB_RECURSE installed RELATIVE ${PREFIX}/include/plumbline/${component}
     ${PREFIX}/include/plumbline/${component}/*)
   if(NOT in_tree STREQUAL installed)

@@ -518,6 +518,12 @@ int SolveLog(const LogInput& input, const Registry& registry, double begin,
            input.name.c_str(), begin_scan.timestamp, end_scan.timestamp,
            part.why.c_str());
   }
+  if (result.second_map_refused) {
+    summary.notes.push_back(
+        "the map from adjusted poses has hardly any walls: the map of the "
+        "front-end stands");
+    Remark("%s: %s", input.name.c_str(), summary.notes.back().c_str());
+  }
   summary.frontend_seconds =
       result.frontend_seconds + result.relocalization_seconds;
   summary.scan_seconds.assign(result.scan_seconds.begin(),

@@ -17,6 +17,20 @@ constexpr char kSameWallDetector[] = "same_wall";
 // more than this.
 constexpr std::size_t kSmallMapGrowth = 10;
 
+// A second map with less than this share of the first one's length of walls has
+// lost what the scans show, and is no better.
+constexpr double kLeastSecondShare = 1.0 / 3.0;
+
+double LengthOfWalls(const Graph& graph) {
+  double length = 0.0;
+  for (const Feature* feature : graph.Features()) {
+    if (!feature->type->Is(FeatureRole::kWall) || feature->level != 0) continue;
+    const double part = feature->extent_end - feature->extent_begin;
+    if (std::isfinite(part)) length += part;
+  }
+  return length;
+}
+
 void AddSameWall(HierarchySpec* hierarchy) {
   if (!hierarchy->Contains(kSameWallDetector)) {
     hierarchy->Add(0, kSameWallDetector);
@@ -373,8 +387,12 @@ void LogSolver::AdjustPoses(Context* context) {
   StateWriter first_map;
   Exchange(first_map, registry_, *graph_);
   const std::vector<Pose2> first_trajectory = result.trajectory;
+  const double first_length = LengthOfWalls(*graph_);
   MakeSecondMap(context);
-  if (!context->IsStopped()) return;
+  const bool is_stopped = context->IsStopped();
+  result.second_map_refused =
+      !is_stopped && LengthOfWalls(*graph_) < kLeastSecondShare * first_length;
+  if (!is_stopped && !result.second_map_refused) return;
   // Half of a second map is worth less than the whole of the first.
   StateReader reader(first_map.bytes());
   DropEm();

@@ -117,6 +117,8 @@ struct LogSolverResult {
   /// Observations recognized as a raw feature, and raw features made.
   std::int64_t feature_matches = 0;
   std::int64_t features_created = 0;
+  /// The second map had hardly any of the walls of the first, which stands.
+  bool second_map_refused = false;
   /// Ended early because `stop` said so: what there is, is whole.
   bool interrupted = false;
   /// What the front-end made of each scan and of the key scans: enough to

@@ -207,6 +207,28 @@ TEST_F(LogSolverTest, FullRefinementBringsThePosesBack) {
   }
 }
 
+// Where the second map's search finds hardly any wall the first map stands,
+// and it is said.
+TEST_F(LogSolverTest, ASecondMapWithoutWallsIsRefused) {
+  LogSolverOptions options;
+  options.completion.min_returns = 1 << 30;
+  options.check_map = false;
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(Office(250));
+  EXPECT_TRUE(result.second_map_refused);
+  EXPECT_EQ(result.wall_votes, 0);
+  ExpectFinite(result.trajectory);
+  // What a run without a second map ends with.
+  LogSolverOptions first_only = options;
+  first_only.refine = Refinement::kMap;
+  first_only.complete_walls = false;
+  LogSolver first(registry_, first_only);
+  const LogSolverResult without = first.Run(Office(250));
+  EXPECT_FALSE(without.second_map_refused);
+  EXPECT_EQ(Json(solver.graph()), Json(first.graph()));
+  EXPECT_EQ(result.trajectory, without.trajectory);
+}
+
 TEST_F(LogSolverTest, SameBytesEveryTime) {
   const Log log = Office(150);
   LogSolver first(registry_, {});

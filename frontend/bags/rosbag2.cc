@@ -27,49 +27,56 @@ constexpr std::size_t kLargestMetadata = std::size_t{1} << 26;
 constexpr std::size_t kLargestMessage = std::size_t{1} << 28;
 constexpr char kExpected[] = "the messages and topics of a ROS 2 bag";
 
-// A file that is gone when this is.
+// A file that is gone when this is, with what a stream holds.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(InputStream* input) {
-    std::error_code error;
-    fs::path folder = fs::temp_directory_path(error);
-    if (error) folder = "/tmp";
-    path_ = (folder / "plumbline-XXXXXX").string();
-    const int descriptor = mkostemp(path_.data(), O_CLOEXEC);
-    if (descriptor < 0) {
-      throw Error(path_, 0,
-                  std::string("cannot be made: ") + std::strerror(errno),
-                  "a folder to write to (TMPDIR)");
-    }
-    bool ok = true;
-    while (ok) {
+  // The file exists from here on, so that it goes whatever is thrown.
+  explicit TemporaryFile(InputStream* input) : TemporaryFile() {
+    for (;;) {
       const std::string_view piece = input->Peek(std::size_t{1} << 18);
       if (piece.empty()) break;
-      std::string_view rest = piece;
-      while (ok && !rest.empty()) {
-        const ssize_t count = write(descriptor, rest.data(), rest.size());
-        if (count < 0 && errno == EINTR) continue;
-        ok = count > 0;
-        if (ok) rest.remove_prefix(static_cast<std::size_t>(count));
-      }
+      Write(piece, *input);
       input->Consume(piece.size());
     }
-    const int why = errno;
-    close(descriptor);
-    if (!ok) {
-      unlink(path_.c_str());
-      throw Error(path_, 0,
-                  std::string("cannot be written: ") + std::strerror(why),
-                  "room for " + input->name() + " unpacked (TMPDIR)");
-    }
+    close(std::exchange(descriptor_, -1));
   }
-  ~TemporaryFile() { unlink(path_.c_str()); }
+  ~TemporaryFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+    unlink(path_.c_str());
+  }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
   const std::string& path() const { return path_; }
 
  private:
+  TemporaryFile() {
+    std::error_code error;
+    fs::path folder = fs::temp_directory_path(error);
+    if (error) folder = "/tmp";
+    path_ = (folder / "plumbline-XXXXXX").string();
+    descriptor_ = mkostemp(path_.data(), O_CLOEXEC);
+    if (descriptor_ < 0) {
+      throw Error(path_, 0,
+                  std::string("cannot be made: ") + std::strerror(errno),
+                  "a folder to write to (TMPDIR)");
+    }
+  }
+
+  void Write(std::string_view rest, const InputStream& input) {
+    while (!rest.empty()) {
+      const ssize_t count = write(descriptor_, rest.data(), rest.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) {
+        throw Error(path_, 0,
+                    std::string("cannot be written: ") + std::strerror(errno),
+                    "room for " + input.name() + " unpacked (TMPDIR)");
+      }
+      rest.remove_prefix(static_cast<std::size_t>(count));
+    }
+  }
+
   std::string path_;
+  int descriptor_ = -1;
 };
 
 struct CloseDatabase {

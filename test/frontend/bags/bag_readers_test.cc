@@ -11,9 +11,12 @@
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/log_reader.h>
+#include <sys/resource.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -579,6 +582,44 @@ TEST(BadBagTest, EveryCutOfADatabaseIsSaidOrRefused) {
       EXPECT_THAT(error.what(), HasSubstr("cut.db3"));
     }
   }
+}
+
+// SQLite needs a file: what is compressed is unpacked into one, which goes
+// whether or not there was room for it.
+TEST(BadBagTest, UnpackedDatabasesLeaveNothing) {
+  const Folder folder;
+  WriteRosbag2(SmallDrive(kCdr), folder / "whole");
+  std::ifstream file(folder / "whole/whole_0.db3", std::ios::binary);
+  std::stringstream whole;
+  whole << file.rdbuf();
+  const std::string path = folder / "bag.db3.gz";
+  gzFile packed = gzopen(path.c_str(), "wb");
+  gzwrite(packed, whole.str().data(),
+          static_cast<unsigned>(whole.str().size()));
+  gzclose(packed);
+  const std::string temporary = folder / "temporary";
+  fs::create_directories(temporary);
+  setenv("TMPDIR", temporary.c_str(), 1);
+  EXPECT_FALSE(ReadPath(path).scans.empty());
+  EXPECT_TRUE(fs::is_empty(temporary));
+  // No room.
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before;
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit small = before;
+  small.rlim_cur = 4096;
+  setrlimit(RLIMIT_FSIZE, &small);
+  std::string what;
+  try {
+    ReadPath(path);
+  } catch (const Error& error) {
+    what = error.what();
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_THAT(what, AllOf(HasSubstr("cannot be written"), HasSubstr("TMPDIR")));
+  EXPECT_TRUE(fs::is_empty(temporary));
+  unsetenv("TMPDIR");
 }
 
 TEST(BadBagTest, IndexThatLiesAboutItsSizeIsSurvived) {

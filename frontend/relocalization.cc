@@ -29,6 +29,7 @@ class KeyScanProblem {
     poses_.reserve(records.size());
     for (const KeyScanRecord& record : records) poses_.push_back(record.pose);
     for (std::size_t k = 0; k < records.size(); ++k) Add(records[k], k);
+    if (options.start_position_sigma > 0.0) HoldStart();
     for (auto& entry : segments_) {
       problem_.SetParameterBlockConstant(entry.second.data());
     }
@@ -85,6 +86,22 @@ class KeyScanProblem {
     }
   }
 
+  // An origin that stays, from which the first key scan is seen.
+  void HoldStart() {
+    const double position =
+        1.0 / (options_.start_position_sigma * options_.start_position_sigma);
+    const double angle =
+        1.0 / (options_.start_angle_sigma * options_.start_angle_sigma);
+    problem_.AddParameterBlock(origin_.data(), 3);
+    problem_.SetParameterBlockConstant(origin_.data());
+    problem_.AddResidualBlock(
+        PosePose::Create(
+            poses_.front(),
+            SqrtInformation(Eigen::Matrix3d(
+                Eigen::Vector3d(position, position, angle).asDiagonal()))),
+        nullptr, origin_.data(), poses_.front().data());
+  }
+
   void AddSegment(const Feature& feature, const SegmentObservation& observation,
                   std::size_t k) {
     Pose2& segment = segments_
@@ -134,6 +151,7 @@ class KeyScanProblem {
   const Graph& graph_;
   const RelocalizationOptions& options_;
   std::vector<Pose2> poses_;
+  Pose2 origin_ = Pose2::Zero();
   std::map<FeatureId, Pose2> segments_;
   std::map<FeatureId, Eigen::Vector2d> points_;
   bool is_anchored_ = false;

@@ -20,6 +20,11 @@ struct RelocalizationOptions {
   double point_sigma = 0.03;
   /// Scale of the Cauchy loss on an observation, in sigmas.
   double loss_scale = 2.0;
+  /// Uncertainty of the first key scan's recorded pose, m and rad; zero: it is
+  /// not used. A few key scans in a corridor do not tell how far along it they
+  /// are.
+  double start_position_sigma = 0.0;
+  double start_angle_sigma = 0.0;
   int max_iterations = 30;
   int num_threads = 1;
 };

@@ -257,6 +257,45 @@ TEST_F(RelocalizationTest, OffsetIsObservedAtTheMiddleOfThePiece) {
   EXPECT_NEAR(poses[0][2], -0.5 * kTurn, 1e-5);
 }
 
+TEST_F(RelocalizationTest, APieceOfACorridorStaysWhereItWas) {
+  // The map has moved by 5 cm since, and its walls are not quite parallel:
+  // where they are as far apart as they look is 25 m down the corridor.
+  Transaction transaction;
+  Feature feature;
+  feature.type = &registry_.GetFeature("segment");
+  feature.parameters = {0.0, -1.0, 0.0};
+  transaction.AddFeature(feature);
+  feature.parameters = {0.0, 1.05, 0.002 - kPi};
+  transaction.AddFeature(feature);
+  const std::vector<FeatureId> ids =
+      graph_.Apply(std::move(transaction)).features;
+  for (int i = 0; i < 5; ++i) {
+    const Pose2 robot(0.5 * i, 0.0, 0.0);
+    KeyScanRecord record;
+    record.pose = robot;
+    if (i > 0) record.motion.mean = Pose2(0.5, 0.0, 0.0);
+    record.motion.covariance =
+        Eigen::Vector3d(0.02 * 0.02, 0.02 * 0.02, 0.01 * 0.01).asDiagonal();
+    for (int k = 0; k < 2; ++k) {
+      const double y = k == 0 ? -1.0 : 1.0;
+      FeatureMatch match;
+      match.feature = ids[k];
+      match.observation = Observe(robot, Wall{{-20.0, y}, {20.0, y}});
+      record.matches.push_back(match);
+    }
+    records_.push_back(record);
+    truth_.push_back(robot);
+  }
+  EXPECT_GT(PositionError(Relocalize()[2], truth_[2]), 5.0);
+  options_.start_position_sigma = 0.5;
+  options_.start_angle_sigma = DegToRad(10.0);
+  const std::vector<Pose2> poses = Relocalize();
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_LT(PositionError(poses[i], truth_[i]), 0.2) << i;
+    EXPECT_LT(HeadingError(poses[i], truth_[i]), DegToRad(0.5)) << i;
+  }
+}
+
 TEST_F(RelocalizationTest, FeaturesThatAreGoneAreLeftOut) {
   Build(5);
   Transaction transaction;

@@ -69,8 +69,10 @@ def main():
     parser.add_argument("--kinds", default=",".join(["none"] + KINDS)); parser.add_argument("--seeds", default="1-10")
     parser.add_argument("--plain", type=float, help="mean error of the log as it is, m, where it is not among the kinds")
     parser.add_argument("--output", help="CSV with a row for each run")
-    parser.add_argument("flags", nargs="*")
-    args = parser.parse_args()
+    own = sys.argv[1:]
+    flags = own[own.index("--") + 1:] if "--" in own else []
+    args = parser.parse_args(own[:own.index("--")] if "--" in own else own)
+    args.flags = flags
     plain, counts, table = args.plain, {}, []
     for kind in args.kinds.split(","):
         for seed in [0] if kind == "none" else seeds_of(args.seeds):

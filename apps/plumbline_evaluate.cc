@@ -6,6 +6,7 @@
 #include <plumbline/apps/evaluation/closure_truth.h>
 #include <plumbline/apps/evaluation/map_evaluation.h>
 #include <plumbline/apps/evaluation/map_truth.h>
+#include <plumbline/apps/evaluation/plan_evaluation.h>
 #include <plumbline/apps/evaluation/relations.h>
 #include <plumbline/apps/evaluation/trajectory_alignment.h>
 #include <plumbline/core/atomic_file.h>
@@ -24,6 +25,9 @@ DEFINE_string(relations, "",
               "True displacements, `t1 t2 x y z roll pitch yaw` a line.");
 DEFINE_string(truth, "", "Truth of a simulated building, as JSON.");
 DEFINE_string(map, "", "Map to compare with the truth: map.json of a solve.");
+DEFINE_string(plan, "",
+              "Plan to compare with the truth, too: floorplan.geojson of a "
+              "solve.");
 DEFINE_string(output, "", "Where to write the results as JSON.");
 DEFINE_string(relation_errors, "",
               "Where to write the error of every relation as CSV.");
@@ -193,6 +197,45 @@ Json TellClosures(const ClosureEvaluation& closures) {
               {"closed_revisits", closures.closed_revisits}};
 }
 
+// Prints rooms against the truth and returns them.
+Json TellRooms(const RoomEvaluation& rooms) {
+  std::printf(
+      "rooms: %d of %d found, %d of %d drawn are none of the true; mean IoU "
+      "%.3f, precision %.3f, recall %.3f\n",
+      rooms.found, rooms.asked, rooms.not_true, rooms.drawn, rooms.mean_iou,
+      rooms.precision, rooms.recall);
+  return Json{{"asked", rooms.asked},       {"found", rooms.found},
+              {"drawn", rooms.drawn},       {"not_true", rooms.not_true},
+              {"mean_iou", rooms.mean_iou}, {"precision", rooms.precision},
+              {"recall", rooms.recall},     {"iou", rooms.iou}};
+}
+
+// Prints a plan against the truth and returns it.
+Json TellPlan(const PlanEvaluation& plan) {
+  Json result{{"file", FLAGS_plan}, {"rooms", TellRooms(plan.rooms)}};
+  std::printf(
+      "doors driven through: %d of %d found, width error %.3f m; %d of %d "
+      "drawn are none\n",
+      plan.doors_found, plan.doors_asked, plan.door_width_error,
+      plan.doors_false, plan.doors_drawn);
+  std::printf(
+      "walls of the plan: completeness %.3f, correctness %.3f; %d of %d ends "
+      "free, %d drawn twice\n",
+      plan.wall_completeness, plan.wall_correctness, plan.free_ends, plan.ends,
+      plan.double_walls);
+  result["doors"] = Json{{"asked", plan.doors_asked},
+                         {"found", plan.doors_found},
+                         {"drawn", plan.doors_drawn},
+                         {"false", plan.doors_false},
+                         {"width_error_m", plan.door_width_error}};
+  result["walls"] = Json{{"completeness", plan.wall_completeness},
+                         {"correctness", plan.wall_correctness},
+                         {"ends", plan.ends},
+                         {"free_ends", plan.free_ends},
+                         {"drawn_twice", plan.double_walls}};
+  return result;
+}
+
 Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
   const MapTruth truth = ReadMapTruth(FLAGS_truth);
   const StraightMap map = ReadStraightMap(FLAGS_map);
@@ -217,7 +260,13 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
   PrintMap(evaluation, found);
   const Json closures =
       TellClosures(EvaluateClosures(map, truth, alignment, options));
+  Json plan;
+  if (!FLAGS_plan.empty()) {
+    plan =
+        TellPlan(EvaluatePlan(ReadBuildingPlan(FLAGS_plan), truth, alignment));
+  }
   return Json{{"file", FLAGS_truth},
+              {"plan", plan},
               {"poses", poses},
               {"map", FLAGS_map},
               {"alignment",
@@ -248,6 +297,8 @@ int UsageError(const std::string& message) {
 }
 
 int Run() {
+  if (!FLAGS_plan.empty() && FLAGS_truth.empty())
+    return UsageError("--plan needs --truth");
   if (FLAGS_relations.empty() && FLAGS_truth.empty())
     return UsageError("nothing to compare with: expected --relations, --truth");
   if (FLAGS_truth.empty() != FLAGS_map.empty())
@@ -291,7 +342,7 @@ int main(int argc, char** argv) {
       "plumbline_evaluate --trajectory=out/trajectory.tum "
       "--relations=intel.relations";
   info.groups = {
-      {"Input", {"trajectory", "relations", "truth", "map"}},
+      {"Input", {"trajectory", "relations", "truth", "map", "plan"}},
       {"Output", {"output", "relation_errors"}},
       {"Comparison",
        {"time_tolerance", "minimum_wall_length", "maximum_wall_offset"}}};

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_APPS_EVALUATION_MAP_TRUTH_H_
 #define PLUMBLINE_APPS_EVALUATION_MAP_TRUTH_H_
 
+#include <plumbline/apps/simulation/world_rooms.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/timed_pose.h>
@@ -33,6 +34,10 @@ struct MapTruth {
   /// Directions of the building, degrees, axial (period 180).
   std::vector<double> orientations_deg;
   std::vector<TruthWall> walls;
+  /// Closed spaces between the faces of walls, world frame, and the doors
+  /// between them.
+  std::vector<Polygon> rooms;
+  std::vector<TrueDoor> doors;
   /// True poses of the scans.
   std::vector<TimedPose> poses;
 };

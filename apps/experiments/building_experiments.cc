@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -62,6 +63,55 @@ double Median(std::vector<double> values) {
                                 : 0.5 * (values[half - 1] + values[half]);
 }
 
+double Sum(const ExperimentResult& result, const std::string& shape,
+           const char* name) {
+  const std::vector<double> values = Column(result, shape, name);
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+// What a plan of a simulated building shall be.
+void AddPlanClaims(const std::string& shape, ExperimentResult* result) {
+  const auto add_share = [&](const std::string& what, const char* part,
+                             const char* whole, double bound, bool is_least) {
+    const double count = Sum(*result, shape, whole);
+    if (count <= 0.0) return;
+    Claim claim;
+    claim.text = shape + ": " + what;
+    claim.required =
+        (is_least ? "at least " : "at most ") + Format("%g", bound);
+    claim.measured =
+        ShareEstimate(static_cast<int>(std::lround(Sum(*result, shape, part))),
+                      static_cast<int>(std::lround(count)));
+    claim.holds = is_least ? claim.measured.value >= bound
+                           : claim.measured.value <= bound;
+    result->claims.push_back(std::move(claim));
+  };
+  const auto add_mean = [&](const std::string& what, const char* name,
+                            double bound, bool is_least) {
+    Claim claim;
+    claim.text = shape + ": " + what;
+    claim.required =
+        (is_least ? "at least " : "at most ") + Format("%g", bound);
+    claim.measured = MeanEstimate(Column(*result, shape, name));
+    claim.holds = is_least ? claim.measured.value >= bound
+                           : claim.measured.value <= bound;
+    result->claims.push_back(std::move(claim));
+  };
+  add_share("rooms found of those entered", "rooms_found", "rooms", 0.97, true);
+  add_share("rooms of the plan that are none", "rooms_false", "rooms_drawn",
+            0.01, false);
+  add_mean("mean IoU of rooms entered", "rooms_iou", 0.9, true);
+  add_share("doors found of those driven through", "doors_found", "doors", 0.97,
+            true);
+  add_share("doors of the plan that are none", "doors_false", "doors_drawn",
+            0.03, false);
+  add_mean("mean error of a door's width, m", "door_width_error", 0.05, false);
+  add_share("ends of walls that meet nothing", "wall_ends_free", "wall_ends",
+            0.1, false);
+  add_mean("walls of the plan that are drawn twice", "plan_walls_twice", 0.0,
+           false);
+}
+
 }  // namespace
 
 void RunB1(const ExperimentOptions& options, const Registry& registry,
@@ -99,7 +149,22 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
             {"drawn_twice", run.map.doubled_length},
             {"offset_error", run.map.offset_error.mean},
             {"direction_error_deg", run.map.direction_error_deg.mean},
-            {"position_error", run.mean_position_error}};
+            {"position_error", run.mean_position_error},
+            {"rooms", run.plan.rooms.asked},
+            {"rooms_found", run.plan.rooms.found},
+            {"rooms_iou", run.plan.rooms.mean_iou},
+            {"rooms_drawn", run.plan.rooms.drawn},
+            {"rooms_false", run.plan.rooms.not_true},
+            {"doors", run.plan.doors_asked},
+            {"doors_found", run.plan.doors_found},
+            {"doors_drawn", run.plan.doors_drawn},
+            {"doors_false", run.plan.doors_false},
+            {"door_width_error", run.plan.door_width_error},
+            {"wall_completeness", run.plan.wall_completeness},
+            {"wall_correctness", run.plan.wall_correctness},
+            {"wall_ends", run.plan.ends},
+            {"wall_ends_free", run.plan.free_ends},
+            {"plan_walls_twice", run.plan.double_walls}};
         if (is_drawn) {
           MapDrawing drawing = run.drawing;
           drawing.title = "B1: " + shape;
@@ -146,6 +211,13 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
     claim.holds = claim.measured.value <= kMostDrawnTwice;
     result->claims.push_back(std::move(claim));
   }
+  for (const std::string& shape : BuildingShapes()) {
+    AddPlanClaims(shape, result);
+  }
+  result->notes.push_back(
+      "Rooms that the robot was in are asked for, and doors that it drove "
+      "through; a room of a plan is false when it is not the one with most in "
+      "common with a true room, or less than half of it lies there.");
   result->notes.push_back(
       "A closure is wrong when it joins segments of different true walls; "
       "closures_near join a shut door and the wall that it is in. Errors are "

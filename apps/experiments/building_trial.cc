@@ -5,6 +5,8 @@
 #include <plumbline/core/graph_json.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
+#include <plumbline/outputs/floor_plan.h>
+#include <plumbline/outputs/occupancy_grid.h>
 
 #include <algorithm>
 #include <cmath>
@@ -67,6 +69,10 @@ BuildingTrial RunBuildingTrial(const World& world,
   const StraightMap map = ReadStraightMap(&map_text);
   trial.map = EvaluateMap(map, truth, alignment);
   trial.closures = EvaluateClosures(map, truth, alignment);
+  FloorPlan plan = MakeFloorPlan(solver.graph(), result.trajectory);
+  AddRooms(MakeOccupancyGrid(log.scans, result.trajectory, {}),
+           result.trajectory, &plan);
+  trial.plan = EvaluatePlan(plan.building, truth, alignment);
   // One true pose a scan, in the same order.
   const std::size_t count = std::min(trajectory.size(), truth.poses.size());
   for (std::size_t i = 0; i < count; ++i) {

@@ -4,6 +4,7 @@
 #include <plumbline/apps/evaluation/closure_truth.h>
 #include <plumbline/apps/evaluation/consistency.h>
 #include <plumbline/apps/evaluation/map_evaluation.h>
+#include <plumbline/apps/evaluation/plan_evaluation.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/registry.h>
@@ -25,6 +26,7 @@ struct BuildingTrial {
   std::int64_t scans = 0;
   MapTruthEvaluation map;
   ClosureEvaluation closures;
+  PlanEvaluation plan;
   /// Mean distance of the poses of scans from the true ones once the trajectory
   /// is laid on them as a whole, m.
   double mean_position_error = 0.0;

@@ -163,6 +163,15 @@ std::string PoseText(const Pose2& pose) {
   return Fixed(pose[0], 6) + ' ' + Fixed(pose[1], 6) + ' ' + Fixed(pose[2], 6);
 }
 
+std::string RingText(const Ring& ring) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    if (i > 0) text += ',';
+    text += '[' + Fixed(ring[i].x(), 4) + ',' + Fixed(ring[i].y(), 4) + ']';
+  }
+  return text + ']';
+}
+
 std::string StampText(double time) {
   return Fixed(time, 6) + " plumbline " + Fixed(time, 6);
 }
@@ -403,6 +412,8 @@ Simulation Simulate(const World& world, const SimulatorOptions& options,
 
   Simulation simulation;
   simulation.surfaces = MakeSurfaces(world);
+  simulation.rooms = WorldRooms(world);
+  simulation.doors = WorldDoors(world);
   const std::vector<SimulatedState> drive = Drive(world, options.drive, seed);
   SimulationRandom laser_random = MakeStream(seed, kLaserStream);
   SimulationRandom odometry_random = MakeStream(seed, kOdometryStream);
@@ -523,6 +534,28 @@ void WriteTruth(const Simulation& simulation, std::ostream& output) {
            << ",\"r\":" << Fixed(circle.radius, 4)
            << ",\"begin_deg\":" << Fixed(circle.begin_deg, 4)
            << ",\"sweep_deg\":" << Fixed(circle.sweep_deg, 4) << '}';
+    separator = ",\n";
+  }
+  output << "],\n\"rooms\":[";
+  separator = "\n";
+  for (std::size_t i = 0; i < simulation.rooms.size(); ++i) {
+    output << separator << "{\"id\":" << i << ",\"outline\":["
+           << RingText(simulation.rooms[i].shell);
+    for (const Ring& hole : simulation.rooms[i].holes) {
+      output << ',' << RingText(hole);
+    }
+    output << "]}";
+    separator = ",\n";
+  }
+  output << "],\n\"doors\":[";
+  separator = "\n";
+  for (const TrueDoor& door : simulation.doors) {
+    output << separator << "{\"x1\":" << Fixed(door.begin.x(), 4)
+           << ",\"y1\":" << Fixed(door.begin.y(), 4)
+           << ",\"x2\":" << Fixed(door.end.x(), 4)
+           << ",\"y2\":" << Fixed(door.end.y(), 4)
+           << ",\"thickness\":" << Fixed(door.thickness, 4)
+           << ",\"shut\":" << (door.is_shut ? "true" : "false") << '}';
     separator = ",\n";
   }
   output << "],\n\"poses\":[";

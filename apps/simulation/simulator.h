@@ -2,6 +2,7 @@
 #define PLUMBLINE_APPS_SIMULATION_SIMULATOR_H_
 
 #include <plumbline/apps/simulation/world.h>
+#include <plumbline/apps/simulation/world_rooms.h>
 #include <plumbline/factors/pose2.h>
 
 #include <cstdint>
@@ -98,6 +99,9 @@ struct Simulation {
   /// For every face the parts of it that beams hit, as distances (m) from its
   /// begin; hits less than 0.25 m apart are joined, lone hits are left out.
   std::vector<std::vector<std::pair<double, double>>> seen;
+  /// Closed spaces and the doors between them.
+  std::vector<Polygon> rooms;
+  std::vector<TrueDoor> doors;
   /// In the order of time; scans and readings of odometry.
   std::vector<SimulatedState> states;
 };
@@ -139,6 +143,9 @@ void WriteCarmenLog(const Simulation& simulation, const LaserModel& laser,
 ///     walls: id, x1, y1, x2, y2, orientation (index, or -1 for clutter),
 ///            seen (intervals [begin, end] in m from (x1, y1))
 ///     circles: id, x, y, r, begin_deg, sweep_deg (360 but for curved walls)
+///     rooms: id, outline (rings of [x, y]: the shell against the clock, then
+///            holes), between the faces of the walls
+///     doors: x1, y1, x2, y2 (jambs), thickness, shut
 ///     poses: [t, x, y, theta] of the robot at every scan
 void WriteTruth(const Simulation& simulation, std::ostream& output);
 

@@ -143,6 +143,7 @@ WorldSurfaces MakeSurfaces(const World& world) {
 int CutDoor(const Vector2d& position, double width, World* world) {
   int num_cut = 0;
   std::vector<WorldWall> walls;
+  WorldDoor door;
   for (const WorldWall& wall : world->walls) {
     const double reach = wall.thickness / 2 + kOnWallTolerance;
     if (DistanceToSegment(position, wall.begin, wall.end) > reach) {
@@ -153,6 +154,11 @@ int CutDoor(const Vector2d& position, double width, World* world) {
     const double length = (wall.end - wall.begin).norm();
     const Vector2d along = (wall.end - wall.begin) / length;
     const double middle = (position - wall.begin).dot(along);
+    if (num_cut == 1 || wall.thickness > door.thickness) {
+      door.begin = wall.begin + std::max(0.0, middle - width / 2) * along;
+      door.end = wall.begin + std::min(length, middle + width / 2) * along;
+      door.thickness = wall.thickness;
+    }
     // A stump shorter than a centimetre is no wall.
     if (middle - width / 2 > 0.01) {
       walls.push_back({wall.begin, wall.begin + (middle - width / 2) * along,
@@ -164,6 +170,7 @@ int CutDoor(const Vector2d& position, double width, World* world) {
     }
   }
   world->walls = std::move(walls);
+  if (num_cut > 0) world->doors.push_back(door);
   return num_cut;
 }
 
@@ -176,6 +183,10 @@ void RotateWorld(double degrees, World* world) {
   for (WorldWall& wall : world->walls) {
     rotate(&wall.begin);
     rotate(&wall.end);
+  }
+  for (WorldDoor& door : world->doors) {
+    rotate(&door.begin);
+    rotate(&door.end);
   }
   for (WorldCircle& circle : world->circles) {
     rotate(&circle.center);
@@ -232,14 +243,18 @@ class WorldReader {
       values_.push_back(value);
     }
     static const std::map<std::string, void (WorldReader::*)()> readers = {
-        {"wall", &WorldReader::ReadWall},     {"door", &WorldReader::ReadDoor},
-        {"circle", &WorldReader::ReadCircle}, {"arc", &WorldReader::ReadArc},
-        {"box", &WorldReader::ReadBox},       {"path", &WorldReader::ReadPath}};
+        {"wall", &WorldReader::ReadWall},
+        {"door", &WorldReader::ReadDoor},
+        {"doorway", &WorldReader::ReadDoorway},
+        {"circle", &WorldReader::ReadCircle},
+        {"arc", &WorldReader::ReadArc},
+        {"box", &WorldReader::ReadBox},
+        {"path", &WorldReader::ReadPath}};
     const auto reader = readers.find(keyword_);
     if (reader == readers.end()) {
       throw Error(world_.name, line_,
                   "'" + PrintableUtf8(keyword_) + "' is unknown",
-                  "wall, door, circle, arc, box or path");
+                  "wall, door, doorway, circle, arc, box or path");
     }
     (this->*reader->second)();
   }
@@ -267,6 +282,16 @@ class WorldReader {
     Require(values_.size() == 3 && values_[2] > 0.0,
             "door x y width with a width above 0");
     doors_.push_back({Point(0), values_[2], line_});
+  }
+
+  void ReadDoorway() {
+    Require(values_.size() == 4 || values_.size() == 5,
+            "doorway x1 y1 x2 y2 [thickness]");
+    const WorldDoor door{Point(0), Point(2),
+                         values_.size() == 5 ? values_[4] : 0.0};
+    Require((door.end - door.begin).norm() > 0.0 && door.thickness >= 0.0,
+            "two different points and a thickness of at least 0");
+    world_.doors.push_back(door);
   }
 
   void ReadCircle() {
@@ -326,6 +351,10 @@ void WriteWorld(const World& world, std::ostream& output) {
   for (const WorldWall& wall : world.walls) {
     write("wall", {wall.begin.x(), wall.begin.y(), wall.end.x(), wall.end.y(),
                    wall.thickness});
+  }
+  for (const WorldDoor& door : world.doors) {
+    write("doorway", {door.begin.x(), door.begin.y(), door.end.x(),
+                      door.end.y(), door.thickness});
   }
   for (const WorldCircle& c : world.circles) {
     if (c.sweep_deg >= 360.0) {
@@ -623,6 +652,8 @@ class BuildingMaker {
     // stay clear of the lowest row.
     const Vector2d root(wall_x, ys_[0] + 0.6 * (ys_[1] - ys_[0]));
     CutDoor(root, 2 * half_ / cosine + t_ * tangent, &world_);
+    // As wide as the corridor: no door.
+    world_.doors.pop_back();
     const Vector2d along = Direction(a);
     const Frame left{root, along, LeftOf(along)};
     const Frame right{root, along, -LeftOf(along)};

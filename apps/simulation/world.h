@@ -63,6 +63,15 @@ struct WorldBox {
   double angle_deg = 0.0;
 };
 
+/// A doorway: the gap between two jambs of a wall, m, by its centre line. It
+/// stops no beam, and tells where a room ends.
+struct WorldDoor {
+  Eigen::Vector2d begin = Eigen::Vector2d::Zero();
+  Eigen::Vector2d end = Eigen::Vector2d::Zero();
+  /// Of the wall.
+  double thickness = 0.0;
+};
+
 /// A building and the way of the robot through it. Frame: x to the right, y up,
 /// m. Doors are gaps in walls (see CutDoor).
 struct World {
@@ -71,6 +80,7 @@ struct World {
   std::vector<WorldWall> walls;
   std::vector<WorldCircle> circles;
   std::vector<WorldBox> boxes;
+  std::vector<WorldDoor> doors;
   /// Way points of the robot; it starts on the first, looking at the second.
   std::vector<Eigen::Vector2d> path;
 };
@@ -100,8 +110,8 @@ struct WorldSurfaces {
 WorldSurfaces MakeSurfaces(const World& world);
 
 /// Cuts a gap of `width` (m), centred at the point nearest to `position`, into
-/// every wall whose body passes through `position` (to within 1 cm). Returns
-/// how many walls were cut.
+/// every wall whose body passes through `position` (to within 1 cm), and adds a
+/// door for the thickest of them. Returns how many walls were cut.
 int CutDoor(const Eigen::Vector2d& position, double width, World* world);
 
 /// Turns everything by `degrees` around the origin.
@@ -112,16 +122,17 @@ void RotateWorld(double degrees, World* world);
 ///
 ///     wall x1 y1 x2 y2 [thickness]      centre line; thickness 0 if not given
 ///     door x y width                    gap in the walls that pass through x y
-///     circle x y radius                 round column
-///     arc x y radius begin_deg end_deg  curved wall, counter-clockwise
-///     box x y length width angle_deg    furniture, clutter
-///     path x1 y1 [x2 y2 ...]            way points; lines add up
+///     doorway x1 y1 x2 y2 [thickness]   gap that is there already, by its
+///     jambs circle x y radius                 round column arc x y radius
+///     begin_deg end_deg  curved wall, counter-clockwise box x y length width
+///     angle_deg    furniture, clutter path x1 y1 [x2 y2 ...]            way
+///     points; lines add up
 ///
 /// Doors apply to all walls of the file wherever they stand. Throws Error with
 /// the line on anything else, and on a door that meets no wall.
 World ReadWorld(std::istream& input, const std::string& name);
 
-/// Writes the format of ReadWorld, with doors as gaps between walls and 6
+/// Writes the format of ReadWorld, with doors as doorways between walls and 6
 /// digits after the point.
 void WriteWorld(const World& world, std::ostream& output);
 

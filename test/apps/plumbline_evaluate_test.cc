@@ -84,16 +84,21 @@ TEST_F(EvaluateTest, Truth) {
   Write("map.json",
         R"({"features":[{"id":0,"type":"segment","parameters":[0,0.25,0],
             "extent":[0,4]}],"constraints":[]})");
+  Write("plan.geojson",
+        R"({"features":[{"properties":{"kind":"wall"},"geometry":{"type":
+            "Polygon","coordinates":[[[0,0],[4,0],[4,0.1],[0,0.1],[0,0]]]}}]})");
   for (const std::string& trajectory :
        {Flag("trajectory", "path.tum"), std::string()}) {
     std::string output;
-    ASSERT_EQ(Run(trajectory + Flag("truth", "truth.json") +
-                      Flag("map", "map.json") + Flag("output", "eval.json"),
-                  &output),
-              0)
+    ASSERT_EQ(
+        Run(trajectory + Flag("truth", "truth.json") + Flag("map", "map.json") +
+                Flag("plan", "plan.geojson") + Flag("output", "eval.json"),
+            &output),
+        0)
         << output;
     EXPECT_THAT(output, HasSubstr("walls: 1 of 1 found"));
     EXPECT_THAT(output, HasSubstr("missed orientations: 1 (0.00 deg)"));
+    EXPECT_THAT(output, HasSubstr("completeness 1.000, correctness 1.000"));
     const auto json = nlohmann::json::parse(Read("eval.json"));
     EXPECT_NEAR(json["truth"]["offset_error_m"]["mean"].get<double>(), 0.25,
                 1e-9);
@@ -132,6 +137,12 @@ TEST_F(EvaluateTest, Usage) {
   EXPECT_THAT(output, HasSubstr("--trajectory"));
   EXPECT_EQ(Run(Flag("truth", "truth.json"), &output), 1);
   EXPECT_THAT(output, HasSubstr("go together"));
+  EXPECT_EQ(
+      Run(Flag("trajectory", "path.tum") + Flag("relations", "true.relations") +
+              Flag("plan", "plan.geojson"),
+          &output),
+      1);
+  EXPECT_THAT(output, HasSubstr("--plan needs --truth"));
   EXPECT_EQ(Run(" --no_such_flag=1", &output), 1);
   EXPECT_THAT(output, HasSubstr("no_such_flag"));
   EXPECT_EQ(Run(" --help", &output), 0);

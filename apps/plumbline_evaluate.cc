@@ -1,5 +1,6 @@
-// Says how good a trajectory and a map are: against true relations (Kuemmerle
-// et al. 2009) and against the truth of a simulated building.
+// Says how good a trajectory and a map are: against another trajectory, against
+// true relations (Kuemmerle et al. 2009) and against the truth of a simulated
+// building.
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
@@ -9,18 +10,60 @@
 #include <plumbline/apps/evaluation/plan_evaluation.h>
 #include <plumbline/apps/evaluation/relations.h>
 #include <plumbline/apps/evaluation/trajectory_alignment.h>
+#include <plumbline/apps/evaluation/trajectory_errors.h>
+#include <plumbline/apps/evaluation/trajectory_file.h>
+#include <plumbline/apps/evaluation/trajectory_plots.h>
+#include <plumbline/apps/figures/line_plot.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
-#include <plumbline/frontend/tum.h>
+#include <plumbline/core/utf8.h>
 
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-DEFINE_string(trajectory, "",
-              "Trajectory in the TUM format: trajectory.tum of a solve.");
+DEFINE_string(
+    trajectory, "",
+    "Trajectory to judge: TUM (trajectory.tum of a solve), KITTI or a "
+    "ROS bag.");
+DEFINE_string(trajectory_topic, "",
+              "Topic of a bag that has the trajectory (Odometry, PoseStamped, "
+              "PoseWithCovarianceStamped), or tf:PARENT.CHILD; empty: the "
+              "only one.");
+DEFINE_string(reference, "",
+              "Trajectory to compare with, of the same kinds; both give the "
+              "figures of evo.");
+DEFINE_string(reference_topic, "", "The same for the reference.");
+DEFINE_string(alignment, "auto",
+              "How the trajectory is moved onto the reference: none; origin "
+              "(first poses); se2 (in the plane: z, roll and pitch are "
+              "dropped), se3, sim3 (with scale) by least squares; auto: se2 "
+              "where one of them lies in the plane, else se3.");
+PLUMBLINE_FLAG_CHOICES(alignment, "auto", "none", "origin", "se2", "se3",
+                       "sim3");
+DEFINE_double(max_time_difference, 0.01,
+              "Poses of trajectory and reference match this close in time, s.");
+PLUMBLINE_FLAG_RANGE(max_time_difference, 0, 1e6);
+DEFINE_double(time_offset, 0.0,
+              "Is added to the time stamps of the trajectory, s.");
+PLUMBLINE_FLAG_RANGE(time_offset, -1e12, 1e12);
+DEFINE_double(rpe_delta, 1.0,
+              "Length of the steps that relative errors are of.");
+PLUMBLINE_FLAG_RANGE(rpe_delta, 1e-6, 1e9);
+DEFINE_string(rpe_unit, "frames",
+              "What --rpe_delta counts: frames (poses) or m (of the "
+              "trajectory's path).");
+PLUMBLINE_FLAG_CHOICES(rpe_unit, "frames", "m");
+DEFINE_bool(rpe_all_pairs, false,
+            "Steps from every pose, not only one after another.");
+DEFINE_string(plot, "",
+              "Where to draw both paths and their errors over time: .svg or "
+              ".png.");
+DEFINE_string(pose_errors, "",
+              "Where to write the errors of every pose as CSV.");
 DEFINE_string(relations, "",
               "True displacements, `t1 t2 x y z roll pitch yaw` a line.");
 DEFINE_string(truth, "", "Truth of a simulated building, as JSON.");
@@ -96,6 +139,145 @@ Json EvaluateAgainstRelations(const std::vector<TimedPose>& trajectory) {
       {"squared_translation_m2", ToJson(evaluation.squared_translation)},
       {"rotation_deg", ToJson(evaluation.rotation_deg)},
       {"squared_rotation_deg2", ToJson(evaluation.squared_rotation_deg)}};
+}
+
+Json ToJson(const ErrorSummary& errors) {
+  return Json{{"rmse", errors.rmse},     {"mean", errors.mean},
+              {"median", errors.median}, {"std", errors.std},
+              {"min", errors.min},       {"max", errors.max},
+              {"sse", errors.sse},       {"n", errors.count}};
+}
+
+// A line of the table of errors, and the same as JSON.
+Json TellErrors(const char* name, const std::vector<double>& errors) {
+  const ErrorSummary summary = SummarizeErrors(errors);
+  std::printf("%-20s %11.6f %11.6f %11.6f %11.6f %11.6f %11.6f %14.6f %7zu\n",
+              name, summary.rmse, summary.mean, summary.median, summary.std,
+              summary.min, summary.max, summary.sse, summary.count);
+  return ToJson(summary);
+}
+
+void TellTrajectory(const char* role, const TrajectoryFile& file) {
+  std::printf("%s: %s (%s%s%s, %zu poses)\n", role, file.name.c_str(),
+              file.format.c_str(), file.source.empty() ? "" : " ",
+              PrintableUtf8(file.source).c_str(), file.poses.size());
+  for (const std::string& note : file.notes) {
+    std::fprintf(stderr, "%s: %s\n", file.name.c_str(),
+                 PrintableUtf8(note).c_str());
+  }
+}
+
+PoseAlignment AlignmentFromFlag(const TrajectoryFile& reference,
+                                const TrajectoryFile& trajectory) {
+  const std::string& name = FLAGS_alignment;
+  if (name == "none") return PoseAlignment::kNone;
+  if (name == "origin") return PoseAlignment::kOrigin;
+  if (name == "se2") return PoseAlignment::kSe2;
+  if (name == "se3") return PoseAlignment::kSe3;
+  if (name == "sim3") return PoseAlignment::kSim3;
+  return IsPlanar(reference.poses) || IsPlanar(trajectory.poses)
+             ? PoseAlignment::kSe2
+             : PoseAlignment::kSe3;
+}
+
+Json TellAlignment(PoseAlignment alignment,
+                   const AlignmentTransform& transform) {
+  const Eigen::Vector3d& t = transform.motion.translation;
+  const Eigen::Quaterniond& q = transform.motion.rotation;
+  const double yaw = RadToDeg(2.0 * std::atan2(q.z(), q.w()));
+  const char* name = "none";
+  switch (alignment) {
+    case PoseAlignment::kNone:
+      std::printf("alignment: none\n");
+      break;
+    case PoseAlignment::kSe2:
+      name = "se2";
+      std::printf("alignment: se2: by %.6f m, %.6f m, %.6f degrees\n", t.x(),
+                  t.y(), RadToDeg(NormalizeAngle(DegToRad(yaw))));
+      break;
+    default:
+      name = alignment == PoseAlignment::kOrigin ? "origin"
+             : alignment == PoseAlignment::kSe3  ? "se3"
+                                                 : "sim3";
+      std::printf(
+          "alignment: %s: by %.6f m, %.6f m, %.6f m, quaternion (x y z w) "
+          "%.6f %.6f %.6f %.6f",
+          name, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+      if (alignment == PoseAlignment::kSim3) {
+        std::printf(", scale %.6f", transform.scale);
+      }
+      std::printf("\n");
+  }
+  return Json{{"kind", name},
+              {"translation_m", {t.x(), t.y(), t.z()}},
+              {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
+              {"scale", transform.scale}};
+}
+
+bool EndsIn(const std::string& text, const std::string& end) {
+  return text.size() > end.size() &&
+         text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+Json EvaluateAgainstReference(const TrajectoryFile& trajectory) {
+  const TrajectoryFile reference =
+      ReadTrajectory(FLAGS_reference, FLAGS_reference_topic);
+  TellTrajectory("reference", reference);
+  TellTrajectory("trajectory", trajectory);
+  TrajectoryComparison comparison;
+  comparison.has_times = reference.has_times;
+  comparison.pairs = AssociatePoses(
+      reference, trajectory, FLAGS_max_time_difference, FLAGS_time_offset);
+  const std::size_t matched = comparison.pairs.times.size();
+  std::printf("matched: %zu poses\n", matched);
+  const PoseAlignment alignment = AlignmentFromFlag(reference, trajectory);
+  const AlignmentTransform transform = ForFlag(
+      "alignment", [&] { return AlignPoses(alignment, &comparison.pairs); });
+  const Json alignment_json = TellAlignment(alignment, transform);
+  comparison.absolute = ComputeAbsoluteErrors(comparison.pairs);
+  comparison.steps.delta = FLAGS_rpe_delta;
+  comparison.steps.delta_is_m = FLAGS_rpe_unit == "m";
+  comparison.steps.all_pairs = FLAGS_rpe_all_pairs;
+  comparison.relative = ForFlag("rpe_delta", [&] {
+    return ComputeRelativeErrors(comparison.pairs, comparison.steps);
+  });
+  std::printf("%-20s %11s %11s %11s %11s %11s %11s %14s %7s\n", "", "rmse",
+              "mean", "median", "std", "min", "max", "sse", "n");
+  Json ape{{"translation_m",
+            TellErrors("APE translation, m", comparison.absolute.translation)},
+           {"rotation_deg",
+            TellErrors("APE rotation, deg", comparison.absolute.rotation_deg)}};
+  Json rpe{{"delta", FLAGS_rpe_delta},
+           {"unit", FLAGS_rpe_unit},
+           {"all_pairs", FLAGS_rpe_all_pairs}};
+  if (comparison.relative.steps.empty()) {
+    std::printf("RPE: the path is too short for a step of %g %s\n",
+                FLAGS_rpe_delta, FLAGS_rpe_unit.c_str());
+  } else {
+    rpe["translation_m"] =
+        TellErrors("RPE translation, m", comparison.relative.translation);
+    rpe["rotation_deg"] =
+        TellErrors("RPE rotation, deg", comparison.relative.rotation_deg);
+  }
+  if (!FLAGS_pose_errors.empty()) {
+    WriteFileAtomically(FLAGS_pose_errors, [&](std::ostream& output) {
+      WritePoseErrors(comparison, output);
+    });
+  }
+  if (EndsIn(FLAGS_plot, ".png")) {
+    WritePlotPng(PlotComparison(comparison), FLAGS_plot);
+  } else if (!FLAGS_plot.empty()) {
+    const std::string svg = PlotSvg(PlotComparison(comparison));
+    WriteFileAtomically(FLAGS_plot,
+                        [&](std::ostream& output) { output << svg; });
+  }
+  return Json{{"file", FLAGS_reference},
+              {"format", reference.format},
+              {"poses", reference.poses.size()},
+              {"matched", matched},
+              {"alignment", alignment_json},
+              {"ape", ape},
+              {"rpe", rpe}};
 }
 
 void PrintAngles(const std::string& name, const std::vector<double>& degrees) {
@@ -299,21 +481,52 @@ int UsageError(const std::string& message) {
 int Run() {
   if (!FLAGS_plan.empty() && FLAGS_truth.empty())
     return UsageError("--plan needs --truth");
-  if (FLAGS_relations.empty() && FLAGS_truth.empty())
-    return UsageError("nothing to compare with: expected --relations, --truth");
+  if (FLAGS_relations.empty() && FLAGS_truth.empty() &&
+      FLAGS_reference.empty()) {
+    return UsageError(
+        "nothing to compare with: expected --reference, --relations or "
+        "--truth");
+  }
   if (FLAGS_truth.empty() != FLAGS_map.empty())
     return UsageError("--truth and --map go together: expected both");
   if (!FLAGS_relations.empty() && FLAGS_trajectory.empty())
     return UsageError("--relations needs a trajectory: expected --trajectory");
+  if (!FLAGS_reference.empty() && FLAGS_trajectory.empty())
+    return UsageError("--reference needs a trajectory: expected --trajectory");
   if (!FLAGS_relation_errors.empty() && FLAGS_relations.empty())
     return UsageError("--relation_errors needs --relations");
+  if (FLAGS_reference.empty()) {
+    for (const auto& [name, value] :
+         {std::make_pair("plot", FLAGS_plot),
+          std::make_pair("pose_errors", FLAGS_pose_errors),
+          std::make_pair("reference_topic", FLAGS_reference_topic)}) {
+      if (!value.empty()) {
+        return UsageError(std::string("--") + name + " needs --reference");
+      }
+    }
+  }
+  if (!FLAGS_plot.empty() && !EndsIn(FLAGS_plot, ".svg") &&
+      !EndsIn(FLAGS_plot, ".png")) {
+    return UsageError("--plot=" + FLAGS_plot +
+                      ": expected a name that ends in .svg or .png");
+  }
 
   std::vector<TimedPose> trajectory;
   Json result;
   if (!FLAGS_trajectory.empty()) {
-    trajectory = ReadTum(FLAGS_trajectory);
+    const TrajectoryFile file =
+        ReadTrajectory(FLAGS_trajectory, FLAGS_trajectory_topic);
     result["trajectory"] =
-        Json{{"file", FLAGS_trajectory}, {"poses", trajectory.size()}};
+        Json{{"file", FLAGS_trajectory}, {"poses", file.poses.size()}};
+    if (!FLAGS_reference.empty()) {
+      result["reference"] = EvaluateAgainstReference(file);
+    }
+    if (!file.has_times && !(FLAGS_relations.empty() && FLAGS_truth.empty())) {
+      throw Error(file.name, 0,
+                  "poses of " + file.format + " have no times to match by",
+                  "a trajectory with times for --relations and --truth");
+    }
+    trajectory = InPlane(file);
   }
   if (!FLAGS_relations.empty())
     result["relations"] = EvaluateAgainstRelations(trajectory);
@@ -334,17 +547,24 @@ int main(int argc, char** argv) {
   plumbline::AppInfo info;
   info.name = "plumbline_evaluate";
   info.summary =
-      "Says how good a trajectory is against true relations (Kuemmerle et al. "
-      "2009), and how good a map is against the truth of a simulated building.";
-  info.usage = {"--trajectory=T.tum --relations=R [flags]",
+      "Says how good a trajectory is against another one (APE and RPE, as evo "
+      "has them) or against true relations (Kuemmerle et al. 2009), and how "
+      "good a map is against the truth of a simulated building.";
+  info.usage = {"--trajectory=T.tum --reference=R.tum [flags]",
+                "--trajectory=T.tum --relations=R [flags]",
                 "--trajectory=T.tum --truth=TRUTH.json --map=map.json [flags]"};
   info.example =
       "plumbline_evaluate --trajectory=out/trajectory.tum "
       "--relations=intel.relations";
   info.groups = {
-      {"Input", {"trajectory", "relations", "truth", "map", "plan"}},
-      {"Output", {"output", "relation_errors"}},
-      {"Comparison",
+      {"Input",
+       {"trajectory", "trajectory_topic", "reference", "reference_topic",
+        "relations", "truth", "map", "plan"}},
+      {"Output", {"output", "plot", "pose_errors", "relation_errors"}},
+      {"Comparison with a reference",
+       {"alignment", "max_time_difference", "time_offset", "rpe_delta",
+        "rpe_unit", "rpe_all_pairs"}},
+      {"Comparison with relations and truth",
        {"time_tolerance", "minimum_wall_length", "maximum_wall_offset"}}};
   plumbline::ParseFlags(info, argc, argv);
   return plumbline::RunMain(plumbline::Run);

@@ -1,6 +1,6 @@
 #include <plumbline/apps/figures/line_plot.h>
+#include <plumbline/apps/figures/plot_canvas.h>
 #include <plumbline/core/error.h>
-#include <plumbline/core/xml_text.h>
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <limits>
 #include <numeric>
-#include <sstream>
 
 namespace plumbline {
 namespace {
@@ -75,8 +74,9 @@ void CheckSizes(const PlotSeries& series) {
 
 class PlotWriter {
  public:
-  PlotWriter(const LinePlot& plot, int top, std::ostringstream* output)
-      : plot_(plot), output_(*output) {
+  // A null canvas: for what the plot measures.
+  PlotWriter(const LinePlot& plot, int top, PlotCanvas* canvas)
+      : plot_(plot), canvas_(canvas) {
     for (const PlotSeries& series : plot.series) {
       CheckSizes(series);
       for (const double x : series.x) x_.Add(OnX(x));
@@ -85,11 +85,11 @@ class PlotWriter {
       for (const double y : series.high) y_.Add(OnY(y));
     }
     x_.Settle();
-    if (!plot.log_y) y_.low = std::min(y_.low, 0.0);
+    if (!plot.log_y && !plot.equal_axes) y_.low = std::min(y_.low, 0.0);
     y_.Settle();
     const double margin = 0.05 * (y_.high - y_.low);
     y_.high += margin;
-    if (y_.low < 0.0 || plot.log_y) y_.low -= margin;
+    if (y_.low < 0.0 || plot.log_y || plot.equal_axes) y_.low -= margin;
     left_ = kLeft;
     right_ = plot.width - kRight - static_cast<int>(LegendWidth(plot));
     top_ = top + kTop;
@@ -104,13 +104,14 @@ class PlotWriter {
           std::clamp(static_cast<int>(longest) - 8, 0, kMostRoomForWords);
     }
     bottom_ = top + plot.height - under_axis_;
+    if (plot.equal_axes) MakeAxesEqual();
   }
 
   int under_axis() const { return under_axis_; }
 
   void Write() {
-    Text(plot_.width / 2.0, top_ - 16, "middle", TitleSize(), plot_.title,
-         true);
+    Text(plot_.width / 2.0, top_ - 16, PlotCanvas::Anchor::kMiddle, TitleSize(),
+         plot_.title, true);
     WriteAxes();
     int next_color = 0;
     std::vector<int> colors;
@@ -153,24 +154,26 @@ class PlotWriter {
                   : RoundTicks(range.low, range.high, count);
   }
 
-  void Line(double x1, double y1, double x2, double y2,
-            const std::string& style) {
-    output_ << "<line x1=\"" << Number(x1) << "\" y1=\"" << Number(y1)
-            << "\" x2=\"" << Number(x2) << "\" y2=\"" << Number(y2) << "\" "
-            << style << "/>\n";
+  // One unit is as long on both: the range with room to spare grows.
+  void MakeAxesEqual() {
+    const double x_unit = (right_ - left_) / (x_.high - x_.low);
+    const double y_unit = (bottom_ - top_) / (y_.high - y_.low);
+    Range& range = x_unit > y_unit ? x_ : y_;
+    const double grow = std::max(x_unit, y_unit) / std::min(x_unit, y_unit);
+    const double center = 0.5 * (range.low + range.high);
+    const double half = 0.5 * (range.high - range.low) * grow;
+    range.low = center - half;
+    range.high = center + half;
   }
 
-  void Text(double x, double y, const char* anchor, int size,
+  void Line(double x1, double y1, double x2, double y2,
+            const PlotCanvas::Stroke& stroke) {
+    canvas_->Line(x1, y1, x2, y2, stroke);
+  }
+
+  void Text(double x, double y, PlotCanvas::Anchor anchor, int size,
             const std::string& text, bool bold = false, double turn = 0.0) {
-    output_ << "<text x=\"" << Number(x) << "\" y=\"" << Number(y)
-            << "\" font-size=\"" << size << "\" text-anchor=\"" << anchor
-            << '"';
-    if (bold) output_ << " font-weight=\"bold\"";
-    if (turn != 0.0) {
-      output_ << " transform=\"rotate(" << Number(turn, "%g") << ' '
-              << Number(x) << ' ' << Number(y) << ")\"";
-    }
-    output_ << '>' << EscapeXml(text) << "</text>\n";
+    canvas_->Text(x, y, anchor, size, text, bold, turn);
   }
 
   // Smaller where the title would be wider than the plot: a bold letter is
@@ -202,68 +205,60 @@ class PlotWriter {
 
   void WriteAxes() {
     for (const double y : Ticks(y_, plot_.log_y, 8)) {
-      Line(left_, Y(y), right_, Y(y), "stroke=\"#dddddd\"");
-      Text(left_ - 8, Y(y) + 4, "end", 12, Label(y));
+      Line(left_, Y(y), right_, Y(y), {"#dddddd"});
+      Text(left_ - 8, Y(y) + 4, PlotCanvas::Anchor::kEnd, 12, Label(y));
     }
     if (plot_.x_ticks.empty()) {
       for (const double x : Ticks(x_, plot_.log_x, 10)) {
-        Line(X(x), bottom_, X(x), bottom_ + 5, "stroke=\"black\"");
-        Text(X(x), bottom_ + 19, "middle", 12, Label(x));
+        Line(X(x), bottom_, X(x), bottom_ + 5, {"black"});
+        Text(X(x), bottom_ + 19, PlotCanvas::Anchor::kMiddle, 12, Label(x));
       }
     }
     const bool is_level = WordsFitBesideEachOther();
     for (const auto& [x, word] : plot_.x_ticks) {
       if (!IsOnAxis(x)) continue;
-      Line(X(x), bottom_, X(x), bottom_ + 5, "stroke=\"black\"");
+      Line(X(x), bottom_, X(x), bottom_ + 5, {"black"});
       if (is_level) {
-        Text(X(x), bottom_ + 19, "middle", 12, word);
+        Text(X(x), bottom_ + 19, PlotCanvas::Anchor::kMiddle, 12, word);
       } else {
-        Text(X(x) + 4, bottom_ + 10, "end", 11, word, false, -90.0);
+        Text(X(x) + 4, bottom_ + 10, PlotCanvas::Anchor::kEnd, 11, word, false,
+             -90.0);
       }
     }
-    output_ << "<rect x=\"" << left_ << "\" y=\"" << top_ << "\" width=\""
-            << right_ - left_ << "\" height=\"" << bottom_ - top_
-            << "\" fill=\"none\" stroke=\"black\"/>\n";
-    Text((left_ + right_) / 2.0, bottom_ + under_axis_ - 14, "middle", 13,
-         plot_.x_label);
-    Text(18, (top_ + bottom_) / 2.0, "middle", 13, plot_.y_label, false, -90.0);
+    canvas_->Box(left_, top_, right_ - left_, bottom_ - top_);
+    Text((left_ + right_) / 2.0, bottom_ + under_axis_ - 14,
+         PlotCanvas::Anchor::kMiddle, 13, plot_.x_label);
+    Text(18, (top_ + bottom_) / 2.0, PlotCanvas::Anchor::kMiddle, 13,
+         plot_.y_label, false, -90.0);
   }
 
   void WriteBand(const PlotSeries& series, const char* color) {
-    std::string forward;
-    std::string backward;
+    std::vector<PlotCanvas::Point> points;
+    std::vector<PlotCanvas::Point> backward;
     for (std::size_t i = 0; i < series.low.size(); ++i) {
       if (!std::isfinite(OnX(series.x[i])) ||
           !std::isfinite(OnY(series.low[i])) ||
           !std::isfinite(OnY(series.high[i]))) {
         continue;
       }
-      const std::string x = Number(X(series.x[i]));
-      forward += x + ',' + Number(Y(series.high[i])) + ' ';
-      backward = x + ',' + Number(Y(series.low[i])) + ' ' + backward;
+      points.push_back({X(series.x[i]), Y(series.high[i])});
+      backward.push_back({X(series.x[i]), Y(series.low[i])});
     }
-    if (forward.empty()) return;
-    output_ << "<polygon points=\"" << forward << backward << "\" fill=\""
-            << color << "\" fill-opacity=\"0.15\"/>\n";
+    if (points.empty()) return;
+    points.insert(points.end(), backward.rbegin(), backward.rend());
+    canvas_->Polygon(points, color, 0.15);
   }
 
   void WriteLine(const PlotSeries& series, const char* color) {
-    std::string points;
+    std::vector<PlotCanvas::Point> points;
     for (std::size_t i = 0; i < series.y.size(); ++i) {
       if (!std::isfinite(OnX(series.x[i])) || !std::isfinite(OnY(series.y[i])))
         continue;
-      const std::string x = Number(X(series.x[i]));
-      const std::string y = Number(Y(series.y[i]));
-      points += x + ',' + y + ' ';
-      if (series.markers) {
-        output_ << "<circle cx=\"" << x << "\" cy=\"" << y
-                << "\" r=\"3\" fill=\"" << color << "\"/>\n";
-      }
+      points.push_back({X(series.x[i]), Y(series.y[i])});
+      if (series.markers) canvas_->Dot(points.back(), 3, color);
     }
     if (points.empty()) return;
-    output_ << "<polyline points=\"" << points << "\" fill=\"none\" stroke=\""
-            << color << "\" stroke-width=\"2\""
-            << (series.dashed ? " stroke-dasharray=\"7 4\"" : "") << "/>\n";
+    canvas_->Polyline(points, {color, 2.0, series.dashed});
   }
 
   // Width of the legend; 0 when no line has a name.
@@ -283,15 +278,14 @@ class PlotWriter {
       if (series.name.empty()) continue;
       const double middle = top_ + kLegendRow * (row++ + 0.5);
       Line(right_ + 10, middle, right_ + 36, middle,
-           std::string("stroke=\"") + Color(colors[i]) +
-               "\" stroke-width=\"2\"" +
-               (series.dashed ? " stroke-dasharray=\"7 4\"" : ""));
-      Text(right_ + 42, middle + 4, "start", 12, series.name);
+           {Color(colors[i]), 2.0, series.dashed});
+      Text(right_ + 42, middle + 4, PlotCanvas::Anchor::kStart, 12,
+           series.name);
     }
   }
 
   const LinePlot& plot_;
-  std::ostringstream& output_;
+  PlotCanvas* canvas_;
   Range x_;
   Range y_;
   int left_ = 0;
@@ -344,43 +338,34 @@ std::vector<double> LogTicks(double low, double high, int count) {
 }
 
 int RoomUnderAxis(const LinePlot& plot) {
-  std::ostringstream nowhere;
-  return PlotWriter(plot, 0, &nowhere).under_axis();
+  return PlotWriter(plot, 0, nullptr).under_axis();
 }
 
-std::string PlotSvg(const std::vector<LinePlot>& plots, int columns) {
-  const auto per_row = static_cast<std::size_t>(std::max(columns, 1));
-  int column_width = 0;
+PlotSheet::PlotSheet(const std::vector<LinePlot>& plots, int columns)
+    : plots_(plots), per_row_(static_cast<std::size_t>(std::max(columns, 1))) {
   for (const LinePlot& plot : plots) {
-    column_width = std::max(column_width, plot.width);
+    column_width_ = std::max(column_width_, plot.width);
   }
-  std::vector<int> row_heights((plots.size() + per_row - 1) / per_row, 0);
+  row_heights_.assign((plots.size() + per_row_ - 1) / per_row_, 0);
   for (std::size_t i = 0; i < plots.size(); ++i) {
-    int& height = row_heights[i / per_row];
+    int& height = row_heights_[i / per_row_];
     height = std::max(height, plots[i].height);
   }
-  const int width =
-      column_width * static_cast<int>(std::min(
-                         per_row, std::max<std::size_t>(plots.size(), 1)));
-  const int height = std::accumulate(row_heights.begin(), row_heights.end(), 0);
-  std::ostringstream output;
-  output << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << width
-         << "\" height=\"" << height << "\" viewBox=\"0 0 " << width << ' '
-         << height << "\" font-family=\"sans-serif\">\n"
-         << "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
+  width_ =
+      column_width_ * static_cast<int>(std::min(
+                          per_row_, std::max<std::size_t>(plots.size(), 1)));
+  height_ = std::accumulate(row_heights_.begin(), row_heights_.end(), 0);
+}
+
+void PlotSheet::Draw(PlotCanvas* canvas) const {
   int top = 0;
-  for (std::size_t i = 0; i < plots.size(); ++i) {
-    const std::size_t column = i % per_row;
-    if (column > 0) {
-      output << "<g transform=\"translate("
-             << column_width * static_cast<int>(column) << " 0)\">\n";
-    }
-    PlotWriter(plots[i], top, &output).Write();
-    if (column > 0) output << "</g>\n";
-    if (column + 1 == per_row) top += row_heights[i / per_row];
+  for (std::size_t i = 0; i < plots_.size(); ++i) {
+    const std::size_t column = i % per_row_;
+    canvas->BeginPlot(column_width_ * static_cast<int>(column));
+    PlotWriter(plots_[i], top, canvas).Write();
+    canvas->EndPlot();
+    if (column + 1 == per_row_) top += row_heights_[i / per_row_];
   }
-  output << "</svg>\n";
-  return output.str();
 }
 
 }  // namespace plumbline

@@ -31,6 +31,8 @@ struct LinePlot {
   /// Logarithmic axes: numbers that are not positive are passed over.
   bool log_x = false;
   bool log_y = false;
+  /// A unit is as long on both axes, as in a map; y need not start at 0.
+  bool equal_axes = false;
   std::vector<PlotSeries> series;
   /// Words under the x axis in the place of numbers, where they belong; written
   /// upwards when they have no room beside each other. Empty: numbers.
@@ -55,6 +57,11 @@ int RoomUnderAxis(const LinePlot& plot);
 /// same plots give the same bytes. Throws Error when a series has sizes that
 /// disagree.
 std::string PlotSvg(const std::vector<LinePlot>& plots, int columns = 1);
+
+/// Writes the same picture as PNG, two pixels to a px, whole or not at all.
+/// Throws Error, too, when the file cannot be written.
+void WritePlotPng(const std::vector<LinePlot>& plots, const std::string& path,
+                  int columns = 1);
 
 }  // namespace plumbline
 

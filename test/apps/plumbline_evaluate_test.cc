@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -103,6 +104,72 @@ TEST_F(EvaluateTest, Truth) {
     EXPECT_NEAR(json["truth"]["offset_error_m"]["mean"].get<double>(), 0.25,
                 1e-9);
   }
+}
+
+TEST_F(EvaluateTest, Reference) {
+  // The path, turned by 180 degrees and shifted, and one pose a metre off.
+  Write("est.tum",
+        "1 10 0 0 0 0 1 0\n2 9 0 0 0 0 1 0\n3 8 0 0 0 0 1 0\n"
+        "4 7 0 0 0 0 1 0\n");
+  Write("ref.tum",
+        "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n3 2 0 0 0 0 0 1\n"
+        "4 4 0 0 0 0 0 1\n");
+  std::string output;
+  ASSERT_EQ(Run(Flag("trajectory", "est.tum") + Flag("reference", "ref.tum") +
+                    Flag("output", "eval.json") + Flag("plot", "plot.svg") +
+                    Flag("pose_errors", "errors.csv"),
+                &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("matched: 4 poses"));
+  EXPECT_THAT(output, HasSubstr("alignment: se2"));
+  const auto json = nlohmann::json::parse(Read("eval.json"))["reference"];
+  EXPECT_EQ(json["matched"], 4);
+  EXPECT_EQ(json["alignment"]["kind"], "se2");
+  // Centres coincide: off by 0.25 m three times, and by 0.75 m.
+  const auto ape = json["ape"]["translation_m"];
+  EXPECT_NEAR(ape["mean"].get<double>(), 0.375, 1e-9);
+  EXPECT_NEAR(ape["sse"].get<double>(), 0.75, 1e-9);
+  EXPECT_NEAR(ape["max"].get<double>(), 0.75, 1e-9);
+  const auto rpe = json["rpe"]["translation_m"];
+  EXPECT_EQ(rpe["n"], 3);
+  EXPECT_NEAR(rpe["max"].get<double>(), 1.0, 1e-9);
+  EXPECT_NEAR(rpe["median"].get<double>(), 0.0, 1e-9);
+  EXPECT_THAT(Read("plot.svg"), HasSubstr("absolute pose error"));
+  EXPECT_THAT(Read("errors.csv"),
+              HasSubstr("time,ape_m,ape_deg,rpe_m,rpe_deg\n1,0.25"));
+
+  ASSERT_EQ(Run(Flag("trajectory", "est.tum") + Flag("reference", "ref.tum") +
+                    " --rpe_delta=50" + Flag("plot", "plot.png"),
+                &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("too short for a step of 50 frames"));
+  EXPECT_EQ(Read("plot.png").substr(1, 3), "PNG");
+}
+
+TEST_F(EvaluateTest, BadReference) {
+  Write("late.tum", "101 0 0 0 0 0 0 1\n102 1 0 0 0 0 0 1\n");
+  Write("one.tum", "1 0 0 0 0 0 0 1\n");
+  std::string output;
+  const auto run = [&](const std::string& reference, const char* flags = "") {
+    return Run(Flag("trajectory", "path.tum") + Flag("reference", reference) +
+                   Flag("output", "none.json") + flags,
+               &output);
+  };
+  EXPECT_EQ(run("late.tum"), 2);
+  EXPECT_THAT(output, HasSubstr("no pose (1 s to 2 s) is within 0.01 s"));
+  EXPECT_EQ(run("late.tum", " --time_offset=100"), 0) << output;
+  std::remove((folder_ + "none.json").c_str());
+  EXPECT_EQ(run("one.tum"), 2);
+  EXPECT_THAT(output, HasSubstr("--alignment: one pose matches"));
+  EXPECT_EQ(run("late.tum", " --time_offset=100 --rpe_delta=1.5"), 2);
+  EXPECT_THAT(output, HasSubstr("--rpe_delta: steps of 1.5 poses"));
+  EXPECT_FALSE(std::ifstream(folder_ + "none.json"));
+  EXPECT_EQ(run("late.tum", " --plot=plot.pdf"), 1);
+  EXPECT_THAT(output, HasSubstr("ends in .svg or .png"));
+  EXPECT_EQ(Run(Flag("reference", "late.tum"), &output), 1);
+  EXPECT_THAT(output, HasSubstr("expected --trajectory"));
 }
 
 TEST_F(EvaluateTest, BadInput) {

@@ -2,7 +2,11 @@
 #include <gtest/gtest.h>
 #include <plumbline/apps/figures/line_plot.h>
 #include <plumbline/core/error.h>
+#include <unistd.h>
 
+#include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -179,6 +183,43 @@ TEST(PlotSvgTest, RowsOfSeveralPlots) {
   EXPECT_EQ(PlotSvg({plot}, 2).find("translate"), std::string::npos);
   EXPECT_NE(PlotSvg({plot}, 2).find("width=\"300\" height=\"200\""),
             std::string::npos);
+}
+
+TEST(LinePlotTest, AxesOfAMapAreEqual) {
+  LinePlot plot;
+  plot.equal_axes = true;
+  plot.width = 600;
+  plot.height = 400;
+  PlotSeries series;
+  series.x = {100.0, 103.0, 103.0, 100.0};
+  series.y = {50.0, 50.0, 51.0, 51.0};
+  plot.series.push_back(series);
+  const std::string svg = PlotSvg({plot});
+  const std::string mark = "<polyline points=\"";
+  const std::size_t at = svg.find(mark);
+  ASSERT_NE(at, std::string::npos);
+  double x[4], y[4];
+  ASSERT_EQ(std::sscanf(svg.c_str() + at + mark.size(),
+                        "%lf,%lf %lf,%lf %lf,%lf %lf,%lf", &x[0], &y[0], &x[1],
+                        &y[1], &x[2], &y[2], &x[3], &y[3]),
+            8);
+  EXPECT_NEAR(x[1] - x[0], 3.0 * (y[1] - y[2]), 0.05);
+  // In the middle, and not from 0 on.
+  EXPECT_GT(x[1] - x[0], 400.0);
+}
+
+TEST(LinePlotTest, Png) {
+  const std::string path =
+      ::testing::TempDir() + "line_plot_" + std::to_string(getpid()) + ".png";
+  WritePlotPng({TwoPoints()}, path);
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file),
+                          std::istreambuf_iterator<char>()};
+  std::remove(path.c_str());
+  ASSERT_GT(bytes.size(), 1000u);
+  EXPECT_EQ(bytes.substr(1, 3), "PNG");
+  // Width and height: two pixels to a px.
+  EXPECT_EQ(bytes.substr(16, 8), std::string("\0\0\x07\x08\0\0\x03\x98", 8));
 }
 
 }  // namespace

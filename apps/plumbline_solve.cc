@@ -217,7 +217,7 @@ void Summarize(const CostReport& initial, const CostReport& last,
   summary->measurement_cost = last.measurement;
   summary->structure_cost = last.structure;
   summary->em_iterations = em.iterations;
-  summary->em_converged = em.converged;
+  summary->em_termination = em.termination;
   summary->detect_seconds = em.detect_seconds;
   summary->solve_seconds = em.solve_seconds;
 }

@@ -41,6 +41,20 @@ FeaturesByLevel FeaturesUpTo(const Graph& graph, const EmScope& scope,
 
 }  // namespace
 
+const char* ToString(EmTermination termination) {
+  switch (termination) {
+    case EmTermination::kConvergence:
+      return "convergence";
+    case EmTermination::kFailure:
+      return "failure";
+    case EmTermination::kUserStop:
+      return "user_stop";
+    case EmTermination::kNoConvergence:
+      break;
+  }
+  return "no_convergence";
+}
+
 struct EmOrchestrator::Impl final : public GraphListener {
   Impl(Graph* graph_in, SolverSession* session_in, const Registry& registry_in,
        Hierarchy hierarchy_in, const EmOptions& options_in,
@@ -99,7 +113,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
     if (!is_stopped && schedule.BeginFinal()) OptimizeWhole("final");
     schedule.EndRun();
 
-    totals.converged = has_converged;
+    totals.termination = Termination(has_converged);
     EmReport report = totals;
     report.iterations -= before.iterations;
     report.detect_seconds -= before.detect_seconds;
@@ -256,6 +270,13 @@ struct EmOrchestrator::Impl final : public GraphListener {
   bool IsSteady(double last_cost, double cost) const {
     const double tolerance = options.cost_tolerance + schedule.cost_tolerance();
     return std::abs(cost - last_cost) <= tolerance * std::max(cost, last_cost);
+  }
+
+  EmTermination Termination(bool has_converged) const {
+    if (has_converged) return EmTermination::kConvergence;
+    if (is_stopped) return EmTermination::kUserStop;
+    return schedule.is_usable() ? EmTermination::kNoConvergence
+                                : EmTermination::kFailure;
   }
 
   bool AskStop() {

@@ -42,12 +42,31 @@ struct EmPhase {
   double seconds = 0.0;
 };
 
+/// Why a run of EM ended, as ceres::TerminationType says it of a solve.
+enum class EmTermination {
+  /// Next to nothing came or went, and the cost stood still.
+  kConvergence,
+  /// After EmOptions::max_iterations, with something still coming or going.
+  kNoConvergence,
+  /// The last solve failed: its state proves nothing.
+  kFailure,
+  /// Whoever was asked whether to stop said so.
+  kUserStop,
+};
+
+/// Its name in summary.json: "convergence", "no_convergence", "failure" or
+/// "user_stop".
+const char* ToString(EmTermination termination);
+
 /// Result of a run of EM.
 struct EmReport {
+  /// Of the last run; kNoConvergence before the first.
+  EmTermination termination = EmTermination::kNoConvergence;
   int iterations = 0;
-  bool converged = false;
   double detect_seconds = 0.0;
   double solve_seconds = 0.0;
+
+  bool converged() const { return termination == EmTermination::kConvergence; }
 };
 
 /// Finds structure, weighs it, breaks it and finds it again (method.md, section

@@ -45,7 +45,7 @@ Values ValuesOf(const SyntheticRun& run, const OracleErrors& oracle) {
   values.emplace_back("exact", run.match.is_exact() ? 1.0 : 0.0);
   values.emplace_back("outliers_in_models", run.match.tied_outliers);
   values.emplace_back("iterations", run.em.iterations);
-  values.emplace_back("converged", run.em.converged ? 1.0 : 0.0);
+  values.emplace_back("converged", run.em.converged() ? 1.0 : 0.0);
   return values;
 }
 
@@ -414,7 +414,7 @@ void RunConcentricity(Concentricity method, double sigma,
       {"live", static_cast<double>(live)},
       {"broken", static_cast<double>(broken)},
       {"iterations", static_cast<double>(report.iterations)},
-      {"converged", report.converged ? 1.0 : 0.0}};
+      {"converged", report.converged() ? 1.0 : 0.0}};
 }
 
 }  // namespace

@@ -265,26 +265,6 @@ Json TraceToJson(const std::vector<EmTraceRow>& trace) {
   return json;
 }
 
-Json CountsToJson(const Summary& summary) {
-  Json features = Json::object();
-  for (const auto& type : summary.features) {
-    Json levels = Json::object();
-    for (const auto& level : type.second) {
-      levels[std::to_string(level.first)] = level.second;
-    }
-    features[type.first] = std::move(levels);
-  }
-  Json constraints = Json::object();
-  for (const auto& type : summary.constraints) {
-    constraints[type.first] = {{"measurement", type.second.measurement},
-                               {"structure", type.second.structure},
-                               {"broken", type.second.broken}};
-  }
-  return {{"scans", summary.scans},
-          {"features", std::move(features)},
-          {"constraints", std::move(constraints)}};
-}
-
 Json DataToJson(const Report& report) {
   const Summary& summary = report.summary;
   Names types, sources, relations;
@@ -294,12 +274,13 @@ Json DataToJson(const Report& report) {
   json["seed"] = summary.seed;
   json["version"] = kVersion;
   json["delta_threshold"] = Rounded(report.delta_threshold, 1e9);
-  json["counts"] = CountsToJson(summary);
+  json["counts"] = Json::parse(CountsAsJson(summary));
   json["cost"] = {{"initial", Digits(summary.initial_cost)},
                   {"measurement", Digits(summary.measurement_cost)},
                   {"structure", Digits(summary.structure_cost)}};
-  json["em"] = {{"iterations", summary.em_iterations},
-                {"converged", summary.em_converged}};
+  json["em"] = {
+      {"iterations", summary.em_iterations},
+      {"converged", summary.em_termination == EmTermination::kConvergence}};
   json["orthogonality_deg"] = summary.orthogonality_deg
                                   ? Digits(*summary.orthogonality_deg)
                                   : Json(nullptr);

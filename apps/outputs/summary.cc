@@ -73,6 +73,97 @@ Json OptionalToJson(const std::optional<double>& value) {
   return value ? Json(*value) : Json(nullptr);
 }
 
+Json FlagsToJson(const std::vector<FlagValue>& flags) {
+  Json json = Json::object();
+  for (const FlagValue& flag : flags) json[flag.name] = FlagToJson(flag);
+  return json;
+}
+
+Json CountsToJson(const Summary& summary) {
+  Json features = Json::object();
+  for (const auto& [type, count_by_level] : summary.features) {
+    Json levels = Json::object();
+    for (const auto& [level, count] : count_by_level) {
+      levels[std::to_string(level)] = count;
+    }
+    features[type] = std::move(levels);
+  }
+  Json constraints = Json::object();
+  for (const auto& [relation, counts] : summary.constraints) {
+    constraints[relation] = {{"measurement", counts.measurement},
+                             {"structure", counts.structure},
+                             {"broken", counts.broken}};
+  }
+  return {{"scans", summary.scans},
+          {"features", std::move(features)},
+          {"constraints", std::move(constraints)}};
+}
+
+Json CostToJson(const Summary& summary) {
+  return {{"initial", summary.initial_cost},
+          {"measurement", summary.measurement_cost},
+          {"structure", summary.structure_cost},
+          {"total", summary.measurement_cost + summary.structure_cost}};
+}
+
+Json TimesToJson(const Summary& summary) {
+  return {{"total", summary.total_seconds},
+          {"parse", summary.parse_seconds},
+          {"frontend", summary.frontend_seconds},
+          {"detect", summary.detect_seconds},
+          {"solve", summary.solve_seconds},
+          {"write", summary.write_seconds}};
+}
+
+Json SolverToJson(const Summary& summary) {
+  const Summary::Solver& solver = *summary.solver;
+  return {{"objective", summary.measurement_cost + summary.structure_cost},
+          {"iterations", solver.iterations},
+          {"solves", solver.solves},
+          {"converged", solver.converged},
+          {"evaluation_s", solver.evaluation_seconds},
+          {"linear_solver_s", solver.linear_solver_seconds},
+          {"setup_s", solver.setup_seconds},
+          {"start",
+           {{"poses", solver.start_poses},
+            {"landmarks", solver.start_landmarks},
+            {"kept", solver.start_kept},
+            {"seconds", solver.start_seconds}}}};
+}
+
+Json FrontendToJson(const Summary& summary) {
+  Json skipped = Json::array();
+  for (const SkipReport& skip : summary.skipped) {
+    skipped.push_back({{"reason", skip.reason},
+                       {"count", skip.count},
+                       {"first_lines", skip.first_lines}});
+  }
+  Json json;
+  json["skipped"] = std::move(skipped);
+  if (!summary.log_format.empty()) json["format"] = summary.log_format;
+  if (!summary.scan_source.empty()) json["scans"] = summary.scan_source;
+  if (!summary.odometry_source.empty()) {
+    json["odometry"] = summary.odometry_source;
+  }
+  if (!summary.notes.empty()) json["notes"] = summary.notes;
+  const std::optional<double> early = MeanOfTenth(summary.scan_seconds, 1);
+  const std::optional<double> late = MeanOfTenth(summary.scan_seconds, 9);
+  json["scan_seconds_second_tenth"] = OptionalToJson(early);
+  json["scan_seconds_last_tenth"] = OptionalToJson(late);
+  json["scan_seconds_growth"] =
+      early && late && *early > 0.0 ? Json(*late / *early) : Json(nullptr);
+  return json;
+}
+
+Json TrackingToJson(const Summary::Tracking& tracking) {
+  Json loose = Json::array();
+  for (const Summary::Tracking::Loose& part : tracking.loose) {
+    loose.push_back(
+        {{"begin", part.begin}, {"end", part.end}, {"why", part.why}});
+  }
+  return {{"pieces", tracking.pieces}, {"loose", std::move(loose)}};
+}
+
 }  // namespace
 
 std::optional<double> OrthogonalityDeg(
@@ -138,6 +229,11 @@ std::optional<double> MeanOfTenth(const std::vector<double>& values,
   return sum / static_cast<double>(end - begin);
 }
 
+std::string CountsAsJson(const Summary& summary) {
+  return CountsToJson(summary).dump(-1, ' ', false,
+                                    Json::error_handler_t::replace);
+}
+
 void CountGraph(const Graph& graph, Summary* summary) {
   summary->features.clear();
   for (const Feature* feature : graph.Features()) {
@@ -165,43 +261,17 @@ void CountGraph(const Graph& graph, Summary* summary) {
 }
 
 void WriteSummary(const Summary& summary, std::ostream& output) {
-  Json flags = Json::object();
-  for (const FlagValue& flag : summary.flags) {
-    flags[flag.name] = FlagToJson(flag);
-  }
-  Json features = Json::object();
-  for (const auto& type : summary.features) {
-    Json levels = Json::object();
-    for (const auto& level : type.second) {
-      levels[std::to_string(level.first)] = level.second;
-    }
-    features[type.first] = std::move(levels);
-  }
-  Json constraints = Json::object();
-  for (const auto& type : summary.constraints) {
-    constraints[type.first] = {{"measurement", type.second.measurement},
-                               {"structure", type.second.structure},
-                               {"broken", type.second.broken}};
-  }
   Json json;
   json["input"] = summary.input;
   json["seed"] = summary.seed;
-  json["flags"] = std::move(flags);
-  json["counts"] = {{"scans", summary.scans},
-                    {"features", std::move(features)},
-                    {"constraints", std::move(constraints)}};
-  json["cost"] = {{"initial", summary.initial_cost},
-                  {"measurement", summary.measurement_cost},
-                  {"structure", summary.structure_cost},
-                  {"total", summary.measurement_cost + summary.structure_cost}};
-  json["em"] = {{"iterations", summary.em_iterations},
-                {"converged", summary.em_converged}};
-  json["time_s"] = {{"total", summary.total_seconds},
-                    {"parse", summary.parse_seconds},
-                    {"frontend", summary.frontend_seconds},
-                    {"detect", summary.detect_seconds},
-                    {"solve", summary.solve_seconds},
-                    {"write", summary.write_seconds}};
+  json["flags"] = FlagsToJson(summary.flags);
+  json["counts"] = CountsToJson(summary);
+  json["cost"] = CostToJson(summary);
+  json["em"] = {
+      {"iterations", summary.em_iterations},
+      {"converged", summary.em_termination == EmTermination::kConvergence},
+      {"termination", ToString(summary.em_termination)}};
+  json["time_s"] = TimesToJson(summary);
   json["peak_memory_bytes"] = summary.peak_memory_bytes;
   json["orthogonality_deg"] = OptionalToJson(summary.orthogonality_deg);
   json["closures"] = {{"proposed", summary.closures.proposed},
@@ -214,51 +284,10 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
   if (summary.partial && summary.scans_in_log > 0) {
     json["scans_in_log"] = summary.scans_in_log;
   }
-  if (summary.solver) {
-    const Summary::Solver& solver = *summary.solver;
-    json["solver"] = {
-        {"objective", summary.measurement_cost + summary.structure_cost},
-        {"iterations", solver.iterations},
-        {"solves", solver.solves},
-        {"converged", solver.converged},
-        {"evaluation_s", solver.evaluation_seconds},
-        {"linear_solver_s", solver.linear_solver_seconds},
-        {"setup_s", solver.setup_seconds},
-        {"start",
-         {{"poses", solver.start_poses},
-          {"landmarks", solver.start_landmarks},
-          {"kept", solver.start_kept},
-          {"seconds", solver.start_seconds}}}};
-  }
+  if (summary.solver) json["solver"] = SolverToJson(summary);
   if (summary.scans > 0) {
-    Json skipped = Json::array();
-    for (const SkipReport& skip : summary.skipped) {
-      skipped.push_back({{"reason", skip.reason},
-                         {"count", skip.count},
-                         {"first_lines", skip.first_lines}});
-    }
-    const std::optional<double> early = MeanOfTenth(summary.scan_seconds, 1);
-    const std::optional<double> late = MeanOfTenth(summary.scan_seconds, 9);
-    Json frontend;
-    frontend["skipped"] = std::move(skipped);
-    if (!summary.log_format.empty()) frontend["format"] = summary.log_format;
-    if (!summary.scan_source.empty()) frontend["scans"] = summary.scan_source;
-    if (!summary.odometry_source.empty()) {
-      frontend["odometry"] = summary.odometry_source;
-    }
-    if (!summary.notes.empty()) frontend["notes"] = summary.notes;
-    frontend["scan_seconds_second_tenth"] = OptionalToJson(early);
-    frontend["scan_seconds_last_tenth"] = OptionalToJson(late);
-    frontend["scan_seconds_growth"] =
-        early && late && *early > 0.0 ? Json(*late / *early) : Json(nullptr);
-    json["frontend"] = std::move(frontend);
-    Json loose = Json::array();
-    for (const Summary::Tracking::Loose& part : summary.tracking.loose) {
-      loose.push_back(
-          {{"begin", part.begin}, {"end", part.end}, {"why", part.why}});
-    }
-    json["tracking"] = {{"pieces", summary.tracking.pieces},
-                        {"loose", std::move(loose)}};
+    json["frontend"] = FrontendToJson(summary);
+    json["tracking"] = TrackingToJson(summary.tracking);
   }
   // A path may hold bytes that are no UTF-8.
   output << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_OUTPUTS_SUMMARY_H_
 #define PLUMBLINE_OUTPUTS_SUMMARY_H_
 
+#include <plumbline/core/em.h>
 #include <plumbline/core/flag_value.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/frontend/scan.h>
@@ -86,9 +87,9 @@ struct Summary {
   double measurement_cost = 0.0;
   double structure_cost = 0.0;
 
-  /// Iterations of EM on the whole graph, and whether they converged.
+  /// Iterations of EM on the whole graph, and why they ended.
   int em_iterations = 0;
-  bool em_converged = false;
+  EmTermination em_termination = EmTermination::kNoConvergence;
 
   /// Seconds.
   double total_seconds = 0.0;
@@ -153,20 +154,24 @@ struct Summary {
 /// Fills in features, constraints, closures and orthogonality_deg.
 void CountGraph(const Graph& graph, Summary* summary);
 
+/// The part `counts` of summary.json, as JSON text.
+std::string CountsAsJson(const Summary& summary);
+
 /// Writes the keys of the product's contract, in its order: input, seed, flags,
 /// counts {scans, features {type {level}}, constraints {type {measurement,
 /// structure, broken}}}, cost {initial, measurement, structure, total}, em
-/// {iterations, converged}, time_s {total, parse, frontend, detect, solve,
-/// write}, peak_memory_bytes, orthogonality_deg (null when there is no wall),
-/// closures {proposed, live, broken}, version, files, sha256 {file}, partial
-/// (the run was interrupted; for a log `scans` then says how many were solved,
-/// and `scans_in_log` how many there are); for a graph also solver {objective
-/// (cost.total), iterations, solves, converged, evaluation_s, linear_solver_s,
-/// setup_s, start {poses, landmarks, kept, seconds}}; for a log also frontend
-/// {skipped [{reason, count, first_lines}], scan_seconds_second_tenth,
-/// scan_seconds_last_tenth, scan_seconds_growth (their quotient), format,
-/// scans, odometry (names; of logs that tell), notes [text]}, tracking {pieces,
-/// loose [{begin, end, why}]}. Numbers that are not finite become null.
+/// {iterations, converged, termination}, time_s {total, parse, frontend,
+/// detect, solve, write}, peak_memory_bytes, orthogonality_deg (null when there
+/// is no wall), closures {proposed, live, broken}, version, files, sha256
+/// {file}, partial (the run was interrupted; for a log `scans` then says how
+/// many were solved, and `scans_in_log` how many there are); for a graph also
+/// solver {objective (cost.total), iterations, solves, converged, evaluation_s,
+/// linear_solver_s, setup_s, start {poses, landmarks, kept, seconds}}; for a
+/// log also frontend {skipped [{reason, count, first_lines}],
+/// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
+/// (their quotient), format, scans, odometry (names; of logs that tell), notes
+/// [text]}, tracking {pieces, loose [{begin, end, why}]}. Numbers that are not
+/// finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// Writes it to a file, whole or not at all. Throws Error when it cannot be

@@ -327,7 +327,7 @@ void LogSolver::ExchangeState(Archive& archive, Stage* stage,
 void LogSolver::RunEm(Context* context) {
   const EmReport report = em_->Run(context->control.stop);
   context->result.em.iterations += report.iterations;
-  context->result.em.converged = report.converged;
+  context->result.em.termination = report.termination;
 }
 
 void LogSolver::FindStructure(Context* context) {

@@ -72,8 +72,8 @@ void Exchange(Archive& archive, CostReport& cost) {
 
 template <typename Archive>
 void Exchange(Archive& archive, EmReport& report) {
-  auto& [iterations, converged, detect_seconds, solve_seconds] = report;
-  ExchangeAll(archive, iterations, converged, detect_seconds, solve_seconds);
+  auto& [termination, iterations, detect_seconds, solve_seconds] = report;
+  ExchangeAll(archive, termination, iterations, detect_seconds, solve_seconds);
 }
 
 template <typename Archive>

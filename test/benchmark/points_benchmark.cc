@@ -200,7 +200,7 @@ Row Measure(int points, bool has_phases, const Registry& registry) {
   }
   std::printf("%7d %8d %9d %9d %6s %6d %9.2f %9.2f %9.2f %9.2f\n",
               city.num_points(), city.num_features(), found, report.iterations,
-              report.converged ? "yes" : "no", steps, row.seconds,
+              report.converged() ? "yes" : "no", steps, row.seconds,
               row.detect_seconds, row.solve_seconds,
               1e6 * row.seconds / (row.points * std::log(row.points)));
   std::fflush(stdout);

@@ -53,7 +53,7 @@ TEST_P(HierarchyTest, FindsAllAndNothingElse) {
                                     registry_, the_case.raw, {}),
                       options);
     const EmReport report = em.Run();
-    EXPECT_TRUE(report.converged);
+    EXPECT_TRUE(report.converged());
     EXPECT_THAT(CompareWithTruth(graph, world.truth()), IsEmpty());
     EXPECT_EQ(CountLive(graph, "orientation_orientation"),
               world.num_relations());

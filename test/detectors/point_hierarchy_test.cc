@@ -51,7 +51,7 @@ TEST_F(PointHierarchyTest, LinesAndCircles) {
         Run("line_ransac,circle_ransac/center_cluster,orientation_mixture/"
             "orientation_relation",
             &graph);
-    EXPECT_TRUE(report.converged) << seed;
+    EXPECT_TRUE(report.converged()) << seed;
     const std::map<std::pair<std::string, int>, int> expected = {
         {{"line", 1}, 14},
         {{"circle", 1}, 8},
@@ -67,7 +67,7 @@ TEST_F(PointHierarchyTest, LinesOnly) {
   PointWorld world(2);
   world.AddCorridors();
   world.Build(registry_, 0.1, 0.02, 5, &graph);
-  EXPECT_TRUE(Run("line_ransac/orientation_mixture", &graph).converged);
+  EXPECT_TRUE(Run("line_ransac/orientation_mixture", &graph).converged());
   // Nothing is made of the circles' points.
   const std::map<std::pair<std::string, int>, int> expected = {
       {{"line", 1}, 14}, {{"orientation", 2}, 2}};
@@ -113,7 +113,7 @@ TEST_F(PointHierarchyTest, CirclesFirst) {
                     MakeHierarchy(ParseHierarchy("center_cluster/line_ransac"),
                                   registry_, {"circle"}, {}),
                     {});
-  EXPECT_TRUE(em.Run().converged);
+  EXPECT_TRUE(em.Run().converged());
   const std::map<std::pair<std::string, int>, int> expected = {
       {{"point", 1}, 6}, {{"line", 2}, 1}};
   EXPECT_EQ(Count(graph), expected);

@@ -410,7 +410,7 @@ TEST_F(RectangleTest, GoesWithASide) {
       graph_.get(), &session, registry_,
       MakeHierarchy(ParseHierarchy("rectangle"), registry_, {"segment"}, {}),
       {});
-  EXPECT_TRUE(em.Run().converged);
+  EXPECT_TRUE(em.Run().converged());
   EXPECT_TRUE(graph_->VirtualFeatures(1).empty());
   // Without the false wall it would have stayed.
   graph_->GetFeature(walls[4]).parameters[2] -= DegToRad(1.5);
@@ -426,7 +426,7 @@ TEST_F(RectangleTest, GoesWithASide) {
       graph_.get(), &session, registry_,
       MakeHierarchy(ParseHierarchy("rectangle"), registry_, {"segment"}, {}),
       {});
-  EXPECT_TRUE(again.Run().converged);
+  EXPECT_TRUE(again.Run().converged());
   EXPECT_EQ(graph_->VirtualFeatures(1).size(), 1u);
 }
 

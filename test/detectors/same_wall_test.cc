@@ -209,7 +209,7 @@ TEST_F(SameWallTest, ARevisitIsClosed) {
   }
   // The map moves by it.
   const EmReport report = RunEm();
-  EXPECT_TRUE(report.converged);
+  EXPECT_TRUE(report.converged());
   EXPECT_EQ(Closures()[ConstraintState::kBroken], 0);
   // Every wall of the second visit is on its first self again, to a tenth of
   // the drift.
@@ -335,7 +335,7 @@ TEST_F(SameWallTest, AFalseClosureIsBrokenAndTheMapReturns) {
     EXPECT_FALSE(IsOneWall(constraint.features[0], constraint.features[1]));
   }
   const EmReport report = RunEm(loose);
-  EXPECT_TRUE(report.converged);
+  EXPECT_TRUE(report.converged());
   EXPECT_EQ(Closures()[ConstraintState::kLive], 0);
   EXPECT_GE(Closures()[ConstraintState::kBroken], 5);
   ExpectState(before, 1e-5);

@@ -171,7 +171,7 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   summary.measurement_cost = 1.5;
   summary.structure_cost = 0.25;
   summary.em_iterations = 3;
-  summary.em_converged = true;
+  summary.em_termination = EmTermination::kConvergence;
   summary.total_seconds = 6.0;
   summary.parse_seconds = std::nan("");
   summary.peak_memory_bytes = 123;
@@ -203,7 +203,8 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   EXPECT_EQ(json["cost"].dump(),
             R"({"initial":9.0,"measurement":1.5,"structure":0.25,)"
             R"("total":1.75})");
-  EXPECT_EQ(json["em"].dump(), R"({"iterations":3,"converged":true})");
+  EXPECT_EQ(json["em"].dump(), R"({"iterations":3,"converged":true,)"
+                               R"("termination":"convergence"})");
   EXPECT_EQ(json["time_s"].dump(),
             R"({"total":6.0,"parse":null,"frontend":0.0,"detect":0.0,)"
             R"("solve":0.0,"write":0.0})");

@@ -64,7 +64,7 @@ TEST_F(GraphSolverTest, IsTheLoopWithWhatThePointsAskFor) {
       solver.Run(nullptr, [&phases](const EmPhase&) { ++phases; });
   EXPECT_EQ(Json(graph), Json(by_hand));
   EXPECT_EQ(result.em.iterations, expected.iterations);
-  EXPECT_TRUE(result.em.converged);
+  EXPECT_TRUE(result.em.converged());
   EXPECT_EQ(result.initial_cost.total(), solver.initial_cost().total());
   EXPECT_EQ(result.final_cost.total(), session.Cost().total());
   EXPECT_EQ(result.num_solves, session.num_solves());
@@ -101,7 +101,7 @@ TEST_F(GraphSolverTest, StopsEarly) {
   int asked = 0;
   const GraphSolverResult result =
       GraphSolver(registry_, {}, &graph).Run([&asked] { return ++asked > 3; });
-  EXPECT_FALSE(result.em.converged);
+  EXPECT_FALSE(result.em.converged());
   EXPECT_GE(result.trace.size(), 1u);
 }
 

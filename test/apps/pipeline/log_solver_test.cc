@@ -143,7 +143,7 @@ TEST_F(LogSolverTest, SolvesTheStartOfALog) {
   EXPECT_GT(result.key_scans, 20);
   EXPECT_LE(result.key_scans, 250);
   EXPECT_GT(result.feature_matches, result.features_created);
-  EXPECT_TRUE(result.em.converged);
+  EXPECT_TRUE(result.em.converged());
   EXPECT_TRUE(std::isfinite(result.final_cost.total()));
   EXPECT_FALSE(solver.trace().empty());
   // Directions at right angles were found.
@@ -169,7 +169,7 @@ TEST_F(LogSolverTest, WithoutStructureThereAreMeasurementsOnly) {
   ExpectFinite(result.trajectory);
   EXPECT_EQ(result.final_cost.structure, 0.0);
   EXPECT_LE(result.final_cost.measurement, result.initial_cost.measurement);
-  EXPECT_TRUE(result.em.converged);
+  EXPECT_TRUE(result.em.converged());
   for (const Feature* feature : solver.graph().Features()) {
     EXPECT_FALSE(feature->is_virtual);
   }
@@ -333,7 +333,7 @@ TEST_F(LogSolverTest, LoopsAreClosed) {
   options.refine = Refinement::kMap;
   LogSolver solver(registry_, options);
   const LogSolverResult result = solver.Run(log);
-  EXPECT_TRUE(result.em.converged);
+  EXPECT_TRUE(result.em.converged());
   EXPECT_GT(Closures(solver.graph())[ConstraintState::kLive], 5);
   // The iterations of the trace go on over the start of closing.
   int last = 0;
@@ -483,7 +483,7 @@ TEST_F(LogSolverTest, StructureAtTheEndOnly) {
   const LogSolverResult result = solver.Run(Office(150));
   EXPECT_EQ(result.trajectory.size(), 150u);
   EXPECT_GE(solver.graph().VirtualFeatures(1).size(), 1u);
-  EXPECT_TRUE(result.em.converged);
+  EXPECT_TRUE(result.em.converged());
 }
 
 TEST_F(LogSolverTest, EmptyLog) {
@@ -526,7 +526,7 @@ TEST_F(LogSolverTest, PointsAsLevelZero) {
   ASSERT_EQ(result.trajectory.size(), 250u);
   ExpectFinite(result.trajectory);
   EXPECT_GT(result.feature_matches, 5 * result.features_created);
-  EXPECT_TRUE(result.em.converged);
+  EXPECT_TRUE(result.em.converged());
   std::map<std::string, std::map<int, int>> features;
   for (const Feature* feature : solver.graph().Features()) {
     ++features[feature->type->name][feature->level];

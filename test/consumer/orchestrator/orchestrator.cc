@@ -95,7 +95,7 @@ int main() {
       "%d orientations after %d iterations; largest deviation from the axes "
       "%.2f degrees, %.2f before\n",
       orientations, report.iterations, after, before);
-  return report.converged && orientations == 2 && after < 0.1 && before > 0.5
+  return report.converged() && orientations == 2 && after < 0.1 && before > 0.5
              ? 0
              : 1;
 }

@@ -246,6 +246,73 @@ void CheckDetectorParameters(
   }
 }
 
+// Parameters of detectors by flags of their own, then those of
+// --detector_parameters, which win.
+std::map<std::string, DetectorParameters> DetectorParametersFromFlags(
+    const Registry& registry) {
+  std::map<std::string, DetectorParameters> parameters;
+  const auto set = [&](const std::string& detector, const std::string& name,
+                       double value) {
+    if (registry.FindDetector(detector) != nullptr) {
+      parameters[detector][name] = value;
+    }
+  };
+  set("orientation_mixture", "sigma_deg",
+      FLAGS_structure_sigma_segment_orientation);
+  set("orientation_relation", "sigma_deg",
+      FLAGS_structure_sigma_orientation_orientation);
+  set("line_ransac", "sigma", FLAGS_structure_sigma_point_line_distance);
+  set("circle_ransac", "sigma", FLAGS_structure_sigma_point_circle_distance);
+  set("center_cluster", "sigma", FLAGS_structure_sigma_point_point_coincidence);
+  set("same_wall", "sigma_offset", FLAGS_structure_sigma_same_wall);
+  set("same_wall", "sigma_angle_deg", FLAGS_structure_sigma_same_wall_angle);
+  if (FLAGS_angle_resolution > 0.0) {
+    set("orientation_relation", "resolution_deg", FLAGS_angle_resolution);
+  } else {
+    const std::vector<double> angles =
+        ParseList("allowed_angles", FLAGS_allowed_angles);
+    for (std::size_t i = 0; i < angles.size(); ++i) {
+      set("orientation_relation", "angle_" + std::to_string(i), angles[i]);
+    }
+  }
+  for (const auto& [detector, values] :
+       ParseDetectorParameters(FLAGS_detector_parameters)) {
+    for (const auto& [name, value] : values) parameters[detector][name] = value;
+  }
+  CheckDetectorParameters(registry, parameters);
+  return parameters;
+}
+
+EmOptions EmOptionsFromFlags(RawFeatures features) {
+  EmOptions options;
+  options.delta_threshold = FLAGS_delta_threshold;
+  options.full_weight_test = FLAGS_full_weight_test == "true" ||
+                             (FLAGS_full_weight_test == "auto" &&
+                              ProfileOf(features).full_weight_test);
+  options.max_iterations = FLAGS_em_max_iterations;
+  options.seed = FLAGS_seed;
+  return options;
+}
+
+// All that is done with scans.
+void TakeFrontEndFlags(LogSolverOptions* options) {
+  options->odometry.match_scans = FLAGS_odometry_refinement;
+  options->odometry.points.usable_range = FLAGS_usable_range;
+  options->builder.link_radius = FLAGS_link_radius;
+  options->builder.association_depth = FLAGS_association_depth;
+  options->point_builder.link_radius = FLAGS_link_radius;
+  options->point_builder.association_depth = FLAGS_association_depth;
+  options->em_every = FLAGS_em_every;
+  options->global_association = FLAGS_global_association;
+  options->refine = FLAGS_refine == "none"  ? Refinement::kNone
+                    : FLAGS_refine == "map" ? Refinement::kMap
+                                            : Refinement::kFull;
+  options->adjustment.points = options->odometry.points;
+  options->adjustment.num_threads = NumThreadsFromFlags();
+  options->check.points = options->odometry.points;
+  options->check.num_threads = NumThreadsFromFlags();
+}
+
 // Throws when a flag was given this value, which needs segments. A default of
 // the same value is passed over.
 void RefuseForPoints(const std::string& flag, const std::string& value,
@@ -310,68 +377,17 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   }
   options.structure = FLAGS_structure;
   options.hierarchy = ParseHierarchy(FLAGS_hierarchy);
-
-  auto set = [&](const std::string& detector, const std::string& name,
-                 double value) {
-    if (registry.FindDetector(detector) != nullptr) {
-      options.detector_parameters[detector][name] = value;
-    }
-  };
-  set("orientation_mixture", "sigma_deg",
-      FLAGS_structure_sigma_segment_orientation);
-  set("orientation_relation", "sigma_deg",
-      FLAGS_structure_sigma_orientation_orientation);
-  set("line_ransac", "sigma", FLAGS_structure_sigma_point_line_distance);
-  set("circle_ransac", "sigma", FLAGS_structure_sigma_point_circle_distance);
-  set("center_cluster", "sigma", FLAGS_structure_sigma_point_point_coincidence);
-  if (FLAGS_angle_resolution > 0.0) {
-    set("orientation_relation", "resolution_deg", FLAGS_angle_resolution);
-  } else {
-    const std::vector<double> angles =
-        ParseList("allowed_angles", FLAGS_allowed_angles);
-    for (std::size_t i = 0; i < angles.size(); ++i) {
-      set("orientation_relation", "angle_" + std::to_string(i), angles[i]);
-    }
-  }
-
-  options.odometry.match_scans = FLAGS_odometry_refinement;
-  options.odometry.points.usable_range = FLAGS_usable_range;
-  options.builder.link_radius = FLAGS_link_radius;
-  options.builder.association_depth = FLAGS_association_depth;
-  options.point_builder.link_radius = FLAGS_link_radius;
-  options.point_builder.association_depth = FLAGS_association_depth;
+  options.detector_parameters = DetectorParametersFromFlags(registry);
   options.session.delta_mode = FLAGS_delta_mode;
   options.session.minimizer = FLAGS_minimizer;
-  options.em.delta_threshold = FLAGS_delta_threshold;
-  options.em.full_weight_test = FLAGS_full_weight_test == "true" ||
-                                (FLAGS_full_weight_test == "auto" &&
-                                 ProfileOf(options.features).full_weight_test);
-  options.em.max_iterations = FLAGS_em_max_iterations;
-  options.em.seed = FLAGS_seed;
-  options.em_every = FLAGS_em_every;
-  options.global_association = FLAGS_global_association;
-  set("same_wall", "sigma_offset", FLAGS_structure_sigma_same_wall);
-  set("same_wall", "sigma_angle_deg", FLAGS_structure_sigma_same_wall_angle);
-  for (const auto& [detector, parameters] :
-       ParseDetectorParameters(FLAGS_detector_parameters)) {
-    for (const auto& [name, value] : parameters) {
-      options.detector_parameters[detector][name] = value;
-    }
-  }
-  CheckDetectorParameters(registry, options.detector_parameters);
+  options.em = EmOptionsFromFlags(options.features);
   if (!FLAGS_structure_prior.empty()) {
     std::istringstream text(ReadTextFile(FLAGS_structure_prior, kLargestPrior));
     ApplyStructurePrior(
         ReadStructurePrior(text, FLAGS_structure_prior, registry), &options.em,
         &options.detector_parameters);
   }
-  options.refine = FLAGS_refine == "none"  ? Refinement::kNone
-                   : FLAGS_refine == "map" ? Refinement::kMap
-                                           : Refinement::kFull;
-  options.adjustment.points = options.odometry.points;
-  options.adjustment.num_threads = NumThreadsFromFlags();
-  options.check.points = options.odometry.points;
-  options.check.num_threads = NumThreadsFromFlags();
+  TakeFrontEndFlags(&options);
   return options;
 }
 

@@ -1,4 +1,4 @@
-#include <plumbline/core/error.h>
+#include <plumbline/core/em_scope.h>
 #include <plumbline/detectors/direction_assignment.h>
 #include <plumbline/detectors/map_directions.h>
 #include <plumbline/detectors/orientation_mixture.h>
@@ -28,11 +28,6 @@ struct Candidate {
 double LengthOf(const Feature& feature) {
   const double length = feature.extent_end - feature.extent_begin;
   return length == 0.0 ? 1.0 : std::abs(length);
-}
-
-bool IsLiveStructure(const Constraint& constraint) {
-  return constraint.state == ConstraintState::kLive &&
-         constraint.kind == ConstraintClass::kStructure;
 }
 
 // Whether a wall is tied to an orientation, or to a rectangle that is read as
@@ -175,18 +170,6 @@ void Bind(ParameterBinder* parameters, OrientationMixtureOptions* options) {
           "no link is known better than this");
 }
 
-}  // namespace
-
-OrientationMixture::OrientationMixture(const OrientationMixtureOptions& options)
-    : options_(options) {}
-
-const std::string& OrientationMixture::name() const {
-  static const std::string name = kName;
-  return name;
-}
-
-namespace {
-
 // A live tie of a wall to an orientation.
 struct WallTie {
   ConstraintId constraint = kNoId;
@@ -271,133 +254,202 @@ std::vector<FeatureId> MatchOrientations(
   return orientations;
 }
 
+// The directions that walls may be tied to, and the ties that are proposed.
+class Proposal {
+ public:
+  Proposal(const Graph& graph, const Registry& registry, int level,
+           double sigma)
+      : registry_(registry),
+        orientation_type_(registry.GetFeature("orientation")),
+        level_(level),
+        variance_(sigma * sigma) {
+    for (const FeatureId id : graph.VirtualFeatures(level)) {
+      const Feature& feature = graph.GetFeature(id);
+      if (!feature.type->Is(FeatureRole::kDirection)) continue;
+      ids_.push_back(id);
+      angles_.push_back(feature.parameters[0]);
+    }
+  }
+
+  FeatureId AddOrientation(double angle) {
+    Feature orientation;
+    orientation.type = &orientation_type_;
+    orientation.level = level_;
+    orientation.is_virtual = true;
+    orientation.parameters[0] = angle;
+    orientation.source = kName;
+    ids_.push_back(transaction_.AddFeature(std::move(orientation)));
+    angles_.push_back(angle);
+    return ids_.back();
+  }
+
+  // Proposes nothing where no relation ties such a feature. `own_sigma`: as
+  // DirectionWall has it.
+  void Tie(const Feature& feature, FeatureId orientation, double expected,
+           double own_sigma) {
+    const RelationType* relation = registry_.FindRelation(
+        RelationRole::kDirection, *feature.type, orientation_type_);
+    if (relation == nullptr) return;
+    const double variance = variance_ + own_sigma * own_sigma;
+    transaction_.AddConstraint(
+        MakeStructure(*relation, {feature.id, orientation},
+                      Eigen::VectorXd::Constant(1, expected),
+                      Eigen::MatrixXd::Constant(1, 1, 1.0 / variance), kName));
+  }
+
+  void Break(ConstraintId tie) { transaction_.BreakConstraint(tie); }
+
+  // The orientation nearest to an angle; kNoId beyond the gate (rad).
+  FeatureId Nearest(double angle, double gate) const {
+    const int nearest = NearestAxial(angles_, angle, gate);
+    return nearest < 0 ? kNoId : ids_[static_cast<std::size_t>(nearest)];
+  }
+
+  const std::vector<double>& angles() const { return angles_; }
+  std::int64_t num_found() const {
+    return static_cast<std::int64_t>(transaction_.added_features().size());
+  }
+  Transaction Take() { return std::move(transaction_); }
+
+ private:
+  const Registry& registry_;
+  const FeatureType& orientation_type_;
+  // Of the orientations.
+  const int level_;
+  // Of a tie, without the wall's own error, rad^2.
+  const double variance_;
+  std::vector<FeatureId> ids_;
+  std::vector<double> angles_;
+  Transaction transaction_;
+};
+
+// All features, or those that a scope lists.
+CandidateList CollectCandidates(const Graph& graph, const DetectionScope& scope,
+                                const OrientationMixtureOptions& options) {
+  CandidateList list(graph, scope.level, options);
+  if (scope.features == nullptr) {
+    for (const Feature* feature : graph.Features()) list.Consider(*feature);
+    return list;
+  }
+  for (const auto* ids : {scope.features, scope.lower_features}) {
+    if (ids == nullptr) continue;
+    for (const FeatureId id : *ids) {
+      const Feature* feature = graph.FindFeature(id);
+      if (feature != nullptr) list.Consider(*feature);
+    }
+  }
+  return list;
+}
+
+// What became of the walls that were judged by their innovation.
+struct AssignmentCounts {
+  std::int64_t refused = 0;
+  std::int64_t moved = 0;
+};
+
+// Ties judged walls as they were assigned, and breaks the ties that lost.
+AssignmentCounts ProposeAssignment(const Graph& graph,
+                                   const DetectionScope& scope,
+                                   const OrientationMixtureOptions& options,
+                                   const JudgedWalls& judged,
+                                   const DirectionAssignment& assignment,
+                                   Proposal* proposal) {
+  std::vector<WallTie> ties;
+  for (const FeatureId id : judged.ids) ties.push_back(TieOf(graph, id));
+  std::vector<FeatureId> shared =
+      MatchOrientations(assignment, judged.walls, ties);
+  for (std::size_t k = 0; k < shared.size(); ++k) {
+    const SharedDirection& direction = assignment.directions[k];
+    if (shared[k] == kNoId && static_cast<int>(direction.walls.size()) >=
+                                  std::max(2, options.minimum_support)) {
+      shared[k] = proposal->AddOrientation(direction.angle);
+    }
+  }
+  AssignmentCounts counts;
+  for (std::size_t i = 0; i < judged.ids.size(); ++i) {
+    const Feature& wall = graph.GetFeature(judged.ids[i]);
+    const double own_sigma = judged.walls[i].own_sigma;
+    const int k = assignment.direction_of[i];
+    const FeatureId orientation = k < 0 ? kNoId : shared[k];
+    counts.refused += orientation == kNoId;
+    if (ties[i].orientation == kNoId) {
+      if (orientation != kNoId && !IsTied(graph, wall, scope.level)) {
+        proposal->Tie(wall, orientation, 0.0, own_sigma);
+      }
+      continue;
+    }
+    // A wall that waits keeps its direction unless that is refuted.
+    const bool has_lost = orientation == kNoId
+                              ? assignment.innovations[i].chi_square >
+                                    options.assignment.breaking_gate
+                              : orientation != ties[i].orientation;
+    if (!has_lost) continue;
+    proposal->Break(ties[i].constraint);
+    ++counts.moved;
+    if (orientation != kNoId) {
+      proposal->Tie(wall, orientation, 0.0, own_sigma);
+    }
+  }
+  return counts;
+}
+
 }  // namespace
+
+OrientationMixture::OrientationMixture(const OrientationMixtureOptions& options)
+    : options_(options) {}
+
+const std::string& OrientationMixture::name() const {
+  static const std::string name = kName;
+  return name;
+}
 
 Transaction OrientationMixture::Detect(const Graph& graph,
                                        const Registry& registry,
                                        const DetectionScope& scope) const {
-  CandidateList list(graph, scope.level, options_);
-  if (scope.features != nullptr) {
-    for (const auto* ids : {scope.features, scope.lower_features}) {
-      if (ids == nullptr) continue;
-      for (const FeatureId id : *ids) {
-        const Feature* feature = graph.FindFeature(id);
-        if (feature != nullptr) list.Consider(*feature);
-      }
-    }
-  } else {
-    for (const Feature* feature : graph.Features()) list.Consider(*feature);
-  }
+  const CandidateList list = CollectCandidates(graph, scope, options_);
   list.Count(scope);
-  const std::vector<Candidate>& candidates = list.candidates();
-  Transaction transaction;
-  if (candidates.empty()) return transaction;
-
-  std::vector<FeatureId> orientations;
-  std::vector<double> directions;
-  for (const FeatureId id : graph.VirtualFeatures(scope.level + 1)) {
-    const Feature& feature = graph.GetFeature(id);
-    if (!feature.type->Is(FeatureRole::kDirection)) continue;
-    orientations.push_back(id);
-    directions.push_back(feature.parameters[0]);
-  }
-
-  const FeatureType& orientation_type = registry.GetFeature("orientation");
-  const auto tie = [&](const Feature& wall, FeatureId orientation,
-                       double expected, double own_sigma) {
-    const RelationType* relation = registry.FindRelation(
-        RelationRole::kDirection, *wall.type, orientation_type);
-    if (relation == nullptr) return;
-    const double variance =
-        options_.sigma * options_.sigma + own_sigma * own_sigma;
-    transaction.AddConstraint(
-        MakeStructure(*relation, {wall.id, orientation},
-                      Eigen::VectorXd::Constant(1, expected),
-                      Eigen::MatrixXd::Constant(1, 1, 1.0 / variance), kName));
-  };
-  const auto add_orientation = [&](double angle) {
-    Feature orientation;
-    orientation.type = &orientation_type;
-    orientation.level = scope.level + 1;
-    orientation.is_virtual = true;
-    orientation.parameters[0] = angle;
-    orientation.source = kName;
-    return transaction.AddFeature(std::move(orientation));
-  };
+  if (list.candidates().empty()) return {};
+  Proposal proposal(graph, registry, scope.level + 1, options_.sigma);
 
   // What can be judged by its innovation is.
   JudgedWalls judged = CollectJudgedWalls(graph, scope, options_);
-  std::int64_t refused = 0;
-  std::int64_t moved = 0;
+  AssignmentCounts counts;
   if (!judged.ids.empty()) {
     if (judged.constraints != judged_constraints_ ||
         judged.ids != judged_ids_) {
-      DirectionAssignmentOptions options = options_.assignment;
-      options.sigma = options_.sigma;
+      DirectionAssignmentOptions assignment = options_.assignment;
+      assignment.sigma = options_.sigma;
       assignment_ = AssignDirections(std::move(judged.network), judged.walls,
-                                     {}, options);
+                                     {}, assignment);
       judged_constraints_ = std::move(judged.constraints);
       judged_ids_ = judged.ids;
     }
-    std::vector<WallTie> ties;
-    for (const FeatureId id : judged.ids) ties.push_back(TieOf(graph, id));
-    std::vector<FeatureId> shared =
-        MatchOrientations(assignment_, judged.walls, ties);
-    for (std::size_t k = 0; k < shared.size(); ++k) {
-      const SharedDirection& direction = assignment_.directions[k];
-      if (shared[k] != kNoId || static_cast<int>(direction.walls.size()) <
-                                    std::max(2, options_.minimum_support)) {
-        continue;
-      }
-      shared[k] = add_orientation(direction.angle);
-      orientations.push_back(shared[k]);
-      directions.push_back(direction.angle);
-    }
-    for (std::size_t i = 0; i < judged.ids.size(); ++i) {
-      const Feature& wall = graph.GetFeature(judged.ids[i]);
-      const int k = assignment_.direction_of[i];
-      const FeatureId orientation = k < 0 ? kNoId : shared[k];
-      refused += orientation == kNoId;
-      if (ties[i].orientation == kNoId) {
-        if (orientation != kNoId && !IsTied(graph, wall, scope.level)) {
-          tie(wall, orientation, 0.0, judged.walls[i].own_sigma);
-        }
-      } else if (orientation == kNoId ? assignment_.innovations[i].chi_square >
-                                            options_.assignment.breaking_gate
-                                      : orientation != ties[i].orientation) {
-        transaction.BreakConstraint(ties[i].constraint);
-        ++moved;
-        if (orientation != kNoId) {
-          tie(wall, orientation, 0.0, judged.walls[i].own_sigma);
-        }
-      }
-    }
+    counts = ProposeAssignment(graph, scope, options_, judged, assignment_,
+                               &proposal);
   } else {
-    for (const AxialComponent& component :
-         FindAxialComponents(list.samples(), directions, options_.mixture)) {
-      orientations.push_back(add_orientation(component.mean));
-      directions.push_back(component.mean);
+    for (const AxialComponent& component : FindAxialComponents(
+             list.samples(), proposal.angles(), options_.mixture)) {
+      proposal.AddOrientation(component.mean);
     }
   }
 
   const std::set<FeatureId> is_judged(judged.ids.begin(), judged.ids.end());
   std::int64_t far = 0;
-  for (const Candidate& candidate : candidates) {
+  for (const Candidate& candidate : list.candidates()) {
     if (is_judged.count(candidate.feature->id) > 0) continue;
-    const int nearest =
-        NearestAxial(directions, candidate.angle, options_.mixture.gate);
-    if (nearest < 0) {
+    const FeatureId nearest =
+        proposal.Nearest(candidate.angle, options_.mixture.gate);
+    if (nearest == kNoId) {
       ++far;
       continue;
     }
-    tie(*candidate.feature, orientations[nearest], candidate.expected, 0.0);
+    proposal.Tie(*candidate.feature, nearest, candidate.expected, 0.0);
   }
-  scope.Count("directions found",
-              static_cast<std::int64_t>(transaction.added_features().size()));
-  scope.Count("walls refused: by their innovation", refused);
-  scope.Count("walls moved to another direction", moved);
+  scope.Count("directions found", proposal.num_found());
+  scope.Count("walls refused: by their innovation", counts.refused);
+  scope.Count("walls moved to another direction", counts.moved);
   scope.Count("walls refused: no direction within the gate", far);
-  return transaction;
+  return proposal.Take();
 }
 
 DetectorType OrientationMixtureType() {

@@ -15,6 +15,8 @@ namespace {
 
 constexpr double kIndexCell = 1.0;
 constexpr double kCoveragePiece = 0.1;
+// A wall has at least so many cells.
+constexpr std::size_t kFewestCells = 6;
 
 std::int64_t CellKey(std::int64_t column, std::int64_t row) {
   // Unsigned, since a negative column cannot be shifted.
@@ -167,6 +169,32 @@ struct LineSums {
   double SquaredError() const {
     const double cross = xy - x * y / n;
     return std::max(yy - y * y / n - cross * cross / Spread(), 0.0);
+  }
+};
+
+double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+// A line that grows from a cell.
+struct GrownLine {
+  // The cell's mean: sums are taken about it, so that they are as exact far
+  // from the map's origin.
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();
+  // Of the line's cells, from there.
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();
+  // Variances of the cells, m^2.
+  double across = 0.0;
+  double along = 0.0;
+
+  void FitTo(const Fit& fit) { fit.Solve(&mean, &direction, &across, &along); }
+  Eigen::Vector2d point() const { return origin + mean; }
+  double Along(const Eigen::Vector2d& place) const {
+    return direction.dot(place - origin - mean);
+  }
+  double Distance(const Eigen::Vector2d& place) const {
+    return std::abs(Cross(direction, place - origin - mean));
   }
 };
 
@@ -377,132 +405,142 @@ class Completion {
     }
   }
 
+  // Makes a wall of what lies in line with a cell, when it is long, whole and
+  // straight enough.
   void Grow(int seed) {
+    GrownLine line;
+    line.origin = cells_[seed].mean;
+    line.direction = cells_[seed].direction;
+    const std::vector<int> on = FitFinally(CollectInLine(seed, &line), &line);
+    if (on.empty() || line.across > scatter_ * scatter_) return;
+    std::vector<double> places;
+    Eigen::Vector2d view = Eigen::Vector2d::Zero();
+    for (const int index : on) {
+      places.push_back(line.Along(cells_[index].mean));
+      view += cells_[index].view;
+    }
+    std::sort(places.begin(), places.end());
+    const double length = places.back() - places.front();
+    if (length < options_.min_length || !IsCovered(places)) return;
+    // The direction must be as certain as that of any other wall.
+    const double end_variance = line.across * length * length /
+                                (static_cast<double>(on.size()) * line.along);
+    if (end_variance > options_.max_end_sigma * options_.max_end_sigma *
+                           (scatter_ / options_.max_scatter)) {
+      return;
+    }
+    for (const int index : on) Use(index);
+    UseUp(line.point(), line.direction, places.front(), places.back());
+    DropUsed();
+
+    const double middle = 0.5 * (places.front() + places.back());
+    const Eigen::Vector2d position = line.point() + middle * line.direction;
+    // y towards the side from which it was seen.
+    Eigen::Vector2d direction = line.direction;
+    if (Cross(direction, view) < 0.0) direction = -direction;
+    Add(Pose2(position.x(), position.y(),
+              std::atan2(direction.y(), direction.x())),
+        length, CountScans(on));
+  }
+
+  // Cells in line with the seed, each within the gap of another one. Fits the
+  // line to them on the way; without enough of them there are none.
+  std::vector<int> CollectInLine(int seed, GrownLine* line) {
     std::vector<int> members = {seed};
     std::vector<char>& in = in_;
     in.resize(cells_.size(), 0);
     in[seed] = 1;
     Fit fit;
-    const Eigen::Vector2d origin = cells_[seed].mean;
     fit.Add(Eigen::Vector2d::Zero(), 1.0);
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-    Eigen::Vector2d direction = cells_[seed].direction;
-    double across = 0.0, along = 0.0;
     const double cos_turn = std::cos(options_.max_turn);
-    const double reach_across = 2.5 * scatter_;
     const double squared_gap = options_.max_gap * options_.max_gap;
     for (std::size_t k = 0; k < members.size(); ++k) {
       const Cell& cell = cells_[members[k]];
       const std::size_t size = members.size();
-      const Eigen::Vector2d point = origin + mean;
-      const auto distance = [&](const Eigen::Vector2d& place) {
-        const Eigen::Vector2d d = place - point;
-        return std::abs(direction.x() * d.y() - direction.y() * d.x());
-      };
       for (const int bucket : buckets_[cell.bucket].around) {
         if (bucket < 0 ||
-            distance(buckets_[bucket].middle) > reach_across + bucket_size_) {
+            std::abs(Cross(line->direction,
+                           buckets_[bucket].middle - line->point())) >
+                ReachAcross() + bucket_size_) {
           continue;
         }
         for (const Bucket::Entry& entry : buckets_[bucket].entries) {
           if ((entry.mean - cell.mean).squaredNorm() > squared_gap ||
-              in[entry.index]) {
-            continue;
-          }
-          const Eigen::Vector2d d = entry.mean - origin - mean;
-          if (std::abs(direction.x() * d.y() - direction.y() * d.x()) >
-              reach_across) {
+              in[entry.index] || line->Distance(entry.mean) > ReachAcross()) {
             continue;
           }
           const Cell& other = cells_[entry.index];
           // Seen from the same side.
           if (other.view.dot(cells_[seed].view) < 0.0) continue;
           if (other.direction.squaredNorm() > 0.0 &&
-              std::abs(other.direction.dot(direction)) < cos_turn) {
+              std::abs(other.direction.dot(line->direction)) < cos_turn) {
             continue;
           }
           in[entry.index] = 1;
           members.push_back(entry.index);
-          fit.Add(entry.mean - origin, 1.0);
+          fit.Add(entry.mean - line->origin, 1.0);
         }
       }
-      if (members.size() >= 6 && members.size() > size) {
-        fit.Solve(&mean, &direction, &across, &along);
+      if (members.size() >= kFewestCells && members.size() > size) {
+        line->FitTo(fit);
       }
     }
     for (const int index : members) in[index] = 0;
-    if (members.size() < 6) return;
+    return members;
+  }
 
-    // Once more with what lies on the line that was found.
-    int returns = 0;
+  // Fits the line once more, to what lies on it, returns counted, and cuts it
+  // at kinks. The cells that it ends with; none when they do not do.
+  std::vector<int> FitFinally(const std::vector<int>& members,
+                              GrownLine* line) const {
+    if (members.size() < kFewestCells) return {};
     std::vector<int> on;
-    for (int index : members) {
-      const Eigen::Vector2d d = cells_[index].mean - origin - mean;
-      if (std::abs(direction.x() * d.y() - direction.y() * d.x()) <=
-          reach_across) {
+    for (const int index : members) {
+      if (line->Distance(cells_[index].mean) <= ReachAcross()) {
         on.push_back(index);
       }
     }
-    for (;;) {
-      if (on.size() < 6) return;
-      Fit final_fit;
-      returns = 0;
-      for (int index : on) {
-        final_fit.Add(cells_[index].mean - origin, cells_[index].returns);
+    do {
+      if (on.size() < kFewestCells) return {};
+      Fit fit;
+      int returns = 0;
+      for (const int index : on) {
+        fit.Add(cells_[index].mean - line->origin, cells_[index].returns);
         returns += cells_[index].returns;
       }
-      if (returns < options_.min_returns) return;
-      final_fit.Solve(&mean, &direction, &across, &along);
-      if (!CutAtKink(origin + mean, direction, &on)) break;
-    }
-    if (across > scatter_ * scatter_) return;
-    std::vector<double> places;
-    Eigen::Vector2d view = Eigen::Vector2d::Zero();
-    for (int index : on) {
-      places.push_back(direction.dot(cells_[index].mean - origin - mean));
-      view += cells_[index].view;
-    }
-    std::sort(places.begin(), places.end());
-    const double length = places.back() - places.front();
-    if (length < options_.min_length) return;
+      if (returns < options_.min_returns) return {};
+      line->FitTo(fit);
+    } while (CutAtKink(line->point(), line->direction, &on));
+    return on;
+  }
+
+  // Whether places along a line, ascending, leave few gaps.
+  bool IsCovered(const std::vector<double>& places) const {
     int pieces = 0;
     std::int64_t last = -1;
-    for (double place : places) {
+    for (const double place : places) {
       const auto piece =
           static_cast<std::int64_t>((place - places.front()) / kCoveragePiece);
       if (piece != last) ++pieces;
       last = piece;
     }
-    if (pieces < options_.min_coverage * (length / kCoveragePiece)) return;
-    // The direction must be as certain as that of any other wall.
-    const double end_variance =
-        across * length * length / (static_cast<double>(on.size()) * along);
-    if (end_variance > options_.max_end_sigma * options_.max_end_sigma *
-                           (scatter_ / options_.max_scatter))
-      return;
-    for (const int index : on) Use(index);
-    UseUp(origin + mean, direction, places.front(), places.back());
-    DropUsed();
+    const double length = places.back() - places.front();
+    return pieces >= options_.min_coverage * (length / kCoveragePiece);
+  }
 
-    if (Eigen::Vector2d(-direction.y(), direction.x()).dot(view) < 0.0) {
-      direction = -direction;
-      std::reverse(places.begin(), places.end());
-      for (double& place : places) place = -place;
-    }
-    const double middle = 0.5 * (places.front() + places.back());
-    const Eigen::Vector2d position = origin + mean + middle * direction;
+  int CountScans(const std::vector<int>& cells) const {
     std::vector<std::size_t> scans;
-    for (const int index : on) {
+    for (const int index : cells) {
       scans.insert(scans.end(), cells_[index].scans.begin(),
                    cells_[index].scans.end());
     }
     std::sort(scans.begin(), scans.end());
-    const auto num_scans =
-        std::unique(scans.begin(), scans.end()) - scans.begin();
-    Add(Pose2(position.x(), position.y(),
-              std::atan2(direction.y(), direction.x())),
-        length, static_cast<int>(num_scans));
+    return static_cast<int>(std::unique(scans.begin(), scans.end()) -
+                            scans.begin());
   }
+
+  // How far from a line its cells may lie, m.
+  double ReachAcross() const { return 2.5 * scatter_; }
 
   // Leaves the longer one of two pieces when two lines explain the cells far
   // better than one does; false when one will do.
@@ -516,8 +554,7 @@ class Completion {
     samples.reserve(on->size());
     for (const int index : *on) {
       const Eigen::Vector2d d = cells_[index].mean - point;
-      samples.push_back({direction.dot(d),
-                         direction.x() * d.y() - direction.y() * d.x(), index});
+      samples.push_back({direction.dot(d), Cross(direction, d), index});
     }
     std::sort(
         samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
@@ -574,8 +611,7 @@ class Completion {
       ForNeighbors(center, BucketsAround(center), bucket_size_, [&](int index) {
         const Eigen::Vector2d d = cells_[index].mean - point;
         const double along = direction.dot(d);
-        if (std::abs(direction.x() * d.y() - direction.y() * d.x()) <=
-                options_.explained_offset &&
+        if (std::abs(Cross(direction, d)) <= options_.explained_offset &&
             along >= begin - options_.explained_gap &&
             along <= end + options_.explained_gap) {
           Use(index);

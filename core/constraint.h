@@ -39,6 +39,11 @@ struct Constraint {
   /// measurements. The frozen loss reads it from here, so its address is
   /// stable.
   double delta = 1.0;
+  /// Structure is broken when its p-value falls below this or below
+  /// EmOptions::delta_threshold, whichever is less. For detectors whose
+  /// tolerances contain every error of what they join: of right hypotheses a
+  /// threshold of 0.3 would break three in ten.
+  double break_below = 1.0;
   /// Label in files and reports: who proposed it. Nothing is decided by it.
   std::string source;
 };

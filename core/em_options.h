@@ -19,7 +19,8 @@ struct RelationPrior {
 
 /// Options of EM: when structure is broken and proposed again, and convergence.
 struct EmOptions {
-  /// Structure constraints with a smaller delta are broken.
+  /// Structure constraints with a smaller delta are broken, unless their
+  /// Constraint::break_below is less.
   double delta_threshold = 0.3;
   /// False: wrong structure is kept (for comparison).
   bool break_constraints = true;

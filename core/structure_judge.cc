@@ -51,7 +51,9 @@ Verdict ResidualJudge::Judge(const EmScope& scope) {
     const double p_value = constraint->delta > kDeltaFloor
                                ? constraint->delta
                                : session_->Delta(*constraint);
-    if (p_value >= delta_threshold_) continue;
+    if (p_value >= std::min(delta_threshold_, constraint->break_below)) {
+      continue;
+    }
     refutations.push_back(
         {constraint->id,
          break_share_ > 0.0 ? session_->SquaredResidual(*constraint) : 0.0});

@@ -62,7 +62,8 @@ Verdict BreakWorst(const std::vector<Refutation>& refutations,
 
 /// Judges by the unweighted residual that a constraint is left with in a solve
 /// which contains it (the paper, Sect. 3): delta is its chi-square p-value, and
-/// what is under EmOptions::delta_threshold is broken. With full_weight_test
+/// what is under EmOptions::delta_threshold and Constraint::break_below is
+/// broken. With full_weight_test
 /// the solve that is judged has all structure at its full weight.
 class ResidualJudge final : public StructureJudge {
  public:

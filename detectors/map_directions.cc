@@ -189,9 +189,10 @@ void AddOrientations(const Graph& graph, double sigma_of_one_metre,
       const double own =
           OwnDirectionSigma(std::max(wall.extent_end - wall.extent_begin, 0.1),
                             sigma_of_one_metre);
-      map->network.AddLink(node, found->second, constraint.expected[0],
-                           1.0 / constraint.information(0, 0) + own * own,
-                           true);
+      // The tolerance may contain the wall's own error.
+      map->network.AddLink(
+          node, found->second, constraint.expected[0],
+          std::max(1.0 / constraint.information(0, 0), own * own), true);
     }
   }
 }

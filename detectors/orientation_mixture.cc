@@ -1,8 +1,10 @@
 #include <plumbline/core/em_scope.h>
 #include <plumbline/detectors/direction_assignment.h>
+#include <plumbline/detectors/direction_scatter.h>
 #include <plumbline/detectors/map_directions.h>
 #include <plumbline/detectors/orientation_mixture.h>
 #include <plumbline/detectors/parameters.h>
+#include <plumbline/factors/chi_square.h>
 
 #include <algorithm>
 #include <cmath>
@@ -189,6 +191,21 @@ WallTie TieOf(const Graph& graph, FeatureId wall) {
   return {};
 }
 
+// Whether a live relation says that two orientations are one.
+bool AreParallel(const Graph& graph, FeatureId a, FeatureId b) {
+  for (const ConstraintId id : graph.ConstraintsOf(a)) {
+    const Constraint& constraint = graph.GetConstraint(id);
+    if (IsLiveStructure(constraint) &&
+        constraint.type->Is(RelationRole::kAngle) &&
+        constraint.features.size() == 2 &&
+        (constraint.features[0] == b || constraint.features[1] == b) &&
+        NormalizeAxial(constraint.expected[0]) == 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // Walls whose directions the measurements tie to each other.
 struct JudgedWalls {
   DirectionNetwork network;
@@ -254,15 +271,40 @@ std::vector<FeatureId> MatchOrientations(
   return orientations;
 }
 
+// Makes one of directions whose orientations a live relation makes parallel:
+// what the relation's own test has found to be one needs no second feature.
+void JoinParallel(const Graph& graph, std::vector<FeatureId>* orientations,
+                  DirectionAssignment* assignment) {
+  for (std::size_t k = 1; k < orientations->size(); ++k) {
+    if ((*orientations)[k] == kNoId) continue;
+    for (std::size_t j = 0; j < k; ++j) {
+      if ((*orientations)[j] == kNoId ||
+          !AreParallel(graph, (*orientations)[j], (*orientations)[k])) {
+        continue;
+      }
+      std::vector<std::size_t>& walls = assignment->directions[k].walls;
+      for (const std::size_t wall : walls) {
+        assignment->direction_of[wall] = static_cast<int>(j);
+      }
+      std::vector<std::size_t>& all = assignment->directions[j].walls;
+      all.insert(all.end(), walls.begin(), walls.end());
+      walls.clear();
+      (*orientations)[k] = kNoId;
+      break;
+    }
+  }
+}
+
 // The directions that walls may be tied to, and the ties that are proposed.
 class Proposal {
  public:
   Proposal(const Graph& graph, const Registry& registry, int level,
-           double sigma)
+           const OrientationMixtureOptions& options)
       : registry_(registry),
         orientation_type_(registry.GetFeature("orientation")),
         level_(level),
-        variance_(sigma * sigma) {
+        variance_(options.sigma * options.sigma),
+        break_below_(ChiSquarePValue(options.assignment.gate, 1)) {
     for (const FeatureId id : graph.VirtualFeatures(level)) {
       const Feature& feature = graph.GetFeature(id);
       if (!feature.type->Is(FeatureRole::kDirection)) continue;
@@ -291,10 +333,13 @@ class Proposal {
         RelationRole::kDirection, *feature.type, orientation_type_);
     if (relation == nullptr) return;
     const double variance = variance_ + own_sigma * own_sigma;
-    transaction_.AddConstraint(
+    Constraint tie =
         MakeStructure(*relation, {feature.id, orientation},
                       Eigen::VectorXd::Constant(1, expected),
-                      Eigen::MatrixXd::Constant(1, 1, 1.0 / variance), kName));
+                      Eigen::MatrixXd::Constant(1, 1, 1.0 / variance), kName);
+    // What was accepted by its innovation goes at the same gate.
+    if (own_sigma > 0.0) tie.break_below = break_below_;
+    transaction_.AddConstraint(std::move(tie));
   }
 
   void Break(ConstraintId tie) { transaction_.BreakConstraint(tie); }
@@ -318,6 +363,8 @@ class Proposal {
   const int level_;
   // Of a tie, without the wall's own error, rad^2.
   const double variance_;
+  // Of a tie that was judged by its innovation.
+  const double break_below_;
   std::vector<FeatureId> ids_;
   std::vector<double> angles_;
   Transaction transaction_;
@@ -348,18 +395,20 @@ struct AssignmentCounts {
 };
 
 // Ties judged walls as they were assigned, and breaks the ties that lost.
+// Directions of the assignment that have become one are joined.
 AssignmentCounts ProposeAssignment(const Graph& graph,
                                    const DetectionScope& scope,
                                    const OrientationMixtureOptions& options,
                                    const JudgedWalls& judged,
-                                   const DirectionAssignment& assignment,
+                                   DirectionAssignment* assignment,
                                    Proposal* proposal) {
   std::vector<WallTie> ties;
   for (const FeatureId id : judged.ids) ties.push_back(TieOf(graph, id));
   std::vector<FeatureId> shared =
-      MatchOrientations(assignment, judged.walls, ties);
+      MatchOrientations(*assignment, judged.walls, ties);
+  JoinParallel(graph, &shared, assignment);
   for (std::size_t k = 0; k < shared.size(); ++k) {
-    const SharedDirection& direction = assignment.directions[k];
+    const SharedDirection& direction = assignment->directions[k];
     if (shared[k] == kNoId && static_cast<int>(direction.walls.size()) >=
                                   std::max(2, options.minimum_support)) {
       shared[k] = proposal->AddOrientation(direction.angle);
@@ -369,7 +418,7 @@ AssignmentCounts ProposeAssignment(const Graph& graph,
   for (std::size_t i = 0; i < judged.ids.size(); ++i) {
     const Feature& wall = graph.GetFeature(judged.ids[i]);
     const double own_sigma = judged.walls[i].own_sigma;
-    const int k = assignment.direction_of[i];
+    const int k = assignment->direction_of[i];
     const FeatureId orientation = k < 0 ? kNoId : shared[k];
     counts.refused += orientation == kNoId;
     if (ties[i].orientation == kNoId) {
@@ -380,7 +429,7 @@ AssignmentCounts ProposeAssignment(const Graph& graph,
     }
     // A wall that waits keeps its direction unless that is refuted.
     const bool has_lost = orientation == kNoId
-                              ? assignment.innovations[i].chi_square >
+                              ? assignment->innovations[i].chi_square >
                                     options.assignment.breaking_gate
                               : orientation != ties[i].orientation;
     if (!has_lost) continue;
@@ -409,14 +458,23 @@ Transaction OrientationMixture::Detect(const Graph& graph,
   const CandidateList list = CollectCandidates(graph, scope, options_);
   list.Count(scope);
   if (list.candidates().empty()) return {};
-  Proposal proposal(graph, registry, scope.level + 1, options_.sigma);
+  Proposal proposal(graph, registry, scope.level + 1, options_);
 
   // What can be judged by its innovation is.
   JudgedWalls judged = CollectJudgedWalls(graph, scope, options_);
   AssignmentCounts counts;
   if (!judged.ids.empty()) {
-    if (judged.constraints != judged_constraints_ ||
-        judged.ids != judged_ids_) {
+    const bool is_new =
+        judged.constraints != judged_constraints_ || judged.ids != judged_ids_;
+    if (is_new) {
+      judged.network.Solve();
+      scatter_ = EstimateDirectionScatter(judged.network, judged.walls,
+                                          options_.scatter);
+    }
+    for (DirectionWall& wall : judged.walls) {
+      wall.own_sigma = std::hypot(wall.own_sigma, scatter_);
+    }
+    if (is_new) {
       DirectionAssignmentOptions assignment = options_.assignment;
       assignment.sigma = options_.sigma;
       assignment_ = AssignDirections(std::move(judged.network), judged.walls,
@@ -424,7 +482,7 @@ Transaction OrientationMixture::Detect(const Graph& graph,
       judged_constraints_ = std::move(judged.constraints);
       judged_ids_ = judged.ids;
     }
-    counts = ProposeAssignment(graph, scope, options_, judged, assignment_,
+    counts = ProposeAssignment(graph, scope, options_, judged, &assignment_,
                                &proposal);
   } else {
     for (const AxialComponent& component : FindAxialComponents(

@@ -5,6 +5,7 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/detectors/axial.h>
 #include <plumbline/detectors/direction_assignment.h>
+#include <plumbline/detectors/direction_scatter.h>
 #include <plumbline/detectors/map_directions.h>
 
 #include <string>
@@ -32,8 +33,10 @@ struct OrientationMixtureOptions {
   /// are in every look: on real logs walls agree only so well.
   double own_direction_noise = DegToRad(2.0);
   /// How walls whose directions the measurements tie to each other are
-  /// assigned (its sigma is the one above), and how far these are trusted.
+  /// assigned (its sigma is the one above), how parallel they are whatever
+  /// their length, and how far the measurements are trusted.
   DirectionAssignmentOptions assignment;
+  DirectionScatterOptions scatter;
   MapDirectionsOptions links;
 };
 
@@ -76,6 +79,7 @@ class OrientationMixture : public StructureDetector {
   // to the next.
   mutable std::vector<ConstraintId> judged_constraints_;
   mutable std::vector<FeatureId> judged_ids_;
+  mutable double scatter_ = 0.0;
   mutable DirectionAssignment assignment_;
 };
 

@@ -542,26 +542,47 @@ class Completion {
   // How far from a line its cells may lie, m.
   double ReachAcross() const { return 2.5 * scatter_; }
 
-  // Leaves the longer one of two pieces when two lines explain the cells far
-  // better than one does; false when one will do.
+  // A cell along and across a line.
+  struct Sample {
+    double along, across;
+    int index;
+  };
+
+  // Leaves the longer one of two pieces when a line with a kink explains the
+  // cells far better than a straight one does; false when that will do.
   bool CutAtKink(const Eigen::Vector2d& point, const Eigen::Vector2d& direction,
                  std::vector<int>* on) const {
-    struct Sample {
-      double along, across;
-      int index;
-    };
     std::vector<Sample> samples;
     samples.reserve(on->size());
     for (const int index : *on) {
       const Eigen::Vector2d d = cells_[index].mean - point;
       samples.push_back({direction.dot(d), Cross(direction, d), index});
     }
+    const std::size_t n = samples.size();
+    if (n < 12) return false;
     std::sort(
         samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
           return a.along != b.along ? a.along < b.along : a.index < b.index;
         });
     LineSums all;
     for (const Sample& sample : samples) all.Add(sample.along, sample.across);
+    std::size_t cut = FindKink(samples, all);
+    if (cut == 0) cut = FindKinkNearEnd(samples, all);
+    if (cut == 0) return false;
+    const bool keeps_left = samples[cut - 1].along - samples[0].along >=
+                            samples[n - 1].along - samples[cut].along;
+    on->clear();
+    for (std::size_t k = keeps_left ? 0 : cut; k < (keeps_left ? cut : n);
+         ++k) {
+      on->push_back(samples[k].index);
+    }
+    return true;
+  }
+
+  // First sample of the second of two walls, both long enough to have a
+  // direction of their own; 0 where one wall will do.
+  std::size_t FindKink(const std::vector<Sample>& samples,
+                       const LineSums& all) const {
     const std::size_t n = samples.size();
     LineSums left;
     double best = all.SquaredError();
@@ -582,22 +603,60 @@ class Completion {
         best_right = right;
       }
     }
-    if (cut == 0 || n < 12) return false;
+    if (cut == 0) return 0;
     const double turn = std::abs(best_left.Slope() - best_right.Slope());
     const double sigma =
         std::sqrt(best / static_cast<double>(n - 4) *
                   (1.0 / best_left.Spread() + 1.0 / best_right.Spread()));
-    if (turn < options_.min_kink || turn < options_.kink_sigmas * sigma) {
-      return false;
+    return IsKink(turn, sigma) ? cut : 0;
+  }
+
+  // The same for an end of another wall that is too short for a direction of
+  // its own: one line that turns (across = a + b x + c max(0, x - x0)) has the
+  // turn c at twice the precision.
+  std::size_t FindKinkNearEnd(const std::vector<Sample>& samples,
+                              const LineSums& all) const {
+    const std::size_t n = samples.size();
+    const double begin = samples.front().along;
+    const double end = samples.back().along;
+    const double cross = all.xy - all.x * all.y / all.n;
+    LineSums left;
+    double best = 0.0, turn = 0.0, best_information = 0.0;
+    std::size_t cut = 0;
+    for (std::size_t k = 1; k < n; ++k) {
+      left.Add(samples[k - 1].along, samples[k - 1].across);
+      const double shorter =
+          std::min(samples[k - 1].along - begin, end - samples[k].along);
+      if (shorter < options_.min_end ||
+          shorter > options_.max_end_share * (end - begin)) {
+        continue;
+      }
+      const LineSums right = all - left;
+      const double x0 = 0.5 * (samples[k - 1].along + samples[k].along);
+      // Sums of z = max(0, x - x0), reduced for a and b.
+      const double z = right.x - x0 * right.n;
+      const double zz = right.xx - 2.0 * x0 * right.x + x0 * x0 * right.n;
+      const double xz = right.xx - x0 * right.x - all.x * z / all.n;
+      const double information = zz - z * z / all.n - xz * xz / all.Spread();
+      if (information <= 1e-9) continue;
+      const double score = right.xy - x0 * right.y - all.y * z / all.n -
+                           xz * cross / all.Spread();
+      if (score * score / information > best) {
+        best = score * score / information;
+        turn = std::abs(score / information);
+        best_information = information;
+        cut = k;
+      }
     }
-    const bool keeps_left = samples[cut - 1].along - samples[0].along >=
-                            samples[n - 1].along - samples[cut].along;
-    on->clear();
-    for (std::size_t k = keeps_left ? 0 : cut; k < (keeps_left ? cut : n);
-         ++k) {
-      on->push_back(samples[k].index);
-    }
-    return true;
+    if (cut == 0) return 0;
+    const double residual = std::max(all.SquaredError() - best, 0.0);
+    const double sigma =
+        std::sqrt(residual / static_cast<double>(n - 3) / best_information);
+    return IsKink(turn, sigma) ? cut : 0;
+  }
+
+  bool IsKink(double turn, double sigma) const {
+    return turn >= options_.min_kink && turn >= options_.kink_sigmas * sigma;
   }
 
   // What the new wall explains is no other wall.

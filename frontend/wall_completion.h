@@ -36,6 +36,11 @@ struct WallCompletionOptions {
   /// a small angle.
   double min_kink = DegToRad(0.5);
   double kink_sigmas = 4.0;
+  /// Least length (m) and largest share of an end that turns away and is not
+  /// the wall's: the beginning of another corridor's wall, however short it is
+  /// up to its next niche.
+  double min_end = 0.3;
+  double max_end_share = 0.34;
   /// Its ends swing by no more across it, as its direction is that uncertain
   /// (standard deviation over the whole length, m).
   double max_end_sigma = 0.0065;

@@ -129,13 +129,13 @@ template <typename Archive>
 void ExchangeConstraint(Archive& archive, const Registry& registry,
                         Constraint& constraint) {
   auto& [id, type, features, expected, information, kind, state, delta,
-         source] = constraint;
+         break_below, source] = constraint;
   ExchangeType(
       archive, type, [&](const std::string& name) -> const auto& {
         return registry.GetRelation(name);
       });
   ExchangeAll(archive, id, features, expected, information, kind, state, delta,
-              source);
+              break_below, source);
 }
 
 inline void Exchange(StateWriter& archive, const Registry& registry,

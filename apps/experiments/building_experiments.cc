@@ -232,7 +232,7 @@ void RunB2(const ExperimentOptions& options, const Registry& registry,
       "where the measurements contradict it.";
   static const Mode kModes[] = {{"none", false, false, Refinement::kFull},
                                 {"structure", true, true, Refinement::kFull}};
-  static const int kBends[] = {1, 2, 3, 5, 7, 9};
+  static const int kBends[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
   std::vector<Job> jobs;
   for (const bool has_niches : {false, true}) {
     for (const int bend : kBends) {

@@ -85,6 +85,22 @@ TEST_F(ResidualJudgeTest, AThresholdUnderTheFloorHolds) {
   EXPECT_THAT(judge.Judge(whole_).refuted, IsEmpty());
 }
 
+TEST_F(ResidualJudgeTest, AConstraintMayAllowForLess) {
+  const ConstraintId tie = Between(segments_[2], orientation_);
+  // Its p-value is 6e-5.
+  graph_.GetConstraint(tie).break_below = 1e-5;
+  ResidualJudge judge(&graph_, session_.get(), EmOptions());
+  judge.Weigh(whole_);
+  EXPECT_THAT(judge.Judge(whole_).refuted, IsEmpty());
+  graph_.GetConstraint(tie).break_below = 1e-4;
+  EXPECT_THAT(judge.Judge(whole_).refuted, ElementsAre(tie));
+  // What the options let pass passes.
+  EmOptions options;
+  options.delta_threshold = 1e-5;
+  ResidualJudge lenient(&graph_, session_.get(), options);
+  EXPECT_THAT(lenient.Judge(whole_).refuted, IsEmpty());
+}
+
 TEST_F(ResidualJudgeTest, AFullWeightTestRestoresWeights) {
   EmOptions options;
   options.full_weight_test = true;

@@ -100,6 +100,43 @@ TEST(WallCompletionKinkTest, AWallIsCutAtAKink) {
   }
 }
 
+// Of a wall that turns by 3 degrees 0.7 m before its end the end is too short
+// for a direction of its own, and too little of the wall to tilt it by much: it
+// is cut off all the same.
+TEST(WallCompletionKinkTest, AnEndThatTurnsAwayIsCutOff) {
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  const double bend = DegToRad(3.0);
+  const std::vector<Wall> world = {
+      {{-4.0, 2.0}, {0.0, 2.0}},
+      {{0.0, 2.0}, {0.7 * std::cos(bend), 2.0 + 0.7 * std::sin(bend)}}};
+  testing::Laser laser;
+  laser.start_angle = DegToRad(30.0);
+  laser.angle_step = DegToRad(1.0);
+  laser.beams = 121;
+  laser.sigma = 0.01;
+  for (const int seed : {1, 2, 3, 4, 5}) {
+    Noise noise(seed);
+    std::vector<Scan> scans;
+    std::vector<Pose2> poses;
+    for (int i = 0; i <= 60; ++i) {
+      poses.emplace_back(-4.0 + 0.08 * i, 0.0, 0.0);
+      scans.push_back(MakeScan(world, poses.back(), laser, &noise));
+    }
+    const Transaction walls =
+        FindGlimpsedWalls(Graph(), registry, scans, poses, {});
+    int found = 0;
+    for (const Feature& wall : walls.added_features()) {
+      if (wall.extent_end - wall.extent_begin < 2.0) continue;
+      ++found;
+      EXPECT_NEAR(RadToDeg(NormalizeAxial(wall.parameters[2])), 0.0, 0.05);
+      // Seen from below: x runs from right to left.
+      EXPECT_NEAR(wall.parameters[0] + wall.extent_end, 0.0, 0.35) << seed;
+    }
+    EXPECT_EQ(found, 1);
+  }
+}
+
 TEST_F(WallCompletionTest, FindsTheWallSeenThroughTheDoor) {
   const Transaction walls =
       FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_);

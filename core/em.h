@@ -66,6 +66,7 @@ struct EmReport {
   double detect_seconds = 0.0;
   double solve_seconds = 0.0;
 
+  /// Whether the last run ended because nothing changed any more.
   bool converged() const { return termination == EmTermination::kConvergence; }
 };
 

@@ -62,6 +62,7 @@ class Assigner {
       if (TieMostCertain()) continue;
       if (Found()) continue;
       if (Dissolve()) continue;
+      if (Reunite()) continue;
       if (!Split()) break;
     }
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
@@ -452,13 +453,45 @@ class Assigner {
     return true;
   }
 
+  // Makes one family of a part that was split off and one that it does not
+  // differ from: a building turns and turns back. Neither is split again. True
+  // when two were joined.
+  bool Reunite() {
+    for (const std::size_t k : split_off_) {
+      if (!IsUsed(k)) continue;
+      const Eigen::VectorXd column = network_.CovarianceColumn(nodes_[k]);
+      double smallest = options_.split_gate;
+      std::size_t nearest = k;
+      for (std::size_t j = 0; j < nodes_.size(); ++j) {
+        if (!IsUsed(j) || families_[j] == families_[k]) continue;
+        const DirectionInnovation innovation = Innovation(
+            nodes_[j], nodes_[k], column, 0.0, options_.relation_sigma);
+        if (innovation.variance <=
+                options_.max_uncertainty * options_.max_uncertainty &&
+            innovation.chi_square < smallest) {
+          smallest = innovation.chi_square;
+          nearest = j;
+        }
+      }
+      if (nearest == k) continue;
+      const std::size_t family = std::min(families_[nearest], families_[k]);
+      Merge(nearest, k);
+      is_whole_.insert(families_[nearest]);
+      is_whole_.insert(family);
+      return true;
+    }
+    return false;
+  }
+
   // Splits the family whose walls are explained best by two, if any is. True
   // when one was.
   bool Split() {
     double best_statistic = options_.split_gate;
     std::vector<std::size_t> best;
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
-      if (families_[k] == k) FindSplit(k, &best_statistic, &best);
+      if (families_[k] == k && is_whole_.count(k) == 0) {
+        FindSplit(k, &best_statistic, &best);
+      }
     }
     if (best.empty()) return false;
     // The walls along, and those across.
@@ -487,35 +520,61 @@ class Assigner {
     result_.direction_of[wall] = -1;
   }
 
+  // A wall of a family.
+  struct Member {
+    std::size_t wall;
+    std::size_t direction;
+    // From the first wall, by the measurements alone, without quarter turns.
+    double untied;
+  };
+
   // The part of a family's walls whose turn against the others would lower the
-  // cost most, if by more than *best_statistic. Parts are cut by the angles
-  // that the measurements alone give.
+  // cost most, if by more than *best_statistic. Parts are cut in the order in
+  // which walls came into the map, where a part is a part of the building, and
+  // by the angles that the measurements alone give.
   void FindSplit(std::size_t family, double* best_statistic,
                  std::vector<std::size_t>* best) const {
-    struct Member {
-      double untied;
-      std::size_t wall;
-      std::size_t direction;
-    };
     std::vector<Member> members;
-    std::size_t first = walls_.size();
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
       if (families_[k] != family) continue;
       for (const std::size_t wall : result_.directions[k].walls) {
-        if (first == walls_.size()) first = wall;
-        // From the first wall, without quarter turns.
-        const double turn = untied_[wall] - untied_[first];
+        const double turn =
+            members.empty() ? 0.0 : untied_[wall] - untied_[members[0].wall];
         members.push_back(
-            {turn - 0.5 * kPi * std::round(turn / (0.5 * kPi)), wall, k});
+            {wall, k, turn - 0.5 * kPi * std::round(turn / (0.5 * kPi))});
       }
     }
     if (members.size() < 2 * static_cast<std::size_t>(options_.min_support)) {
       return;
     }
-    std::sort(
-        members.begin(), members.end(), [](const Member& a, const Member& b) {
-          return a.untied != b.untied ? a.untied < b.untied : a.wall < b.wall;
-        });
+    std::sort(members.begin(), members.end(),
+              [](const Member& a, const Member& b) { return a.wall < b.wall; });
+    FindCut(members, best_statistic, best);
+    // The two halves of any scatter differ: chosen so, the turn of a normal
+    // distribution's upper half explains 2 / pi of the cost, of a uniform
+    // one's 3 / 4.
+    double cost = 0.0;
+    for (const Member& member : members) {
+      const double pull = Residual(member) / Tolerance(member.wall);
+      cost += pull * pull;
+    }
+    double least = std::max(*best_statistic, options_.split_share * cost);
+    const double without = least;
+    std::stable_sort(
+        members.begin(), members.end(),
+        [](const Member& a, const Member& b) { return a.untied < b.untied; });
+    FindCut(members, &least, best);
+    if (least > without) *best_statistic = least;
+  }
+
+  double Residual(const Member& member) const {
+    return NormalizeAxial(network_.Angle(walls_[member.wall].node) -
+                          network_.Angle(nodes_[member.direction]));
+  }
+
+  // The same among the parts before and after a member.
+  void FindCut(const std::vector<Member>& members, double* best_statistic,
+               std::vector<std::size_t>* best) const {
     double total_length = 0.0;
     for (const Member& member : members) {
       total_length += walls_[member.wall].length;
@@ -526,14 +585,12 @@ class Assigner {
     double score = 0.0, weight = 0.0, length = 0.0;
     for (std::size_t i = 0; i + 1 < members.size(); ++i) {
       const Member& member = members[i];
-      const std::size_t node = walls_[member.wall].node;
       const double tolerance = Tolerance(member.wall);
       const double w = 1.0 / (tolerance * tolerance);
-      score += w * NormalizeAxial(network_.Angle(node) -
-                                  network_.Angle(nodes_[member.direction]));
+      score += w * Residual(member);
       weight += w;
       length += walls_[member.wall].length;
-      pull[static_cast<Eigen::Index>(node)] += w;
+      pull[static_cast<Eigen::Index>(walls_[member.wall].node)] += w;
       pull[static_cast<Eigen::Index>(nodes_[member.direction])] -= w;
       const std::size_t count = i + 1;
       const auto support = static_cast<std::size_t>(options_.min_support);
@@ -581,6 +638,8 @@ class Assigner {
   std::map<std::size_t, std::size_t> merged_into_;
   std::set<std::size_t> is_removed_;
   std::set<std::size_t> split_off_;
+  // Families that were found to be one after a split.
+  std::set<std::size_t> is_whole_;
   // Of this round. By direction: the one at a right angle, -1 for none.
   std::vector<int> companion_;
   std::vector<Candidate> candidates_;

@@ -27,6 +27,9 @@ struct DirectionAssignmentOptions {
   /// Two directions are two only when the chi-square of their difference (1
   /// degree of freedom) is at least this: the price of a further direction.
   double split_gate = 16.0;
+  /// Of the cost of all ties, the share that a split has to take away where the
+  /// parts are chosen by the angles of their walls.
+  double split_share = 0.85;
   /// Log-likelihood by which the best direction has to beat the next one; walls
   /// between them wait.
   double margin = 2.3;
@@ -101,7 +104,8 @@ struct DirectionAssignment {
 /// every other one by split_gate. In the end a direction is split where two
 /// explain its walls better: walls that each lie within their own gate can
 /// contradict it together (score test of a further parameter, the turn of one
-/// part of the walls against the other). Walls that could be of several, or of
+/// part of the walls against the other); parts that then differ from no other
+/// direction are joined with it. Walls that could be of several, or of
 /// which too little is known, are left.
 ///
 /// Without a given direction all walls are such as may found one.

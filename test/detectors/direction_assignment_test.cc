@@ -122,12 +122,72 @@ TEST(DirectionAssignmentTest, ADirectionIsSplitWhenTwoExplainItsWallsBetter) {
   constexpr int kCount = 40;
   int apart = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    Row row = MakeRow(kCount, 1.0, 0.1, seed);
+    Row row = MakeRow(kCount, 1.0, 0.05, seed);
     for (DirectionWall& wall : row.walls) wall.own_sigma = DegToRad(0.4);
     const DirectionAssignment assignment = Assign(std::move(row));
     apart += Mixed(assignment, kCount) == 0;
   }
-  EXPECT_GE(apart, 14);
+  EXPECT_GE(apart, 18);
+}
+
+// Walls that are all known to 0.05 degrees against a first one, their true
+// directions around `modes` (degrees) by turns with a normal scatter.
+Row MakeScattered(int count, const std::vector<double>& modes_deg,
+                  double scatter_deg, double own_deg, std::uint64_t seed) {
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> scatter(0.0, DegToRad(scatter_deg));
+  const double variance = DegToRad(0.05) * DegToRad(0.05);
+  Row row;
+  const std::size_t origin = row.network.AddNode(0.0);
+  for (int i = 0; i < count; ++i) {
+    const double mode =
+        modes_deg[static_cast<std::size_t>(i) % modes_deg.size()];
+    const double angle = DegToRad(mode) + scatter(engine);
+    DirectionWall wall;
+    wall.node = row.network.AddNode(angle);
+    wall.length = 3.0;
+    wall.own_sigma = DegToRad(own_deg);
+    row.network.AddLink(origin, wall.node, angle, variance, false);
+    row.walls.push_back(wall);
+  }
+  return row;
+}
+
+int NumUsed(const DirectionAssignment& assignment) {
+  int used = 0;
+  for (const SharedDirection& direction : assignment.directions) {
+    used += !direction.walls.empty();
+  }
+  return used;
+}
+
+// The upper half of any scatter differs from the lower one by far more than
+// chance allows parts that are chosen otherwise.
+TEST(DirectionAssignmentTest, ScatterIsNotSplit) {
+  for (const double own : {0.4, 0.6}) {
+    int one = 0;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      one += NumUsed(Assign(MakeScattered(120, {0.0}, 0.4, own, seed))) == 1;
+    }
+    EXPECT_GE(one, 19) << own;
+  }
+}
+
+// Two directions whose walls alternate are found by their angles.
+TEST(DirectionAssignmentTest, DirectionsThatAlternateAreTwo) {
+  int two = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const DirectionAssignment assignment =
+        Assign(MakeScattered(60, {0.0, 1.5}, 0.2, 0.2, seed));
+    int mixed = 0;
+    for (const SharedDirection& direction : assignment.directions) {
+      int odd = 0;
+      for (const std::size_t wall : direction.walls) odd += wall % 2 == 1;
+      mixed += std::min(odd, static_cast<int>(direction.walls.size()) - odd);
+    }
+    two += NumUsed(assignment) == 2 && mixed <= 2;
+  }
+  EXPECT_GE(two, 18);
 }
 
 TEST(DirectionAssignmentTest, AFewWallsMakeNoDirection) {

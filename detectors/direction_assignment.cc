@@ -35,10 +35,12 @@ class Assigner {
  public:
   Assigner(DirectionNetwork network, const std::vector<DirectionWall>& walls,
            std::vector<SharedDirection> directions,
-           const DirectionAssignmentOptions& options)
+           const DirectionAssignmentOptions& options,
+           const std::function<bool()>& stop)
       : network_(std::move(network)),
         walls_(walls),
         options_(options),
+        stop_(stop),
         num_given_(directions.size()) {
     result_.direction_of.assign(walls.size(), -1);
     result_.innovations.resize(walls.size());
@@ -57,6 +59,7 @@ class Assigner {
 
   DirectionAssignment Run() {
     for (int round = 0; round < kMaxRounds; ++round) {
+      if (stop_ && stop_()) break;
       network_.Solve();
       Predict();
       if (TieMostCertain()) continue;
@@ -629,6 +632,7 @@ class Assigner {
   DirectionNetwork network_;
   const std::vector<DirectionWall>& walls_;
   const DirectionAssignmentOptions& options_;
+  const std::function<bool()>& stop_;
   std::size_t num_given_;
   DirectionAssignment result_;
   // By direction: its node, and its family, which it shares with the one at a
@@ -652,11 +656,13 @@ class Assigner {
 
 }  // namespace
 
-DirectionAssignment AssignDirections(
-    DirectionNetwork network, const std::vector<DirectionWall>& walls,
-    std::vector<SharedDirection> directions,
-    const DirectionAssignmentOptions& options) {
-  return Assigner(std::move(network), walls, std::move(directions), options)
+DirectionAssignment AssignDirections(DirectionNetwork network,
+                                     const std::vector<DirectionWall>& walls,
+                                     std::vector<SharedDirection> directions,
+                                     const DirectionAssignmentOptions& options,
+                                     const std::function<bool()>& stop) {
+  return Assigner(std::move(network), walls, std::move(directions), options,
+                  stop)
       .Run();
 }
 

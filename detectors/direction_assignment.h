@@ -5,6 +5,7 @@
 #include <plumbline/factors/angle.h>
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 namespace plumbline {
@@ -110,11 +111,13 @@ struct DirectionAssignment {
 ///
 /// Without a given direction all walls are such as may found one.
 ///
-/// `network` holds the measurements.
-DirectionAssignment AssignDirections(DirectionNetwork network,
-                                     const std::vector<DirectionWall>& walls,
-                                     std::vector<SharedDirection> directions,
-                                     const DirectionAssignmentOptions& options);
+/// `network` holds the measurements. `stop` (may be null) is asked now and
+/// then; once it has returned true the assignment is unfinished.
+DirectionAssignment AssignDirections(
+    DirectionNetwork network, const std::vector<DirectionWall>& walls,
+    std::vector<SharedDirection> directions,
+    const DirectionAssignmentOptions& options,
+    const std::function<bool()>& stop = nullptr);
 
 }  // namespace plumbline
 

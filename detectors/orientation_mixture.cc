@@ -478,7 +478,8 @@ Transaction OrientationMixture::Detect(const Graph& graph,
       DirectionAssignmentOptions assignment = options_.assignment;
       assignment.sigma = options_.sigma;
       assignment_ = AssignDirections(std::move(judged.network), judged.walls,
-                                     {}, assignment);
+                                     {}, assignment, scope.stop);
+      if (scope.ShouldStop()) return {};
       judged_constraints_ = std::move(judged.constraints);
       judged_ids_ = judged.ids;
     }

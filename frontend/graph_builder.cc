@@ -1,4 +1,5 @@
 #include <plumbline/core/error.h>
+#include <plumbline/frontend/frontend_state.h>
 #include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/relocalization.h>
 
@@ -120,6 +121,19 @@ KeyScanRecord GraphBuilder::BeginScan(
     robot_.Cut(link_radius, distance);
   }
   return record;
+}
+
+void GraphBuilder::WriteState(StateWriter* state) const {
+  robot_.WriteState(state);
+  std::vector<KeyScanRecord> records = records_;
+  std::int64_t num_matches = num_matches_;
+  std::int64_t num_created = num_created_;
+  ExchangeAll(*state, records, num_matches, num_created);
+}
+
+void GraphBuilder::ReadState(StateReader* state) {
+  robot_.ReadState(state);
+  ExchangeAll(*state, records_, num_matches_, num_created_);
 }
 
 }  // namespace plumbline

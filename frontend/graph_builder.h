@@ -93,6 +93,11 @@ class GraphBuilder {
   /// Takes the robot's pose back from the graph after a solve.
   void ReadRobot() { robot_.Read(); }
 
+  /// What it knows between two key scans, for another one of the same kind and
+  /// options with a graph that is as this one's.
+  virtual void WriteState(StateWriter* state) const;
+  virtual void ReadState(StateReader* state);
+
   /// The robot's pose, map frame.
   const Pose2& robot() const { return robot_.pose(); }
   /// The robot's feature in the graph; kNoId before the first WriteRobot.

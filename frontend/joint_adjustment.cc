@@ -2,6 +2,7 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/factors/information.h>
+#include <plumbline/frontend/frontend_state.h>
 #include <plumbline/frontend/joint_adjustment.h>
 
 #include <Eigen/Eigenvalues>
@@ -170,12 +171,13 @@ Arrival ArrivalAt(const std::vector<KeyScanRecord>& records,
 
 }  // namespace
 
-JointAdjustment::JointAdjustment(
-    Graph* graph, SolverSession* session, const Registry& registry,
-    const std::vector<Scan>& scans, const std::vector<RefinedScan>& refined,
-    const std::vector<KeyScanRecord>& records,
-    const std::vector<Pose2>& key_poses, FeatureId robot,
-    const JointAdjustmentOptions& options, std::function<bool()> stop)
+JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
+                                 const Registry& registry,
+                                 const std::vector<Scan>& scans,
+                                 const std::vector<RefinedScan>& refined,
+                                 const std::vector<KeyScanRecord>& records,
+                                 const JointAdjustmentOptions& options,
+                                 std::function<bool()> stop)
     : graph_(graph),
       session_(session),
       registry_(registry),
@@ -187,23 +189,62 @@ JointAdjustment::JointAdjustment(
         "place_stride is " + std::to_string(options_.place_stride),
         "1 or more");
   }
+  options_.relations.num_threads = options_.num_threads;
+  options_.votes.num_threads = options_.num_threads;
+  begins_ = PlaceBegins(records_, options_.place_stride);
+  places_ = GatherPlaces(scans, refined, records_, begins_, options_);
+  for (std::size_t p = 0; p < places_.size(); ++p) {
+    const KeyScanRecord& record = records_[begins_[p]];
+    places_[p].follows_previous = record.from < 0 && !record.is_loose;
+    if (p > 0) {
+      places_[p].since_previous = ArrivalAt(records_, begins_, p).motion.mean;
+    }
+  }
+  finder_ = std::make_unique<ScanMatchFinder>(places_, options_.relations);
+}
 
+JointAdjustment::JointAdjustment(
+    Graph* graph, SolverSession* session, const Registry& registry,
+    const std::vector<Scan>& scans, const std::vector<RefinedScan>& refined,
+    const std::vector<KeyScanRecord>& records, StateReader* state,
+    const JointAdjustmentOptions& options, std::function<bool()> stop)
+    : JointAdjustment(graph, session, registry, scans, refined, records,
+                      options, std::move(stop)) {
+  finder_->ReadState(state);
+  ExchangeState(*state);
+  if (poses_.size() != places_.size()) {
+    throw PLUMBLINE_ERROR(
+        "the state is of " + std::to_string(poses_.size()) + " places",
+        std::to_string(places_.size()));
+  }
+}
+
+void JointAdjustment::WriteState(StateWriter* state) {
+  finder_->WriteState(state);
+  ExchangeState(*state);
+}
+
+template <typename Archive>
+void JointAdjustment::ExchangeState(Archive& archive) {
+  ExchangeAll(archive, poses_, relations_, relation_constraints_, motions_,
+              motion_factor_, relation_factor_, vote_factor_, votes_);
+}
+
+JointAdjustment::JointAdjustment(
+    Graph* graph, SolverSession* session, const Registry& registry,
+    const std::vector<Scan>& scans, const std::vector<RefinedScan>& refined,
+    const std::vector<KeyScanRecord>& records,
+    const std::vector<Pose2>& key_poses, FeatureId robot,
+    const JointAdjustmentOptions& options, std::function<bool()> stop)
+    : JointAdjustment(graph, session, registry, scans, refined, records,
+                      options, std::move(stop)) {
   if (records.size() != key_poses.size()) {
     throw PLUMBLINE_ERROR(
         std::to_string(key_poses.size()) + " poses",
         "one for each of " + std::to_string(records.size()) + " key scans");
   }
-  options_.relations.num_threads = options_.num_threads;
-  options_.votes.num_threads = options_.num_threads;
-  begins_ = PlaceBegins(records_, options_.place_stride);
-  places_ = GatherPlaces(scans, refined, records_, begins_, options_);
   std::vector<Pose2> poses;
   for (const std::size_t k : begins_) poses.push_back(key_poses[k]);
-  for (std::size_t p = 0; p < places_.size(); ++p) {
-    const KeyScanRecord& record = records_[begins_[p]];
-    places_[p].follows_previous = record.from < 0 && !record.is_loose;
-  }
-  finder_ = std::make_unique<ScanMatchFinder>(places_, options_.relations);
 
   Transaction transaction;
   std::vector<FeatureId> provisional;
@@ -222,7 +263,6 @@ JointAdjustment::JointAdjustment(
   }
   for (std::size_t p = 1; p < poses.size(); ++p) {
     const auto [before, motion] = ArrivalAt(records_, begins_, p);
-    places_[p].since_previous = motion.mean;
     const Eigen::Matrix3d information = motion.covariance.inverse();
     transaction.AddConstraint(MakeMeasurement(
         pose_pose, {provisional[before], provisional[p]}, motion.mean,
@@ -395,6 +435,7 @@ void JointAdjustment::EstimateVariances() {
     graph_->UpdateConstraint(id, expected, information);
   }
   vote_factor_ = vote_factor;
+  const SolveStop solve_stop(session_, stop_);
   for (const auto& [id, information] : motions_) {
     const Eigen::VectorXd expected = graph_->GetConstraint(id).expected;
     graph_->UpdateConstraint(id, expected, information / motion_factor_);

@@ -4,6 +4,7 @@
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/session.h>
+#include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/odometry_refinement.h>
@@ -86,6 +87,19 @@ class JointAdjustment {
                   const JointAdjustmentOptions& options,
                   std::function<bool()> stop = nullptr);
 
+  /// Goes on with what WriteState of another one wrote, made with the same
+  /// scans, records and options, on a graph that is as that one's was.
+  JointAdjustment(Graph* graph, SolverSession* session,
+                  const Registry& registry, const std::vector<Scan>& scans,
+                  const std::vector<RefinedScan>& refined,
+                  const std::vector<KeyScanRecord>& records, StateReader* state,
+                  const JointAdjustmentOptions& options,
+                  std::function<bool()> stop = nullptr);
+  void WriteState(StateWriter* state);
+
+  /// Solves with another session on the same graph from now on.
+  void SetSession(SolverSession* session) { session_ = session; }
+
   /// Matches all scans anew at the poses as they are now: once they are
   /// adjusted they are better than the odometry that placed the scans of one
   /// submap until then.
@@ -132,6 +146,15 @@ class JointAdjustment {
   }
 
  private:
+  // Without places in the graph.
+  JointAdjustment(Graph* graph, SolverSession* session,
+                  const Registry& registry, const std::vector<Scan>& scans,
+                  const std::vector<RefinedScan>& refined,
+                  const std::vector<KeyScanRecord>& records,
+                  const JointAdjustmentOptions& options,
+                  std::function<bool()> stop);
+  template <typename Archive>
+  void ExchangeState(Archive& archive);
   std::vector<Pose2> PlacePoses() const;
   // Binds every wall that gets votes to the place that gave it most; returns
   // these places by wall.

@@ -14,6 +14,9 @@ namespace {
 // was lost the trajectory may jump.
 constexpr double kLongestStep = 2.0;
 
+// Between two times that `stop` is asked.
+constexpr std::size_t kScansAtOnce = 64;
+
 // Key scans by the cell of a grid that they were made in.
 class PlaceGrid {
  public:
@@ -70,7 +73,8 @@ Verdict Judge(const ScanAgreement& agreement, const MapCheckOptions& options) {
 
 std::vector<MapContradiction> FindContradictions(
     const std::vector<Scan>& scans, const std::vector<int>& keys,
-    const std::vector<Pose2>& poses, const MapCheckOptions& options) {
+    const std::vector<Pose2>& poses, const MapCheckOptions& options,
+    const std::function<bool()>& stop) {
   if (keys.size() != poses.size()) {
     throw PLUMBLINE_ERROR(
         std::to_string(poses.size()) + " poses",
@@ -91,7 +95,7 @@ std::vector<MapContradiction> FindContradictions(
   }
   const PlaceGrid grid(poses, options.radius);
   std::vector<Verdict> verdicts(looked_at.size(), Verdict::kUnknown);
-  ParallelFor(looked_at.size(), options.num_threads, [&](std::size_t i) {
+  const auto judge = [&](std::size_t i) {
     const std::size_t k = looked_at[i];
     std::vector<std::pair<double, std::size_t>> others;
     grid.Around(poses[k].head<2>(), [&](std::size_t j) {
@@ -126,7 +130,12 @@ std::vector<MapContradiction> FindContradictions(
     verdicts[i] =
         Judge(matcher.Compare(points, poses[k], scan.laser_offset.head<2>()),
               options);
-  });
+  };
+  for (std::size_t begin = 0; begin < looked_at.size(); begin += kScansAtOnce) {
+    if (stop && stop()) return {};
+    ParallelFor(std::min(kScansAtOnce, looked_at.size() - begin),
+                options.num_threads, [&](std::size_t i) { judge(begin + i); });
+  }
 
   std::vector<MapContradiction> found;
   std::size_t i = 0;

@@ -6,6 +6,7 @@
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/scan_points.h>
 
+#include <functional>
 #include <vector>
 
 namespace plumbline {
@@ -46,11 +47,13 @@ struct MapContradiction {
 /// The parts of a trajectory whose scans do not agree with those of other
 /// visits about what is solid and what is free (core/method.md, section 7), in
 /// the order of scans. `keys`: indices into `scans`, ascending; `poses`: of the
-/// robot at these, map frame. Throws Error when their numbers differ. Cost:
-/// linear in the way.
+/// robot at these, map frame. `stop` (may be null) is asked now and then; once
+/// it has returned true the result is empty. Throws Error when numbers differ.
+/// Cost: linear in the way.
 std::vector<MapContradiction> FindContradictions(
     const std::vector<Scan>& scans, const std::vector<int>& keys,
-    const std::vector<Pose2>& poses, const MapCheckOptions& options);
+    const std::vector<Pose2>& poses, const MapCheckOptions& options,
+    const std::function<bool()>& stop = nullptr);
 
 }  // namespace plumbline
 

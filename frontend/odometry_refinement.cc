@@ -1,3 +1,5 @@
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/frontend_state.h>
 #include <plumbline/frontend/odometry_refinement.h>
 
 #include <Eigen/Eigenvalues>
@@ -800,6 +802,25 @@ void OdometryRefiner::Finish() {
   if (open_ != nullptr) Tie(true);
   if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
   guessed_ = -1;
+}
+
+template <typename StateArchive>
+void OdometryRefiner::ExchangeState(StateArchive& archive) {
+  ExchangeAll(archive, track_, points_, started_, count_, last_odometry_,
+              last_time_, usual_step_, archive_, wide_searches_, refusals_,
+              losses_, loose_, guessed_);
+}
+
+void OdometryRefiner::WriteState(StateWriter* state) {
+  if (!IsSettled()) {
+    throw PLUMBLINE_ERROR("scans are not settled", "none of them open");
+  }
+  ExchangeState(*state);
+}
+
+void OdometryRefiner::ReadState(StateReader* state) {
+  ExchangeState(*state);
+  if (started_) RebuildReference(&track_);
 }
 
 }  // namespace plumbline

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_FRONTEND_ODOMETRY_REFINEMENT_H_
 #define PLUMBLINE_FRONTEND_ODOMETRY_REFINEMENT_H_
 
+#include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/scan_matcher.h>
@@ -225,6 +226,14 @@ class OdometryRefiner {
   /// Settles what is open: no scan follows.
   void Finish();
 
+  /// Whether no tie is open and all that is settled was taken out.
+  bool IsSettled() const { return open_ == nullptr && settled_.empty(); }
+
+  /// What it knows between two scans while IsSettled, for another one with the
+  /// same options.
+  void WriteState(StateWriter* state);
+  void ReadState(StateReader* state);
+
   /// The returns of the last scan that was processed, in the robot's frame.
   const std::vector<ScanPoint>& points() const { return points_; }
 
@@ -249,6 +258,12 @@ class OdometryRefiner {
     std::vector<ScanPoint> points;
     // Position of the laser in the robot's frame, m.
     Eigen::Vector2d laser;
+
+    template <typename Archive>
+    friend void Exchange(Archive& archive, KeyScan& key) {
+      auto& [scan, pose, points, laser] = key;
+      ExchangeAll(archive, scan, pose, points, laser);
+    }
   };
   // Scans that are matched with each other.
   struct Track {
@@ -266,6 +281,15 @@ class OdometryRefiner {
     // Returns of the last scan.
     std::vector<ScanPoint> last_points;
     explicit Track(const ScanMatcherOptions& options) : matcher(options) {}
+
+    // The matcher is made anew from the keys.
+    template <typename Archive>
+    friend void Exchange(Archive& archive, Track& track) {
+      auto& [keys, matcher, last_pose, since_key, way, turn, refused, moving,
+             after_gap, last_points] = track;
+      ExchangeAll(archive, keys, last_pose, since_key, way, turn, refused,
+                  moving, after_gap, last_points);
+    }
   };
   // A track whose tie to the one before is not known.
   struct OpenTie {
@@ -290,6 +314,8 @@ class OdometryRefiner {
   struct Outcome;
   struct Agreement;
 
+  template <typename Archive>
+  void ExchangeState(Archive& archive);
   void RebuildReference(Track* track);
   Outcome Match(const Scan& scan, const Pose2& motion);
   // Returns of the last scan that do not lie on clutter; none when there is
@@ -352,6 +378,12 @@ class OdometryRefiner {
     Eigen::Vector2d laser;
     // Position and normal, robot's frame.
     std::vector<Eigen::Vector4f> points;
+
+    template <typename Archive>
+    friend void Exchange(Archive& archive, ArchivedKey& key) {
+      auto& [scan, piece, pose, laser, points] = key;
+      ExchangeAll(archive, scan, piece, pose, laser, points);
+    }
   };
   std::vector<ArchivedKey> archive_;
   int wide_searches_ = 0;

@@ -410,4 +410,15 @@ void PointMapBuilder::WriteRobot() {
   });
 }
 
+void PointMapBuilder::WriteState(StateWriter* state) const {
+  GraphBuilder::WriteState(state);
+  std::map<FeatureId, double> directions = directions_;
+  Exchange(*state, directions);
+}
+
+void PointMapBuilder::ReadState(StateReader* state) {
+  GraphBuilder::ReadState(state);
+  Exchange(*state, directions_);
+}
+
 }  // namespace plumbline

@@ -77,6 +77,9 @@ class PointMapBuilder final : public GraphBuilder {
 
   void WriteRobot() override;
 
+  void WriteState(StateWriter* state) const override;
+  void ReadState(StateReader* state) override;
+
  private:
   // A point that this scan makes.
   struct NewPoint {

@@ -138,4 +138,13 @@ void RobotLinks::Read() {
                 NormalizeAngle(feature.parameters[2]));
 }
 
+void RobotLinks::WriteState(StateWriter* state) const {
+  RobotLinks copy = *this;
+  ExchangeAll(*state, copy.pose_, copy.id_, copy.links_);
+}
+
+void RobotLinks::ReadState(StateReader* state) {
+  ExchangeAll(*state, pose_, id_, links_);
+}
+
 }  // namespace plumbline

@@ -3,6 +3,7 @@
 
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
 
 #include <Eigen/Core>
@@ -77,6 +78,10 @@ class RobotLinks {
   /// Takes the pose back from the graph after a solve; no effect before the
   /// first Write.
   void Read();
+
+  /// Pose, id and links, for one with a graph that is as this one's.
+  void WriteState(StateWriter* state) const;
+  void ReadState(StateReader* state);
 
  private:
   Graph* graph_;

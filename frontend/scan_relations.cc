@@ -1,5 +1,6 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
+#include <plumbline/frontend/frontend_state.h>
 #include <plumbline/frontend/scan_relations.h>
 
 #include <algorithm>
@@ -145,6 +146,22 @@ ScanMatchFinder::ScanMatchFinder(const std::vector<Place>& places,
 void ScanMatchFinder::TrustPoses() {
   trusts_poses_ = true;
   for (std::map<int, Attempt>& attempts : attempts_) attempts.clear();
+}
+
+void ScanMatchFinder::WriteState(StateWriter* state) const {
+  bool trusts_poses = trusts_poses_;
+  std::vector<std::map<int, Attempt>> attempts = attempts_;
+  ExchangeAll(*state, trusts_poses, attempts);
+}
+
+void ScanMatchFinder::ReadState(StateReader* state) {
+  const std::size_t submaps = attempts_.size();
+  ExchangeAll(*state, trusts_poses_, attempts_);
+  if (attempts_.size() != submaps) {
+    throw PLUMBLINE_ERROR(
+        "the state is of " + std::to_string(attempts_.size()) + " submaps",
+        std::to_string(submaps));
+  }
 }
 
 std::vector<ScanRelation> ScanMatchFinder::Find(

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_FRONTEND_SCAN_RELATIONS_H_
 #define PLUMBLINE_FRONTEND_SCAN_RELATIONS_H_
 
+#include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/scan_points.h>
@@ -95,6 +96,10 @@ class ScanMatchFinder {
   /// with a bent submap keeps it bent.
   void TrustPoses();
 
+  /// What it remembers, for another finder with the same places and options.
+  void WriteState(StateWriter* state) const;
+  void ReadState(StateReader* state);
+
   /// Pairs that the last call matched or tried to.
   std::int64_t num_tried() const { return num_tried_; }
 
@@ -105,6 +110,12 @@ class ScanMatchFinder {
     Pose2 pose = Pose2::Zero();
     bool is_match = false;
     ScanRelation relation;
+
+    template <typename Archive>
+    friend void Exchange(Archive& archive, Attempt& attempt) {
+      auto& [pose, is_match, relation] = attempt;
+      ExchangeAll(archive, pose, is_match, relation);
+    }
   };
 
   const std::vector<Place>& places_;

@@ -64,6 +64,14 @@ struct LogSolver::Context {
   std::vector<Pose2> keys;
   // Features of the places of the second map.
   std::vector<FeatureId> places;
+  // While the second map is made: what makes it, and the first one.
+  std::unique_ptr<JointAdjustment> adjustment;
+  std::string first_map;
+  std::vector<Pose2> first_trajectory;
+  double first_length = 0.0;
+
+  Context(const std::vector<Scan>& all_scans, const RunControl& run_control)
+      : scans(all_scans), control(run_control) {}
 
   void Begin(const char* step) const {
     if (control.step) control.step(step);
@@ -85,10 +93,9 @@ LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
       refiner_(options_.odometry) {
   session_ = std::make_unique<SolverSession>(graph_.get(), registry_,
                                              options_.session);
-  em_ = std::make_unique<EmOrchestrator>(
-      graph_.get(), session_.get(), registry_,
-      options_.structure ? MakeDetectors(HierarchyOfOptions()) : Hierarchy(),
-      options_.em);
+  em_ =
+      std::make_unique<EmOrchestrator>(graph_.get(), session_.get(), registry_,
+                                       StructureDetectors(), options_.em);
   builder_ = profile_.make_builder(options_, graph_.get(), registry_);
 }
 
@@ -98,6 +105,10 @@ HierarchySpec LogSolver::HierarchyOfOptions() const {
   if (!options_.hierarchy.empty()) return options_.hierarchy;
   return DefaultHierarchy({&registry_.GetFeature(profile_.feature_type)},
                           registry_);
+}
+
+Hierarchy LogSolver::StructureDetectors() const {
+  return options_.structure ? MakeDetectors(HierarchyOfOptions()) : Hierarchy();
 }
 
 Hierarchy LogSolver::MakeDetectors(const HierarchySpec& spec) const {
@@ -153,9 +164,39 @@ void LogSolver::TakeScan(const std::vector<Scan>& scans) {
     guess.since_key.mean =
         Between(refined_[builder_->records().back().scan].pose, guess.pose);
   }
+  if (options_.scans_per_stage > 0 &&
+      refined_.size() >=
+          stage_begin_ + static_cast<std::size_t>(options_.scans_per_stage) &&
+      num_settled_ == refined_.size() && refiner_.IsSettled()) {
+    stage_begin_ = refined_.size();
+    Renew(StructureDetectors());
+  }
   const double seconds = watch.Seconds();
   scan_seconds_.push_back(static_cast<float>(seconds));
   frontend_seconds_ += seconds - em_seconds;
+}
+
+void LogSolver::TakeScans(const std::vector<Scan>& scans,
+                          const RunControl& control) {
+  refined_.reserve(scans.size());
+  scan_seconds_.reserve(scans.size());
+  while (refined_.size() < scans.size()) {
+    if (control.stop && control.stop()) break;
+    TakeScan(scans);
+    if (control.progress) control.progress(refined_.size(), scans.size());
+    if (stage_begin_ == refined_.size() && control.checkpoint) {
+      control.checkpoint([&] {
+        StateWriter writer;
+        Stage stage = Stage::kTakeScans;
+        Context context(scans, control);
+        ExchangeState(writer, &stage, &context);
+        ExchangeScansState(writer);
+        builder_->WriteState(&writer);
+        refiner_.WriteState(&writer);
+        return writer.bytes();
+      });
+    }
+  }
 }
 
 void LogSolver::RunEmNearRobot() {
@@ -195,13 +236,7 @@ LogSolverResult LogSolver::Run(const Log& log, const RunControl& control) {
     throw PLUMBLINE_ERROR("scans were added before Run",
                           "Finish, or a new solver");
   }
-  refined_.reserve(log.scans.size());
-  scan_seconds_.reserve(log.scans.size());
-  while (refined_.size() < log.scans.size()) {
-    if (control.stop && control.stop()) break;
-    TakeScan(log.scans);
-    if (control.progress) control.progress(refined_.size(), log.scans.size());
-  }
+  TakeScans(log.scans, control);
   return FinishWith(log.scans, control);
 }
 
@@ -216,12 +251,26 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
   if (!refined_.empty()) {
     throw PLUMBLINE_ERROR("scans were added before Resume", "a new solver");
   }
-  is_finished_ = true;
-  builder_.reset();
-  Context context{log.scans, control, {}, {}, {}};
-  Stage stage = Stage::kFindStructure;
+  Context context(log.scans, control);
+  Stage stage = Stage::kTakeScans;
   StateReader reader(state);
   ExchangeState(reader, &stage, &context);
+  if (stage == Stage::kTakeScans) {
+    ExchangeScansState(reader);
+    if (refined_.size() > log.scans.size()) {
+      throw PLUMBLINE_ERROR(
+          "the state is of " + std::to_string(refined_.size()) + " scans",
+          std::to_string(log.scans.size()) + " at most");
+    }
+    builder_->ReadState(&reader);
+    refiner_.ReadState(&reader);
+    Renew(StructureDetectors());
+    if (control.progress) control.progress(refined_.size(), log.scans.size());
+    TakeScans(log.scans, control);
+    return FinishWith(log.scans, control);
+  }
+  is_finished_ = true;
+  builder_.reset();
   if (context.result.refined.size() != log.scans.size()) {
     throw PLUMBLINE_ERROR("the state is of a log with " +
                               std::to_string(context.result.refined.size()) +
@@ -229,6 +278,12 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
                           std::to_string(log.scans.size()));
   }
   Renew();
+  if (stage == Stage::kMakeWalls || stage == Stage::kAdjustWalls) {
+    context.adjustment = std::make_unique<JointAdjustment>(
+        graph_.get(), session_.get(), registry_, log.scans,
+        context.result.refined, context.result.records, &reader,
+        options_.adjustment, control.stop);
+  }
   if (control.progress) control.progress(log.scans.size(), log.scans.size());
   return FinishFrom(stage, &context);
 }
@@ -236,7 +291,7 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
 LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
                                       const RunControl& control) {
   is_finished_ = true;
-  Context context{scans, control, {}, {}, {}};
+  Context context(scans, control);
   LogSolverResult& result = context.result;
   result.interrupted = refined_.size() < scans.size();
   {
@@ -253,6 +308,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
   result.wide_searches = refiner_.wide_searches();
   result.refused_matches = refiner_.refusals();
   result.lost_tracks = refiner_.losses();
+  result.loose = refiner_.loose();
   result.feature_matches = builder_->num_matches();
   result.features_created = builder_->num_created();
   result.records = builder_->records();
@@ -274,6 +330,17 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Context* context) {
   }
   if (stage == Stage::kAdjustPoses) {
     AdjustPoses(context);
+    BeginStage(stage = context->adjustment == nullptr
+                           ? Stage::kFindStructureAgain
+                           : Stage::kMakeWalls,
+               context);
+  }
+  if (stage == Stage::kMakeWalls) {
+    MakeWalls(context);
+    BeginStage(stage = Stage::kAdjustWalls, context);
+  }
+  if (stage == Stage::kAdjustWalls) {
+    AdjustWalls(context);
     BeginStage(stage = Stage::kFindStructureAgain, context);
   }
   if (stage == Stage::kFindStructureAgain) {
@@ -293,10 +360,16 @@ void LogSolver::BeginStage(Stage stage, Context* context) {
   // What was cut short is for no other run to go on with.
   if (context->IsStopped()) return;
   Renew();
+  if (context->adjustment != nullptr) {
+    context->adjustment->SetSession(session_.get());
+  }
   if (!context->control.checkpoint) return;
   context->control.checkpoint([&] {
     StateWriter writer;
     ExchangeState(writer, &stage, context);
+    if (context->adjustment != nullptr) {
+      context->adjustment->WriteState(&writer);
+    }
     return writer.bytes();
   });
 }
@@ -308,20 +381,28 @@ void LogSolver::DropEm() {
 }
 
 // The session and EM know nothing but what is in the graph.
-void LogSolver::Renew() {
+void LogSolver::Renew(Hierarchy detectors) {
   DropEm();
   session_ = std::make_unique<SolverSession>(graph_.get(), registry_,
                                              options_.session);
-  em_ = std::make_unique<EmOrchestrator>(graph_.get(), session_.get(),
-                                         registry_, Hierarchy(), options_.em);
+  em_ =
+      std::make_unique<EmOrchestrator>(graph_.get(), session_.get(), registry_,
+                                       std::move(detectors), options_.em);
 }
 
 template <typename Archive>
 void LogSolver::ExchangeState(Archive& archive, Stage* stage,
                               Context* context) {
   ExchangeAll(archive, *stage, context->result, context->keys, context->places,
-              em_before_, trace_);
+              context->first_map, context->first_trajectory,
+              context->first_length, em_before_, trace_);
   Exchange(archive, registry_, *graph_);
+}
+
+template <typename Archive>
+void LogSolver::ExchangeScansState(Archive& archive) {
+  ExchangeAll(archive, refined_, num_settled_, stage_begin_, scan_seconds_,
+              frontend_seconds_, scans_since_em_, features_at_last_global_);
 }
 
 void LogSolver::RunEm(Context* context) {
@@ -386,50 +467,70 @@ void LogSolver::AdjustPoses(Context* context) {
   context->Begin("adjustment of poses");
   StateWriter first_map;
   Exchange(first_map, registry_, *graph_);
-  const std::vector<Pose2> first_trajectory = result.trajectory;
-  const double first_length = LengthOfWalls(*graph_);
-  MakeSecondMap(context);
-  const bool is_stopped = context->IsStopped();
-  result.second_map_refused =
-      !is_stopped && LengthOfWalls(*graph_) < kLeastSecondShare * first_length;
-  if (!is_stopped && !result.second_map_refused) return;
+  context->first_map = first_map.bytes();
+  context->first_trajectory = result.trajectory;
+  context->first_length = LengthOfWalls(*graph_);
+  ClearGraph();
+  context->adjustment = std::make_unique<JointAdjustment>(
+      graph_.get(), session_.get(), registry_, context->scans, result.refined,
+      result.records, context->keys, kNoId, options_.adjustment,
+      context->control.stop);
+  JointAdjustment& adjustment = *context->adjustment;
+  context->places = adjustment.places();
+  adjustment.Adjust();
+  if (!context->IsStopped()) {
+    adjustment.MatchAnew();
+    adjustment.Adjust();
+  }
+  if (context->IsStopped()) return ReturnToFirstMap(context);
+  adjustment.EstimateVariances();
+  TakeTrajectory(context);
+}
+
+void LogSolver::MakeWalls(Context* context) {
   // Half of a second map is worth less than the whole of the first.
-  StateReader reader(first_map.bytes());
+  if (context->IsStopped()) return ReturnToFirstMap(context);
+  const ScopedTimer timer(&context->result.adjustment_seconds);
+  context->Begin("walls from adjusted poses");
+  context->adjustment->AddWalls(FindGlimpsedWalls(
+      *graph_, registry_, context->scans, context->result.trajectory,
+      options_.completion, context->control.stop));
+}
+
+void LogSolver::AdjustWalls(Context* context) {
+  if (context->adjustment == nullptr) return;
+  if (context->IsStopped()) return ReturnToFirstMap(context);
+  LogSolverResult& result = context->result;
+  const ScopedTimer timer(&result.adjustment_seconds);
+  context->Begin("joint adjustment of poses and walls");
+  JointAdjustment& adjustment = *context->adjustment;
+  adjustment.Adjust();
+  if (!context->IsStopped()) adjustment.EstimateVariances();
+  if (context->IsStopped()) return ReturnToFirstMap(context);
+  TakeTrajectory(context);
+  result.scan_relations = adjustment.num_relations();
+  result.wall_votes = adjustment.num_votes();
+  result.second_map_refused =
+      LengthOfWalls(*graph_) < kLeastSecondShare * context->first_length;
+  if (result.second_map_refused) return ReturnToFirstMap(context);
+  context->adjustment.reset();
+  context->first_map.clear();
+  context->first_trajectory.clear();
+}
+
+void LogSolver::ReturnToFirstMap(Context* context) {
+  LogSolverResult& result = context->result;
+  context->adjustment.reset();
+  StateReader reader(context->first_map);
   DropEm();
   graph_ = std::make_unique<Graph>();
   Exchange(reader, registry_, *graph_);
   Renew();
   context->places.clear();
-  result.trajectory = first_trajectory;
+  result.trajectory = std::move(context->first_trajectory);
+  context->first_trajectory.clear();
+  context->first_map.clear();
   result.scan_relations = result.wall_votes = 0;
-}
-
-void LogSolver::MakeSecondMap(Context* context) {
-  LogSolverResult& result = context->result;
-  ClearGraph();
-  JointAdjustment adjustment(graph_.get(), session_.get(), registry_,
-                             context->scans, result.refined, result.records,
-                             context->keys, kNoId, options_.adjustment,
-                             context->control.stop);
-  context->places = adjustment.places();
-  adjustment.Adjust();
-  if (context->IsStopped()) return;
-  adjustment.MatchAnew();
-  adjustment.Adjust();
-  if (context->IsStopped()) return;
-  adjustment.EstimateVariances();
-  TakeTrajectory(context);
-  context->Begin("walls from adjusted poses");
-  adjustment.AddWalls(FindGlimpsedWalls(*graph_, registry_, context->scans,
-                                        result.trajectory, options_.completion,
-                                        context->control.stop));
-  if (context->IsStopped()) return;
-  context->Begin("joint adjustment of poses and walls");
-  adjustment.Adjust();
-  if (!context->IsStopped()) adjustment.EstimateVariances();
-  TakeTrajectory(context);
-  result.scan_relations = adjustment.num_relations();
-  result.wall_votes = adjustment.num_votes();
 }
 
 void LogSolver::FindStructureAgain(Context* context) {
@@ -471,7 +572,8 @@ void LogSolver::CheckMap(Context* context) const {
     poses.push_back(result.trajectory[static_cast<std::size_t>(record.scan)]);
   }
   for (const MapContradiction& part :
-       FindContradictions(context->scans, keys, poses, options_.check)) {
+       FindContradictions(context->scans, keys, poses, options_.check,
+                          [context] { return context->IsStopped(); })) {
     LooseTrack loose;
     loose.begin = part.begin;
     loose.end = part.end;

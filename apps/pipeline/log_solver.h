@@ -75,6 +75,10 @@ struct LogSolverOptions {
   /// visits, and report those that contradict it.
   bool check_map = true;
   MapCheckOptions check;
+  /// Scans after which a run can be gone on with before all are in: EM and the
+  /// minimizer start anew there, and what was broken may be proposed again. 0:
+  /// never.
+  int scans_per_stage = 20000;
   /// Scans between EM steps while replaying; 0: only at the end.
   int em_every = 20;
   /// Constraints from the robot that an EM step while replaying reaches.
@@ -148,9 +152,10 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
 /// minimizer and EM start anew in each stage, whether it was gone on with or
 /// not. So a stage depends on these bytes alone (RunControl::checkpoint), and
 /// Resume ends with the bytes of a run that was never interrupted. What is lost
-/// is the stage that was under way. The stages: taking the scans and finding
-/// their structure; closing loops and finding scans again; adjusting poses and
-/// making walls anew; finding structure in these; the end.
+/// is the stage that was under way. The stages: taking so many scans each;
+/// finding their structure; closing loops and finding scans again; adjusting
+/// poses; making walls anew; adjusting both; finding structure in these; the
+/// end.
 class LogSolver {
  public:
   /// The registry must outlive the solver and have the built-ins. Throws Error
@@ -188,11 +193,14 @@ class LogSolver {
   const std::vector<EmPhase>& trace() const { return trace_; }
 
  private:
-  // A stage once all scans are in, by what it does.
+  // A stage, by what it does.
   enum class Stage : int {
+    kTakeScans,
     kFindStructure,
     kCloseLoops,
     kAdjustPoses,
+    kMakeWalls,
+    kAdjustWalls,
     kFindStructureAgain,
     kEnd,
   };
@@ -202,6 +210,8 @@ class LogSolver {
   // A scan by itself: key scans enter the map, now and then with an EM step.
   // Takes the next of the scans.
   void TakeScan(const std::vector<Scan>& scans);
+  // Takes those that are left; stages end on the way.
+  void TakeScans(const std::vector<Scan>& scans, const RunControl& control);
   // Those whose place is settled go on into the map.
   void TakeSettled(const std::vector<Scan>& scans, double* em_seconds);
   void RunEmNearRobot();
@@ -214,8 +224,12 @@ class LogSolver {
   void CloseLoops(Context* context);
   void FindScansAgain(Context* context);
   void CompleteWalls(Context* context);
+  // The second map, in three stages.
   void AdjustPoses(Context* context);
-  void MakeSecondMap(Context* context);
+  void MakeWalls(Context* context);
+  void AdjustWalls(Context* context);
+  // The first map stands.
+  void ReturnToFirstMap(Context* context);
   void FindStructureAgain(Context* context);
   // Tells what hangs loosely, or contradicts the rest of the map.
   void CheckMap(Context* context) const;
@@ -223,9 +237,11 @@ class LogSolver {
   // Between stages: all that is left is in the state.
   void BeginStage(Stage stage, Context* context);
   void DropEm();
-  void Renew();
+  void Renew(Hierarchy detectors = Hierarchy());
   template <typename Archive>
   void ExchangeState(Archive& archive, Stage* stage, Context* context);
+  template <typename Archive>
+  void ExchangeScansState(Archive& archive);
   void TakeTrajectory(Context* context) const;
 
   void RunEm(Context* context);
@@ -239,6 +255,7 @@ class LogSolver {
   // Rows of the trace, counted on over all orchestrators.
   void TraceEm();
   HierarchySpec HierarchyOfOptions() const;
+  Hierarchy StructureDetectors() const;
   Hierarchy MakeDetectors(const HierarchySpec& spec) const;
   std::vector<Pose2> KeyPoses(const std::vector<KeyScanRecord>& records) const;
 
@@ -256,6 +273,8 @@ class LogSolver {
   // One per scan.
   std::vector<RefinedScan> refined_;
   std::size_t num_settled_ = 0;
+  // Of them, when the present stage began.
+  std::size_t stage_begin_ = 0;
   std::vector<float> scan_seconds_;
   double frontend_seconds_ = 0.0;
   // Since the last EM step near the robot.

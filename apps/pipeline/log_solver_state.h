@@ -4,65 +4,18 @@
 #include <plumbline/core/em.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/core/state_archive.h>
+#include <plumbline/frontend/frontend_state.h>
 #include <plumbline/pipeline/log_solver.h>
-#include <plumbline/pipeline/state_archive.h>
 
 #include <string>
 #include <utility>
 #include <vector>
 
 // What a LogSolver has between two stages, for a StateWriter or StateReader
-// (state_archive.h).
+// (core/state_archive.h).
 
 namespace plumbline {
-
-template <typename Archive>
-void Exchange(Archive& archive, UncertainPose2& pose) {
-  auto& [mean, covariance] = pose;
-  ExchangeAll(archive, mean, covariance);
-}
-
-template <typename Archive>
-void Exchange(Archive& archive, RefinedScan& scan) {
-  auto& [pose, since_key, since, is_key, odometry_only, tie] = scan;
-  ExchangeAll(archive, pose, since_key, since, is_key, odometry_only, tie);
-}
-
-template <typename Archive>
-void Exchange(Archive& archive, SegmentObservation& observation) {
-  auto& [pose, length, points, covariance] = observation;
-  ExchangeAll(archive, pose, length, points, covariance);
-}
-
-template <typename Archive>
-void Exchange(Archive& archive, PointObservation& observation) {
-  auto& [position, covariance, share] = observation;
-  ExchangeAll(archive, position, covariance, share);
-}
-
-template <typename Archive>
-void Exchange(Archive& archive, FeatureMatch& match) {
-  auto& [feature, observation] = match;
-  ExchangeAll(archive, feature, observation);
-}
-
-template <typename Archive>
-void Exchange(Archive& archive, PointMatch& match) {
-  auto& [feature, observation] = match;
-  ExchangeAll(archive, feature, observation);
-}
-
-template <typename Archive>
-void Exchange(Archive& archive, KeyScanRecord& record) {
-  auto& [scan, motion, from, is_loose, pose, matches, points] = record;
-  ExchangeAll(archive, scan, motion, from, is_loose, pose, matches, points);
-}
-
-template <typename Archive>
-void Exchange(Archive& archive, LooseTrack& track) {
-  auto& [begin, end, why, found] = track;
-  ExchangeAll(archive, begin, end, why, found);
-}
 
 template <typename Archive>
 void Exchange(Archive& archive, CostReport& cost) {

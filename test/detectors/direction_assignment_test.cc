@@ -215,6 +215,20 @@ TEST(DirectionAssignmentTest, AFewWallsMakeNoDirection) {
   EXPECT_GT(assignment.innovations[10].chi_square, 16.0);
 }
 
+TEST(DirectionAssignmentTest, EndsWhenItIsTold) {
+  constexpr int kCount = 40;
+  Row row = MakeRow(kCount, 1.0, 0.1, 1);
+  int asked = 0;
+  const DirectionAssignment assignment =
+      AssignDirections(std::move(row.network), row.walls, {}, {},
+                       [&asked] { return ++asked > 1; });
+  EXPECT_EQ(asked, 2);
+  // A round is too short for all of them.
+  EXPECT_GT(std::count(assignment.direction_of.begin(),
+                       assignment.direction_of.end(), -1),
+            0);
+}
+
 TEST(DirectionAssignmentTest, NothingToDo) {
   EXPECT_TRUE(
       AssignDirections(DirectionNetwork(), {}, {}, {}).direction_of.empty());

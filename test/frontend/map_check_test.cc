@@ -57,6 +57,16 @@ TEST(FindContradictionsTest, NoneInATrueMap) {
       FindContradictions(rounds.scans, rounds.keys, rounds.poses, {}).empty());
 }
 
+TEST(FindContradictionsTest, EndsWhenItIsTold) {
+  const Rounds rounds = TwoRounds();
+  int asked = 0;
+  EXPECT_TRUE(
+      FindContradictions(rounds.scans, rounds.keys, rounds.poses, {}, [&asked] {
+        return ++asked > 0;
+      }).empty());
+  EXPECT_EQ(asked, 1);
+}
+
 TEST(FindContradictionsTest, ARoundThatIsTurned) {
   Rounds rounds = TwoRounds();
   for (std::size_t k = static_cast<std::size_t>(rounds.second);

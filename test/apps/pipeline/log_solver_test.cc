@@ -48,11 +48,19 @@ class LogSolverTest : public ::testing::Test {
   Registry registry_;
 };
 
+LogSolverOptions Points() {
+  LogSolverOptions options;
+  options.features = RawFeatures::kPoints;
+  options.em.full_weight_test = true;
+  return options;
+}
+
 TEST_F(LogSolverTest, GoesOnFromEveryStateToTheSameBytes) {
   const Log log = Office(500);
   for (const Refinement refine : {Refinement::kFull, Refinement::kMap}) {
     LogSolverOptions options;
     options.refine = refine;
+    options.scans_per_stage = 200;
     std::vector<std::string> states;
     RunControl control;
     control.checkpoint = [&](const std::function<std::string()>& state) {
@@ -60,7 +68,9 @@ TEST_F(LogSolverTest, GoesOnFromEveryStateToTheSameBytes) {
     };
     LogSolver whole(registry_, options);
     const LogSolverResult expected = whole.Run(log, control);
-    ASSERT_EQ(states.size(), 4u);
+    // Two while scans are taken, four between the stages after them, and two
+    // more on the way to a second map.
+    ASSERT_EQ(states.size(), refine == Refinement::kFull ? 8u : 6u);
     // Whoever makes no states gets the same.
     LogSolver without(registry_, options);
     without.Run(log);
@@ -80,6 +90,45 @@ TEST_F(LogSolverTest, GoesOnFromEveryStateToTheSameBytes) {
       EXPECT_EQ(solver.trace().size(), whole.trace().size());
     }
   }
+}
+
+TEST_F(LogSolverTest, PointsGoOnFromEveryStateToTheSameBytes) {
+  const Log log = Office(300);
+  LogSolverOptions options = Points();
+  options.scans_per_stage = 100;
+  std::vector<std::string> states;
+  RunControl control;
+  control.checkpoint = [&](const std::function<std::string()>& state) {
+    states.push_back(state());
+  };
+  LogSolver whole(registry_, options);
+  const LogSolverResult expected = whole.Run(log, control);
+  ASSERT_EQ(states.size(), 7u);
+  for (const std::string& state : states) {
+    LogSolver solver(registry_, options);
+    const LogSolverResult result = solver.Resume(log, state);
+    EXPECT_EQ(Json(solver.graph()), Json(whole.graph()));
+    EXPECT_EQ(result.trajectory, expected.trajectory);
+  }
+}
+
+// What is seen after a gap fits nothing from before it: the result says so.
+TEST_F(LogSolverTest, WhatHangsLooselyIsReported) {
+  Log log = Office(200);
+  for (std::size_t i = 100; i < log.scans.size(); ++i) {
+    Scan& scan = log.scans[i];
+    scan.timestamp += 1000.0;
+    // As in a mirror.
+    std::reverse(scan.ranges.begin(), scan.ranges.end());
+    scan.odometry[1] = -scan.odometry[1] + 40.0;
+    scan.odometry[2] = -scan.odometry[2];
+  }
+  LogSolver solver(registry_, {});
+  const LogSolverResult result = solver.Run(log);
+  EXPECT_GE(result.lost_tracks, 1);
+  ASSERT_FALSE(result.loose.empty());
+  EXPECT_GE(result.loose.front().begin, 98);
+  EXPECT_FALSE(result.loose.front().why.empty());
 }
 
 TEST_F(LogSolverTest, AStateOfAnotherLogIsRefused) {
@@ -507,13 +556,6 @@ TEST_F(LogSolverTest, ScansWithoutAnyReturn) {
   for (std::size_t i = 0; i < 40; ++i) {
     EXPECT_LT((result.trajectory[i] - log.scans[i].odometry).norm(), 1e-6) << i;
   }
-}
-
-LogSolverOptions Points() {
-  LogSolverOptions options;
-  options.features = RawFeatures::kPoints;
-  options.em.full_weight_test = true;
-  return options;
 }
 
 TEST_F(LogSolverTest, PointsAsLevelZero) {

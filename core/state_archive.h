@@ -1,5 +1,5 @@
-#ifndef PLUMBLINE_PIPELINE_STATE_ARCHIVE_H_
-#define PLUMBLINE_PIPELINE_STATE_ARCHIVE_H_
+#ifndef PLUMBLINE_CORE_STATE_ARCHIVE_H_
+#define PLUMBLINE_CORE_STATE_ARCHIVE_H_
 
 #include <plumbline/core/error.h>
 
@@ -8,10 +8,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <deque>
 #include <map>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -86,15 +88,15 @@ void Exchange(Archive& archive, std::string& value) {
   archive.Bytes(value.data(), size);
 }
 
-template <typename Archive, int kRows, int kColumns>
-void Exchange(Archive& archive, Eigen::Matrix<double, kRows, kColumns>& value) {
+template <typename Archive, typename Scalar, int kRows, int kColumns>
+void Exchange(Archive& archive, Eigen::Matrix<Scalar, kRows, kColumns>& value) {
   std::int64_t rows = value.rows();
   std::int64_t columns = value.cols();
   if constexpr (kRows == Eigen::Dynamic) Exchange(archive, rows);
   if constexpr (kColumns == Eigen::Dynamic) Exchange(archive, columns);
   if constexpr (Archive::kReads) value.resize(rows, columns);
   archive.Bytes(value.data(),
-                static_cast<std::size_t>(value.size()) * sizeof(double));
+                static_cast<std::size_t>(value.size()) * sizeof(Scalar));
 }
 
 template <typename Archive, typename T, std::size_t kSize>
@@ -102,8 +104,12 @@ void Exchange(Archive& archive, std::array<T, kSize>& values) {
   for (T& value : values) Exchange(archive, value);
 }
 
+template <typename Archive, typename A, typename B>
+void Exchange(Archive& archive, std::pair<A, B>& values);
 template <typename Archive, typename T>
 void Exchange(Archive& archive, std::vector<T>& values);
+template <typename Archive, typename T>
+void Exchange(Archive& archive, std::deque<T>& values);
 template <typename Archive, typename Key, typename T>
 void Exchange(Archive& archive, std::map<Key, T>& values);
 
@@ -113,8 +119,19 @@ void ExchangeAll(Archive& archive, Values&... values) {
   (Exchange(archive, values), ...);
 }
 
+template <typename Archive, typename A, typename B>
+void Exchange(Archive& archive, std::pair<A, B>& values) {
+  ExchangeAll(archive, values.first, values.second);
+}
+
 template <typename Archive, typename T>
 void Exchange(Archive& archive, std::vector<T>& values) {
+  values.resize(ExchangeSize(archive, values.size()));
+  for (T& value : values) Exchange(archive, value);
+}
+
+template <typename Archive, typename T>
+void Exchange(Archive& archive, std::deque<T>& values) {
   values.resize(ExchangeSize(archive, values.size()));
   for (T& value : values) Exchange(archive, value);
 }
@@ -140,4 +157,4 @@ void Exchange(Archive& archive, std::map<Key, T>& values) {
 
 }  // namespace plumbline
 
-#endif  // PLUMBLINE_PIPELINE_STATE_ARCHIVE_H_
+#endif  // PLUMBLINE_CORE_STATE_ARCHIVE_H_

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -179,6 +180,8 @@ class StepJudge {
 }  // namespace
 
 struct ResidentMinimizer::Impl {
+  class Minimization;
+
   explicit Impl(ceres::Problem* problem_in) : problem(problem_in) {
     cholmod_start(&common);
     common.print = 0;
@@ -717,16 +720,318 @@ struct ResidentMinimizer::Impl {
   int num_analyses = 0;
 };
 
-namespace {
+// One solve: the loop of Ceres' trust region minimizer, by the same names.
+class ResidentMinimizer::Impl::Minimization {
+ public:
+  // All must outlive it; `summary` is as it is made.
+  Minimization(const ceres::Solver::Options& options, Impl* m,
+               ceres::Solver::Summary* summary)
+      : options_(options),
+        m_(*m),
+        summary_(*summary),
+        radius_(options.initial_trust_region_radius) {}
 
-// How a solve ends.
-void End(ceres::Solver::Summary* summary, ceres::TerminationType type,
-         std::string message) {
-  summary->termination_type = type;
-  summary->message = std::move(message);
-}
+  void Run() {
+    if (Init()) {
+      Minimize();
+      Finish();
+    }
+    summary_.total_time_in_seconds = watch_.Seconds();
+  }
 
-}  // namespace
+ private:
+  // Reads the problem and linearizes it where it is; false when there is
+  // nothing to minimize, or it cannot be.
+  bool Init() {
+    summary_.num_successful_steps = 0;
+    summary_.num_unsuccessful_steps = 0;
+    summary_.num_linear_solves = 0;
+    summary_.num_jacobian_evaluations = 0;
+    summary_.num_residual_evaluations = 0;
+    summary_.linear_solver_time_in_seconds = 0.0;
+    summary_.residual_evaluation_time_in_seconds = 0.0;
+    summary_.jacobian_evaluation_time_in_seconds = 0.0;
+    std::string fault;
+    if (options_.IsValid(&fault)) fault = m_.Read();
+    if (!fault.empty()) return End(ceres::FAILURE, fault);
+    m_.TakeState();
+    summary_.fixed_cost = 0.0;
+    if (!m_.Cost(m_.fixed_terms, m_.state, &summary_.fixed_cost)) {
+      return End(ceres::FAILURE, "Evaluation of the fixed residuals failed.");
+    }
+    summary_.num_parameter_blocks_reduced =
+        static_cast<int>(m_.variables.size());
+    summary_.num_residual_blocks_reduced = static_cast<int>(m_.terms.size());
+    summary_.num_effective_parameters_reduced = m_.num_columns;
+    summary_.initial_cost = summary_.final_cost = summary_.fixed_cost;
+    summary_.preprocessor_time_in_seconds = watch_.Seconds();
+    if (m_.variables.empty() || m_.terms.empty()) {
+      return End(ceres::CONVERGENCE, "No parameter block varies.");
+    }
+    if (!Linearize()) {
+      return End(
+          ceres::FAILURE,
+          "Residual and Jacobian evaluation failed at the initial state.");
+    }
+    summary_.initial_cost = cost_ + summary_.fixed_cost;
+
+    const int n = m_.num_columns;
+    scale_ = Eigen::VectorXd::Ones(n);
+    if (options_.jacobi_scaling) {
+      for (int c = 0; c < n; ++c) {
+        scale_[c] = 1.0 / (1.0 + std::sqrt(m_.values[m_.diagonal[c]]));
+      }
+    }
+    normal_diagonal_.resize(n);
+    Rescale();
+    judge_.emplace(cost_, options_.use_nonmonotonic_steps
+                              ? options_.max_consecutive_nonmonotonic_steps
+                              : 0);
+    best_cost_ = cost_;
+    best_ = m_.state;
+    candidate_ = m_.state;
+    y_.resize(n);
+    return true;
+  }
+
+  void Minimize() {
+    StartIteration(0);
+    NoteLinearization();
+    while (FinalizeIterationAndCheckIfMinimizerCanContinue()) {
+      StartIteration(step_.iteration + 1);
+      if (!ComputeStep()) {
+        if (!HandleInvalidStep()) return;
+        continue;
+      }
+      ComputeCandidate();
+      if (ParameterToleranceReached() || FunctionToleranceReached()) return;
+      step_.relative_decrease = judge_->Quality(candidate_cost_, model_change_);
+      if (step_.relative_decrease > options_.min_relative_decrease) {
+        if (!HandleSuccessfulStep()) return;
+      } else {
+        HandleUnsuccessfulStep();
+      }
+    }
+  }
+
+  // Leaves the best state, or what there was before.
+  void Finish() {
+    if (is_usable_) {
+      m_.GiveState(best_);
+    } else {
+      m_.TakeState();
+    }
+    summary_.final_cost = best_cost_ + summary_.fixed_cost;
+    summary_.minimizer_time_in_seconds =
+        watch_.Seconds() - summary_.preprocessor_time_in_seconds;
+  }
+
+  // The gradient is that of the iteration before until there is another one.
+  void StartIteration(int iteration) {
+    const double gradient_max_norm = step_.gradient_max_norm;
+    const double gradient_norm = step_.gradient_norm;
+    step_ = ceres::IterationSummary();
+    step_.iteration = iteration;
+    step_.gradient_max_norm = gradient_max_norm;
+    step_.gradient_norm = gradient_norm;
+    step_.cost = cost_ + summary_.fixed_cost;
+    step_.cost_change = 0.0;
+    step_.relative_decrease = 0.0;
+    step_.step_is_valid = false;
+    step_.step_is_successful = false;
+    step_.linear_solver_iterations = iteration == 0 ? 0 : 1;
+  }
+
+  // Tells the callbacks of the iteration, and whether to go on, asked in the
+  // order in which Ceres asks.
+  bool FinalizeIterationAndCheckIfMinimizerCanContinue() {
+    step_.cumulative_time_in_seconds = watch_.Seconds();
+    if (options_.update_state_every_iteration && step_.step_is_successful) {
+      m_.GiveState(m_.state);
+    }
+    summary_.iterations.push_back(step_);
+    ceres::CallbackReturnType answer = ceres::SOLVER_CONTINUE;
+    for (ceres::IterationCallback* const callback : options_.callbacks) {
+      answer = (*callback)(step_);
+      if (answer != ceres::SOLVER_CONTINUE) break;
+    }
+    if (answer == ceres::SOLVER_ABORT) {
+      is_usable_ = false;
+      return End(ceres::USER_FAILURE, "User callback returned SOLVER_ABORT.");
+    }
+    if (answer == ceres::SOLVER_TERMINATE_SUCCESSFULLY) {
+      return End(ceres::USER_SUCCESS,
+                 "User callback returned SOLVER_TERMINATE_SUCCESSFULLY.");
+    }
+    if (watch_.Seconds() >= options_.max_solver_time_in_seconds) {
+      return End(ceres::NO_CONVERGENCE, "Maximum solver time reached.");
+    }
+    if (step_.iteration >= options_.max_num_iterations) {
+      return End(ceres::NO_CONVERGENCE,
+                 "Maximum number of iterations reached.");
+    }
+    if ((step_.step_is_successful || step_.iteration == 0) &&
+        step_.gradient_max_norm <= options_.gradient_tolerance) {
+      return End(ceres::CONVERGENCE, "Gradient tolerance reached.");
+    }
+    if (radius_ <= options_.min_trust_region_radius) {
+      return End(ceres::CONVERGENCE, "Minimum trust region radius reached.");
+    }
+    return true;
+  }
+
+  // False when it leads nowhere.
+  bool ComputeStep() {
+    const Eigen::VectorXd damping = normal_diagonal_ / radius_;
+    const ScopedTimer timer(&summary_.linear_solver_time_in_seconds);
+    ++summary_.num_linear_solves;
+    if (!m_.SolveDamped(damping, -scaled_gradient_, &y_)) return false;
+    // With (H + D) y = -g:  -g'y - y'Hy/2 = -g'y/2 + y'Dy/2.
+    model_change_ =
+        0.5 * (y_.dot(damping.cwiseProduct(y_)) - scaled_gradient_.dot(y_));
+    step_.step_is_valid = model_change_ > 0.0;
+    return step_.step_is_valid;
+  }
+
+  void ComputeCandidate() {
+    invalid_steps_ = 0;
+    const Eigen::VectorXd delta = scale_.cwiseProduct(y_);
+    {
+      const ScopedTimer timer(&summary_.residual_evaluation_time_in_seconds);
+      if (!m_.Plus(m_.state, delta, &candidate_) || !candidate_.allFinite() ||
+          !m_.Cost(m_.terms, candidate_, &candidate_cost_)) {
+        candidate_cost_ = std::numeric_limits<double>::max();
+      }
+      ++summary_.num_residual_evaluations;
+    }
+    step_.step_norm = (candidate_ - m_.state).norm();
+    step_.cost_change = cost_ - candidate_cost_;
+  }
+
+  bool ParameterToleranceReached() {
+    // A candidate that is no number is none to stop at.
+    if (!(step_.step_norm <=
+          options_.parameter_tolerance *
+              (m_.state.norm() + options_.parameter_tolerance))) {
+      return false;
+    }
+    End(ceres::CONVERGENCE, "Parameter tolerance reached.");
+    return true;
+  }
+
+  bool FunctionToleranceReached() {
+    if (!(std::abs(step_.cost_change) <= options_.function_tolerance * cost_)) {
+      return false;
+    }
+    End(ceres::CONVERGENCE, "Function tolerance reached.");
+    return true;
+  }
+
+  // False when there were too many in a row.
+  bool HandleInvalidStep() {
+    if (++invalid_steps_ >= options_.max_num_consecutive_invalid_steps) {
+      ++summary_.num_unsuccessful_steps;
+      is_usable_ = false;
+      return End(ceres::FAILURE,
+                 "Number of consecutive invalid steps more than allowed.");
+    }
+    HandleUnsuccessfulStep();
+    return true;
+  }
+
+  void HandleUnsuccessfulStep() {
+    ++summary_.num_unsuccessful_steps;
+    radius_ /= decrease_factor_;
+    decrease_factor_ *= 2.0;
+    step_.trust_region_radius = radius_;
+  }
+
+  // Goes there; false when nothing can be computed there.
+  bool HandleSuccessfulStep() {
+    step_.step_is_successful = true;
+    step_.step_is_nonmonotonic = candidate_cost_ >= best_cost_;
+    ++summary_.num_successful_steps;
+    m_.state = candidate_;
+    judge_->Accept(candidate_cost_, model_change_);
+    if (!Linearize()) {
+      is_usable_ = false;
+      return End(ceres::FAILURE,
+                 "Residual and Jacobian evaluation failed after a step.");
+    }
+    Rescale();
+    if (cost_ < best_cost_) {
+      best_cost_ = cost_;
+      best_ = m_.state;
+    }
+    radius_ = std::min(
+        options_.max_trust_region_radius,
+        radius_ /
+            std::max(1.0 / 3.0,
+                     1.0 - std::pow(2.0 * step_.relative_decrease - 1.0, 3)));
+    decrease_factor_ = 2.0;
+    NoteLinearization();
+    return true;
+  }
+
+  bool Linearize() {
+    const ScopedTimer timer(&summary_.jacobian_evaluation_time_in_seconds);
+    ++summary_.num_jacobian_evaluations;
+    return m_.Linearize(&cost_);
+  }
+
+  void Rescale() {
+    m_.Scale(scale_);
+    scaled_gradient_ = scale_.cwiseProduct(m_.gradient);
+    for (int c = 0; c < m_.num_columns; ++c) {
+      normal_diagonal_[c] =
+          std::clamp(m_.values[m_.diagonal[c]], options_.min_lm_diagonal,
+                     options_.max_lm_diagonal);
+    }
+  }
+
+  void NoteLinearization() {
+    step_.cost = cost_ + summary_.fixed_cost;
+    step_.gradient_max_norm = m_.GradientMaxNorm();
+    step_.gradient_norm = m_.gradient.norm();
+    step_.trust_region_radius = radius_;
+  }
+
+  // How the solve ends; false, for whoever asks whether it goes on.
+  bool End(ceres::TerminationType type, std::string message) {
+    summary_.termination_type = type;
+    summary_.message = std::move(message);
+    return false;
+  }
+
+  const ceres::Solver::Options& options_;
+  Impl& m_;
+  ceres::Solver::Summary& summary_;
+  const Stopwatch watch_;
+
+  // Of the present state, and of the lowest so far: steps may lead uphill.
+  double cost_ = 0.0;
+  double best_cost_ = 0.0;
+  Eigen::VectorXd best_;
+  bool is_usable_ = true;
+  std::optional<StepJudge> judge_;
+
+  // Of the columns: Jacobi scaling, gradient, diagonal of the normal matrix
+  // within bounds.
+  Eigen::VectorXd scale_;
+  Eigen::VectorXd scaled_gradient_;
+  Eigen::VectorXd normal_diagonal_;
+
+  double radius_;
+  double decrease_factor_ = 2.0;
+  int invalid_steps_ = 0;
+
+  // The step under way.
+  ceres::IterationSummary step_;
+  Eigen::VectorXd y_;
+  double model_change_ = 0.0;
+  Eigen::VectorXd candidate_;
+  double candidate_cost_ = 0.0;
+};
 
 ResidentMinimizer::ResidentMinimizer(ceres::Problem* problem)
     : impl_(std::make_unique<Impl>(problem)) {}
@@ -737,246 +1042,8 @@ int ResidentMinimizer::num_analyses() const { return impl_->num_analyses; }
 
 void ResidentMinimizer::Solve(const ceres::Solver::Options& options,
                               ceres::Solver::Summary* summary) {
-  const Stopwatch watch;
-  Impl& m = *impl_;
   *summary = ceres::Solver::Summary();
-  ceres::Solver::Summary& s = *summary;
-  s.num_successful_steps = 0;
-  s.num_unsuccessful_steps = 0;
-  s.num_linear_solves = 0;
-  s.linear_solver_time_in_seconds = 0.0;
-  s.residual_evaluation_time_in_seconds = 0.0;
-  s.jacobian_evaluation_time_in_seconds = 0.0;
-  std::string fault;
-  if (options.IsValid(&fault)) fault = m.Read();
-  if (!fault.empty()) {
-    End(summary, ceres::FAILURE, fault);
-    return;
-  }
-  m.TakeState();
-  s.fixed_cost = 0.0;
-  if (!m.Cost(m.fixed_terms, m.state, &s.fixed_cost)) {
-    End(summary, ceres::FAILURE, "Evaluation of the fixed residuals failed.");
-    return;
-  }
-  s.num_parameter_blocks_reduced = static_cast<int>(m.variables.size());
-  s.num_residual_blocks_reduced = static_cast<int>(m.terms.size());
-  s.num_effective_parameters_reduced = m.num_columns;
-  s.initial_cost = s.final_cost = s.fixed_cost;
-  if (m.variables.empty() || m.terms.empty()) {
-    s.preprocessor_time_in_seconds = s.total_time_in_seconds = watch.Seconds();
-    End(summary, ceres::CONVERGENCE, "No parameter block varies.");
-    return;
-  }
-  s.preprocessor_time_in_seconds = watch.Seconds();
-  double cost = 0.0;
-  const auto linearize = [&] {
-    const Stopwatch evaluation;
-    const bool is_good = m.Linearize(&cost);
-    s.jacobian_evaluation_time_in_seconds += evaluation.Seconds();
-    ++s.num_jacobian_evaluations;
-    return is_good;
-  };
-  s.num_jacobian_evaluations = 0;
-  s.num_residual_evaluations = 0;
-  if (!linearize()) {
-    s.total_time_in_seconds = watch.Seconds();
-    End(summary, ceres::FAILURE,
-        "Residual and Jacobian evaluation failed at the initial state.");
-    return;
-  }
-  s.initial_cost = cost + s.fixed_cost;
-
-  const int n = m.num_columns;
-  Eigen::VectorXd scale = Eigen::VectorXd::Ones(n);
-  if (options.jacobi_scaling) {
-    for (int c = 0; c < n; ++c) {
-      scale[c] = 1.0 / (1.0 + std::sqrt(m.values[m.diagonal[c]]));
-    }
-  }
-  Eigen::VectorXd scaled_gradient;
-  Eigen::VectorXd normal_diagonal(n);
-  const auto rescale = [&] {
-    m.Scale(scale);
-    scaled_gradient = scale.cwiseProduct(m.gradient);
-    for (int c = 0; c < n; ++c) {
-      normal_diagonal[c] =
-          std::clamp(m.values[m.diagonal[c]], options.min_lm_diagonal,
-                     options.max_lm_diagonal);
-    }
-  };
-  rescale();
-
-  StepJudge judge(cost, options.use_nonmonotonic_steps
-                            ? options.max_consecutive_nonmonotonic_steps
-                            : 0);
-  double best_cost = cost;
-  Eigen::VectorXd best = m.state;
-  Eigen::VectorXd candidate = m.state;
-  Eigen::VectorXd y(n);
-  double radius = options.initial_trust_region_radius;
-  double decrease_factor = 2.0;
-  int invalid_steps = 0;
-
-  ceres::IterationSummary step;
-  step.iteration = 0;
-  step.step_is_valid = false;
-  step.step_is_successful = false;
-  step.cost = cost + s.fixed_cost;
-  step.cost_change = 0.0;
-  step.gradient_max_norm = m.GradientMaxNorm();
-  step.gradient_norm = m.gradient.norm();
-  step.trust_region_radius = radius;
-  bool is_usable = true;
-  for (;;) {
-    // Whether to go on, asked in the order in which Ceres asks.
-    step.cumulative_time_in_seconds = watch.Seconds();
-    if (options.update_state_every_iteration && step.step_is_successful) {
-      m.GiveState(m.state);
-    }
-    s.iterations.push_back(step);
-    ceres::CallbackReturnType answer = ceres::SOLVER_CONTINUE;
-    for (ceres::IterationCallback* const callback : options.callbacks) {
-      answer = (*callback)(step);
-      if (answer != ceres::SOLVER_CONTINUE) break;
-    }
-    if (answer == ceres::SOLVER_ABORT) {
-      End(summary, ceres::USER_FAILURE, "User callback returned SOLVER_ABORT.");
-      is_usable = false;
-      break;
-    }
-    if (answer == ceres::SOLVER_TERMINATE_SUCCESSFULLY) {
-      End(summary, ceres::USER_SUCCESS,
-          "User callback returned SOLVER_TERMINATE_SUCCESSFULLY.");
-      break;
-    }
-    if (watch.Seconds() >= options.max_solver_time_in_seconds) {
-      End(summary, ceres::NO_CONVERGENCE, "Maximum solver time reached.");
-      break;
-    }
-    if (step.iteration >= options.max_num_iterations) {
-      End(summary, ceres::NO_CONVERGENCE,
-          "Maximum number of iterations reached.");
-      break;
-    }
-    if ((step.step_is_successful || step.iteration == 0) &&
-        step.gradient_max_norm <= options.gradient_tolerance) {
-      End(summary, ceres::CONVERGENCE, "Gradient tolerance reached.");
-      break;
-    }
-    if (radius <= options.min_trust_region_radius) {
-      End(summary, ceres::CONVERGENCE, "Minimum trust region radius reached.");
-      break;
-    }
-
-    const int iteration = step.iteration + 1;
-    const double gradient_max_norm = step.gradient_max_norm;
-    const double gradient_norm = step.gradient_norm;
-    step = ceres::IterationSummary();
-    step.iteration = iteration;
-    step.gradient_max_norm = gradient_max_norm;
-    step.gradient_norm = gradient_norm;
-    step.cost = cost + s.fixed_cost;
-    step.cost_change = 0.0;
-    step.relative_decrease = 0.0;
-    step.step_is_valid = false;
-    step.step_is_successful = false;
-    step.linear_solver_iterations = 1;
-
-    Eigen::VectorXd damping = normal_diagonal / radius;
-    double model_change = 0.0;
-    {
-      const Stopwatch linear;
-      const bool is_solved = m.SolveDamped(damping, -scaled_gradient, &y);
-      s.linear_solver_time_in_seconds += linear.Seconds();
-      ++s.num_linear_solves;
-      if (is_solved) {
-        // With (H + D) y = -g:  -g'y - y'Hy/2 = -g'y/2 + y'Dy/2.
-        model_change =
-            0.5 * (y.dot(damping.cwiseProduct(y)) - scaled_gradient.dot(y));
-        step.step_is_valid = model_change > 0.0;
-      }
-    }
-    if (!step.step_is_valid) {
-      ++s.num_unsuccessful_steps;
-      if (++invalid_steps >= options.max_num_consecutive_invalid_steps) {
-        End(summary, ceres::FAILURE,
-            "Number of consecutive invalid steps more than allowed.");
-        is_usable = false;
-        break;
-      }
-      radius /= decrease_factor;
-      decrease_factor *= 2.0;
-      step.trust_region_radius = radius;
-      continue;
-    }
-    invalid_steps = 0;
-    const Eigen::VectorXd delta = scale.cwiseProduct(y);
-    double candidate_cost = std::numeric_limits<double>::max();
-    {
-      const Stopwatch evaluation;
-      if (!m.Plus(m.state, delta, &candidate) || !candidate.allFinite() ||
-          !m.Cost(m.terms, candidate, &candidate_cost)) {
-        candidate_cost = std::numeric_limits<double>::max();
-      }
-      s.residual_evaluation_time_in_seconds += evaluation.Seconds();
-      ++s.num_residual_evaluations;
-    }
-    step.step_norm = (candidate - m.state).norm();
-    if (step.step_norm <= options.parameter_tolerance *
-                              (m.state.norm() + options.parameter_tolerance)) {
-      End(summary, ceres::CONVERGENCE, "Parameter tolerance reached.");
-      break;
-    }
-    step.cost_change = cost - candidate_cost;
-    if (std::abs(step.cost_change) <= options.function_tolerance * cost) {
-      End(summary, ceres::CONVERGENCE, "Function tolerance reached.");
-      break;
-    }
-    step.relative_decrease = judge.Quality(candidate_cost, model_change);
-    if (!(step.relative_decrease > options.min_relative_decrease)) {
-      ++s.num_unsuccessful_steps;
-      radius /= decrease_factor;
-      decrease_factor *= 2.0;
-      step.trust_region_radius = radius;
-      continue;
-    }
-    step.step_is_successful = true;
-    step.step_is_nonmonotonic = candidate_cost >= best_cost;
-    ++s.num_successful_steps;
-    m.state = candidate;
-    judge.Accept(candidate_cost, model_change);
-    if (!linearize()) {
-      End(summary, ceres::FAILURE,
-          "Residual and Jacobian evaluation failed after a step.");
-      is_usable = false;
-      break;
-    }
-    rescale();
-    if (cost < best_cost) {
-      best_cost = cost;
-      best = m.state;
-    }
-    radius = std::min(
-        options.max_trust_region_radius,
-        radius /
-            std::max(1.0 / 3.0,
-                     1.0 - std::pow(2.0 * step.relative_decrease - 1.0, 3)));
-    decrease_factor = 2.0;
-    step.cost = cost + s.fixed_cost;
-    step.gradient_max_norm = m.GradientMaxNorm();
-    step.gradient_norm = m.gradient.norm();
-    step.trust_region_radius = radius;
-  }
-  if (is_usable) {
-    m.GiveState(best);
-  } else {
-    m.TakeState();
-  }
-  s.final_cost = best_cost + s.fixed_cost;
-  s.minimizer_time_in_seconds =
-      watch.Seconds() - s.preprocessor_time_in_seconds;
-  s.total_time_in_seconds = watch.Seconds();
+  Impl::Minimization(options, impl_.get(), summary).Run();
 }
 
 }  // namespace plumbline

@@ -19,8 +19,8 @@ if(DOXYGEN_FOUND)
   set(DOXYGEN_STRIP_FROM_PATH ${PLUMBLINE_INCLUDE_ROOT} ${PROJECT_SOURCE_DIR})
   set(DOXYGEN_STRIP_FROM_INC_PATH ${PLUMBLINE_INCLUDE_ROOT})
   set(headers)
-  foreach(component factors core detectors frontend pipeline outputs)
-    file(GLOB component_headers CONFIGURE_DEPENDS
+  foreach(component factors core detectors frontend pipeline plan outputs)
+    file(GLOB_RECURSE component_headers CONFIGURE_DEPENDS
       ${PLUMBLINE_INCLUDE_ROOT}/plumbline/${component}/*.h)
     list(APPEND headers ${component_headers})
   endforeach()

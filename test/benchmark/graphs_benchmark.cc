@@ -8,9 +8,9 @@
 #include <plumbline/core/em.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/initial_guess.h>
 #include <plumbline/core/session.h>
-#include <plumbline/factors/information.h>
 #include <plumbline/factors/line_manifold.h>
 #include <plumbline/factors/point_line_distance.h>
 #include <plumbline/factors/pose_line.h>

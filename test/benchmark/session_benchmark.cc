@@ -6,8 +6,8 @@
 #include <ceres/ceres.h>
 #include <dlfcn.h>
 #include <plumbline/core/builtins.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/session.h>
-#include <plumbline/factors/information.h>
 
 #include <Eigen/CholmodSupport>
 #include <Eigen/SparseCore>

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/error.h>
-#include <plumbline/factors/information.h>
+#include <plumbline/core/information.h>
 
 #include <cmath>
 #include <limits>

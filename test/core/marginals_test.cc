@@ -4,10 +4,10 @@
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/marginals.h>
 #include <plumbline/core/session.h>
 #include <plumbline/factors/angle.h>
-#include <plumbline/factors/information.h>
 #include <plumbline/factors/pose_pose.h>
 
 #include <algorithm>

@@ -177,7 +177,10 @@ DEFINE_string(laser_step, "", "Angle between beams, degrees; empty: as above");
 DEFINE_string(laser_max_range, "",
               "Readings from here on are no return, m; empty: as the log says");
 
-DEFINE_uint64(seed, 1, "Seed of everything random");
+DEFINE_uint64(seed, 1,
+              "Seed of everything random: the search for lines and circles "
+              "through points. Segments of a log draw nothing, so that their "
+              "maps do not depend on it");
 DEFINE_int32(num_threads, 0,
              "Threads; 0: all cores. The results do not depend on it");
 PLUMBLINE_FLAG_RANGE(num_threads, 0, 1024);

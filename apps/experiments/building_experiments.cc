@@ -1,8 +1,8 @@
 #include <plumbline/apps/experiments/building_experiments.h>
 #include <plumbline/apps/experiments/building_trial.h>
 #include <plumbline/apps/experiments/experiment_jobs.h>
+#include <plumbline/apps/experiments/solve_mode.h>
 #include <plumbline/apps/simulation/bent_world.h>
-#include <plumbline/pipeline/log_solver.h>
 
 #include <algorithm>
 #include <cmath>
@@ -29,31 +29,6 @@ constexpr double kBendDeg = 0.3;
 // Between these the ratio of errors to covariances is sound.
 constexpr double kSmallestRatio = 0.6;
 constexpr double kLargestRatio = 1.5;
-
-// How a log is solved.
-struct Mode {
-  const char* name;
-  bool structure;
-  bool closures;
-  Refinement refine;
-};
-
-LogSolverOptions SolverOptions(const ExperimentOptions& options) {
-  LogSolverOptions solver;
-  solver.session.delta_mode = options.delta_mode;
-  solver.em.delta_threshold = options.delta_threshold;
-  solver.em.seed = options.seed;
-  return solver;
-}
-
-LogSolverOptions SolverOptions(const ExperimentOptions& options,
-                               const Mode& mode) {
-  LogSolverOptions solver = SolverOptions(options);
-  solver.structure = mode.structure;
-  solver.global_association = mode.closures;
-  solver.refine = mode.refine;
-  return solver;
-}
 
 double Median(std::vector<double> values) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
@@ -122,57 +97,50 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
       "would help most.";
   std::vector<Job> jobs;
   for (const std::string& shape : BuildingShapes()) {
-    for (int trial = 0; trial < options.trials; ++trial) {
-      Job job;
-      job.condition = shape;
-      job.seed = options.seed + static_cast<std::uint64_t>(trial);
-      const bool is_drawn = trial == 0;
-      job.run = [shape, is_drawn, &options, &registry](Job* self) {
-        const LogSolverOptions solver = SolverOptions(options);
-        const BuildingTrial run = RunBuildingTrial(
-            MakeWorld(shape, self->seed, 1.0), SimulatorOptions(), self->seed,
-            registry, solver, options.stop);
-        if (run.is_stopped) return;
-        const ClosureEvaluation& closures = run.closures;
-        self->values = {
-            {"scans", static_cast<double>(run.scans)},
-            {"closures_right", closures.right},
-            {"closures_near", closures.near},
-            {"closures_wrong", closures.wrong},
-            {"broken_right", closures.broken_right},
-            {"broken_wrong", closures.broken_wrong},
-            {"revisits", closures.revisits},
-            {"revisits_closed", closures.closed_revisits},
-            {"walls", static_cast<double>(run.map.walls.size())},
-            {"walls_missed", static_cast<double>(run.map.missed_walls.size())},
-            {"walls_false", static_cast<double>(run.map.false_walls.size())},
-            {"drawn_twice", run.map.doubled_length},
-            {"offset_error", run.map.offset_error.mean},
-            {"direction_error_deg", run.map.direction_error_deg.mean},
-            {"position_error", run.mean_position_error},
-            {"rooms", run.plan.rooms.asked},
-            {"rooms_found", run.plan.rooms.found},
-            {"rooms_iou", run.plan.rooms.mean_iou},
-            {"rooms_drawn", run.plan.rooms.drawn},
-            {"rooms_false", run.plan.rooms.not_true},
-            {"doors", run.plan.doors_asked},
-            {"doors_found", run.plan.doors_found},
-            {"doors_drawn", run.plan.doors_drawn},
-            {"doors_false", run.plan.doors_false},
-            {"door_width_error", run.plan.door_width_error},
-            {"wall_completeness", run.plan.wall_completeness},
-            {"wall_correctness", run.plan.wall_correctness},
-            {"wall_ends", run.plan.ends},
-            {"wall_ends_free", run.plan.free_ends},
-            {"plan_walls_twice", run.plan.double_walls}};
-        if (is_drawn) {
-          MapDrawing drawing = run.drawing;
-          drawing.title = "B1: " + shape;
-          self->maps.emplace_back(shape, drawing);
-        }
-      };
-      jobs.push_back(std::move(job));
-    }
+    const auto run_trial = [shape, &options, &registry](Job* self) {
+      const BuildingTrial run = RunBuildingTrial(
+          MakeWorld(shape, self->seed, 1.0), SimulatorOptions(), self->seed,
+          registry, SolverOptions(options), options.stop);
+      if (run.is_stopped) return;
+      const ClosureEvaluation& closures = run.closures;
+      self->values = {
+          {"scans", static_cast<double>(run.scans)},
+          {"closures_right", closures.right},
+          {"closures_near", closures.near},
+          {"closures_wrong", closures.wrong},
+          {"broken_right", closures.broken_right},
+          {"broken_wrong", closures.broken_wrong},
+          {"revisits", closures.revisits},
+          {"revisits_closed", closures.closed_revisits},
+          {"walls", static_cast<double>(run.map.walls.size())},
+          {"walls_missed", static_cast<double>(run.map.missed_walls.size())},
+          {"walls_false", static_cast<double>(run.map.false_walls.size())},
+          {"drawn_twice", run.map.doubled_length},
+          {"offset_error", run.map.offset_error.mean},
+          {"direction_error_deg", run.map.direction_error_deg.mean},
+          {"position_error", run.mean_position_error},
+          {"rooms", run.plan.rooms.asked},
+          {"rooms_found", run.plan.rooms.found},
+          {"rooms_iou", run.plan.rooms.mean_iou},
+          {"rooms_drawn", run.plan.rooms.drawn},
+          {"rooms_false", run.plan.rooms.not_true},
+          {"doors", run.plan.doors_asked},
+          {"doors_found", run.plan.doors_found},
+          {"doors_drawn", run.plan.doors_drawn},
+          {"doors_false", run.plan.doors_false},
+          {"door_width_error", run.plan.door_width_error},
+          {"wall_completeness", run.plan.wall_completeness},
+          {"wall_correctness", run.plan.wall_correctness},
+          {"wall_ends", run.plan.ends},
+          {"wall_ends_free", run.plan.free_ends},
+          {"plan_walls_twice", run.plan.double_walls}};
+      if (self->seed == options.seed) {
+        MapDrawing drawing = run.drawing;
+        drawing.title = "B1: " + shape;
+        self->maps.emplace_back(shape, drawing);
+      }
+    };
+    AddTrials(options, shape, run_trial, &jobs);
   }
   RunJobs(options, &jobs);
   Collect(&jobs, result);
@@ -230,30 +198,28 @@ void RunB2(const ExperimentOptions& options, const Registry& registry,
   result->paper =
       "The paper's buildings have right angles only, and structure is broken "
       "where the measurements contradict it.";
-  static const Mode kModes[] = {{"none", false, false, Refinement::kFull},
-                                {"structure", true, true, Refinement::kFull}};
+  static const SolveMode kModes[] = {
+      {"none", false, false, Refinement::kFull},
+      {"structure", true, true, Refinement::kFull}};
   static const int kBends[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
   std::vector<Job> jobs;
   for (const bool has_niches : {false, true}) {
     for (const int bend : kBends) {
-      for (const Mode& mode : kModes) {
-        for (int trial = 0; trial < options.trials; ++trial) {
-          Job job;
-          job.condition = std::string(has_niches ? "niches " : "plain ") +
-                          std::to_string(bend) + " deg, " + mode.name;
-          job.seed = options.seed + static_cast<std::uint64_t>(trial);
-          job.run = [=, &mode, &options, &registry](Job* self) {
-            BentOptions bent = has_niches ? NichesOptions() : BentOptions();
-            bent.bend_deg = bend;
-            const BuildingTrial run = RunBuildingTrial(
-                MakeBentWorld(bent, self->seed), SimulatorOptions(), self->seed,
-                registry, SolverOptions(options, mode), options.stop);
-            if (run.is_stopped) return;
-            self->values = {{"position_error", run.mean_position_error},
-                            {"bend_error_deg", run.map.bend_error_deg}};
-          };
-          jobs.push_back(std::move(job));
-        }
+      for (const SolveMode& mode : kModes) {
+        const auto run_trial = [=, &mode, &options, &registry](Job* self) {
+          BentOptions bent = has_niches ? NichesOptions() : BentOptions();
+          bent.bend_deg = bend;
+          const BuildingTrial run = RunBuildingTrial(
+              MakeBentWorld(bent, self->seed), SimulatorOptions(), self->seed,
+              registry, SolverOptions(options, mode), options.stop);
+          if (run.is_stopped) return;
+          self->values = {{"position_error", run.mean_position_error},
+                          {"bend_error_deg", run.map.bend_error_deg}};
+        };
+        AddTrials(options,
+                  std::string(has_niches ? "niches " : "plain ") +
+                      std::to_string(bend) + " deg, " + mode.name,
+                  run_trial, &jobs);
       }
     }
   }
@@ -298,43 +264,39 @@ void RunN1(const ExperimentOptions& options, const Registry& registry,
   result->paper =
       "The paper reports no covariances; structure is judged by them all the "
       "same.";
-  static const Mode kModes[] = {
+  static const SolveMode kModes[] = {
       {"none", false, false, Refinement::kMap},
       {"structure alone", true, false, Refinement::kMap},
       {"default", true, true, Refinement::kFull}};
   static const char* const kShapes[] = {"office", "killian_like"};
   std::vector<Job> jobs;
   for (const char* shape : kShapes) {
-    for (const Mode& mode : kModes) {
-      for (int trial = 0; trial < options.trials; ++trial) {
-        Job job;
-        job.condition = std::string(shape) + ", " + mode.name;
-        job.seed = options.seed + static_cast<std::uint64_t>(trial);
-        job.run = [=, &mode, &options, &registry](Job* self) {
-          const BuildingTrial run = RunBuildingTrial(
-              MakeWorld(shape, self->seed, 1.0), SimulatorOptions(), self->seed,
-              registry, SolverOptions(options, mode), options.stop);
-          if (run.is_stopped) return;
-          const Consistency& consistency = run.consistency;
-          self->values = {
-              {"ratio", consistency.ratio()},
-              {"ratio_of_each_wall", consistency.mean_wall_ratio},
-              {"degrees_of_freedom",
-               static_cast<double>(consistency.degrees_of_freedom)},
-              {"offset_error", consistency.offset_error},
-              {"offset_sigma", consistency.offset_sigma},
-              {"direction_error_deg", consistency.direction_error_deg},
-              {"direction_sigma_deg", consistency.direction_sigma_deg}};
-        };
-        jobs.push_back(std::move(job));
-      }
+    for (const SolveMode& mode : kModes) {
+      const auto run_trial = [=, &mode, &options, &registry](Job* self) {
+        const BuildingTrial run = RunBuildingTrial(
+            MakeWorld(shape, self->seed, 1.0), SimulatorOptions(), self->seed,
+            registry, SolverOptions(options, mode), options.stop);
+        if (run.is_stopped) return;
+        const Consistency& consistency = run.consistency;
+        self->values = {
+            {"ratio", consistency.ratio()},
+            {"ratio_of_each_wall", consistency.mean_wall_ratio},
+            {"degrees_of_freedom",
+             static_cast<double>(consistency.degrees_of_freedom)},
+            {"offset_error", consistency.offset_error},
+            {"offset_sigma", consistency.offset_sigma},
+            {"direction_error_deg", consistency.direction_error_deg},
+            {"direction_sigma_deg", consistency.direction_sigma_deg}};
+      };
+      AddTrials(options, std::string(shape) + ", " + mode.name, run_trial,
+                &jobs);
     }
   }
   RunJobs(options, &jobs);
   Collect(&jobs, result);
   if (result->interrupted) return;
   for (const char* shape : kShapes) {
-    for (const Mode& mode : kModes) {
+    for (const SolveMode& mode : kModes) {
       const std::string condition = std::string(shape) + ", " + mode.name;
       const std::vector<double> ratios = Column(*result, condition, "ratio");
       Claim claim;

@@ -64,6 +64,17 @@ void RunJobs(const ExperimentOptions& options, std::vector<Job>* jobs) {
   });
 }
 
+void AddTrials(const ExperimentOptions& options, const std::string& condition,
+               const std::function<void(Job*)>& run, std::vector<Job>* jobs) {
+  for (int trial = 0; trial < options.trials; ++trial) {
+    Job job;
+    job.condition = condition;
+    job.seed = options.seed + static_cast<std::uint64_t>(trial);
+    job.run = run;
+    jobs->push_back(std::move(job));
+  }
+}
+
 void Collect(std::vector<Job>* jobs, ExperimentResult* result) {
   for (Job& job : *jobs) {
     if (!job.is_done) {
@@ -159,6 +170,17 @@ void AddLevel(const std::string& name, double y, int color, LinePlot* plot) {
   series.x = {0.0, static_cast<double>(plot->x_ticks.size()) - 1.0};
   series.y = {y, y};
   plot->series.push_back(std::move(series));
+}
+
+Estimate RatioOfMeans(const ExperimentResult& result, const std::string& name,
+                      const std::string& condition,
+                      const std::string& reference) {
+  std::vector<double> values = Column(result, condition, name);
+  std::vector<double> of_reference = Column(result, reference, name);
+  const std::size_t trials = std::min(values.size(), of_reference.size());
+  values.resize(trials);
+  of_reference.resize(trials);
+  return RatioEstimate(values, of_reference);
 }
 
 void AddBound(const std::string& text, const Estimate& measured, double bound,

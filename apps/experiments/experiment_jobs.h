@@ -29,6 +29,10 @@ struct Job {
   bool is_done = false;
 };
 
+/// Adds a job for each of options.trials, with the seeds from options.seed on.
+void AddTrials(const ExperimentOptions& options, const std::string& condition,
+               const std::function<void(Job*)>& run, std::vector<Job>* jobs);
+
 /// Runs the jobs on options.num_threads threads. The first exception, in the
 /// order of jobs, is thrown again when all threads have ended.
 void RunJobs(const ExperimentOptions& options, std::vector<Job>* jobs);
@@ -58,6 +62,12 @@ LinePlot EvolutionPlot(const std::vector<Job>& jobs,
 
 /// A dashed line at y across a plot.
 void AddLevel(const std::string& name, double y, int color, LinePlot* plot);
+
+/// Ratio of the means of a value under two conditions, over the trials that
+/// both have.
+Estimate RatioOfMeans(const ExperimentResult& result, const std::string& name,
+                      const std::string& condition,
+                      const std::string& reference);
 
 /// Claims that `measured` is at most `bound`.
 void AddBound(const std::string& text, const Estimate& measured, double bound,

@@ -1,10 +1,10 @@
 #include <plumbline/apps/evaluation/relations.h>
 #include <plumbline/apps/experiments/experiment_jobs.h>
 #include <plumbline/apps/experiments/log_experiments.h>
+#include <plumbline/apps/experiments/solve_mode.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/outputs/summary.h>
-#include <plumbline/pipeline/log_solver.h>
 
 #include <filesystem>
 #include <limits>
@@ -17,6 +17,23 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 // R2: the first part of the log, scans.
 constexpr std::size_t kFirstPart = 4500;
+
+// Each adds one thing to one before it.
+constexpr SolveMode kModes[] = {
+    {"none", false, false, Refinement::kMap},
+    {"structure", true, false, Refinement::kMap},
+    {"structure and closures", true, true, Refinement::kMap},
+    {"adjustment", false, false, Refinement::kFull},
+    {"structure, closures and adjustment", true, true, Refinement::kFull}};
+
+// "structure, closures" becomes "structure_closures".
+std::string FileNameOf(const std::string& condition) {
+  std::string name;
+  for (const char c : condition) {
+    if (c != ',') name += c == ' ' ? '_' : c;
+  }
+  return name;
+}
 
 void RunLog(const std::string& log_file, const std::string& relations_file,
             std::size_t max_scans, const ExperimentOptions& options,
@@ -37,21 +54,14 @@ void RunLog(const std::string& log_file, const std::string& relations_file,
   }
   const std::vector<Relation> relations =
       ReadRelations(options.datasets + "/" + relations_file);
-  const std::vector<std::string> conditions = {"without structure",
-                                               "with structure"};
   std::vector<Job> jobs;
-  for (const bool structure : {false, true}) {
+  for (const SolveMode& mode : kModes) {
     Job job;
-    job.condition = conditions[structure ? 1 : 0];
+    job.condition = mode.name;
     job.seed = options.seed;
-    job.run = [structure, &log, &relations, &options, &registry,
+    job.run = [&mode, &log, &relations, &options, &registry,
                result](Job* self) {
-      LogSolverOptions solver_options;
-      solver_options.structure = structure;
-      solver_options.session.delta_mode = options.delta_mode;
-      solver_options.em.delta_threshold = options.delta_threshold;
-      solver_options.em.seed = options.seed;
-      LogSolver solver(registry, solver_options);
+      LogSolver solver(registry, SolverOptions(options, mode));
       const Stopwatch watch;
       RunControl control;
       control.stop = options.stop;
@@ -77,7 +87,7 @@ void RunLog(const std::string& log_file, const std::string& relations_file,
           {"seconds", seconds}};
       MapDrawing drawing = DrawingFromGraph(solver.graph(), solved.trajectory);
       drawing.title = result->id + ": " + self->condition;
-      self->maps.emplace_back(structure ? "with" : "without", drawing);
+      self->maps.emplace_back(FileNameOf(self->condition), drawing);
     };
     jobs.push_back(std::move(job));
   }
@@ -85,14 +95,26 @@ void RunLog(const std::string& log_file, const std::string& relations_file,
   Collect(&jobs, result);
   if (result->interrupted) return;
   for (const char* value : {"orthogonality_deg", "translation_mean"}) {
-    AddBound(std::string(value) + " with structure / without",
-             RatioEstimate(Column(*result, conditions[1], value),
-                           Column(*result, conditions[0], value)),
-             1.0, result);
+    AddBound(std::string(value) + " with structure / without, all else equal",
+             RatioOfMeans(*result, value, "structure", "none"), 1.0, result);
+  }
+  result->notes.push_back("Translational error, by what is added:");
+  for (const auto& [mode, reference] :
+       {std::pair("structure", "none"),
+        std::pair("structure and closures", "structure"),
+        std::pair("structure, closures and adjustment",
+                  "structure and closures"),
+        std::pair("adjustment", "none"),
+        std::pair("structure, closures and adjustment", "adjustment")}) {
+    result->notes.push_back("  " + std::string(mode) + " over " + reference +
+                            ": " +
+                            FormatEstimate(RatioOfMeans(
+                                *result, "translation_mean", mode, reference)));
   }
   result->notes.push_back(
-      "One run each way: a ratio below 1 means better with structure. Errors "
-      "are those of Kuemmerle et al. 2009, m and degrees.");
+      "One run each: a ratio below 1 means better. Closures are structure, "
+      "too: walls of two visits that are one. Errors are those of Kuemmerle et "
+      "al. 2009, m and degrees.");
 }
 
 }  // namespace

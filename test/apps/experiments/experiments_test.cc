@@ -95,7 +95,7 @@ TEST_F(ExperimentsTest, NoStructureIsIsolatedButNotIntact) {
 TEST_F(ExperimentsTest, CommonCentreIsolatesTheOutlierInAllTrials) {
   ExperimentOptions options;
   const ExperimentResult result = RunExperiment("S6", options, &registry_);
-  ASSERT_EQ(result.trials.size(), 160u);
+  ASSERT_EQ(result.trials.size(), 180u);
   ASSERT_EQ(result.claims.size(), 1u);
   EXPECT_TRUE(result.claims[0].holds);
   EXPECT_EQ(result.claims[0].measured.value, 1.0);
@@ -186,7 +186,7 @@ TEST_F(ExperimentsTest, TrialsHaveTheSeedsFromTheFirstOn) {
   options.trials = 2;
   options.seed = 7;
   const ExperimentResult result = RunExperiment("S6", options, &registry_);
-  ASSERT_EQ(result.trials.size(), 16u);
+  ASSERT_EQ(result.trials.size(), 18u);
   EXPECT_EQ(result.trials[0].seed, 7u);
   EXPECT_EQ(result.trials[1].seed, 8u);
   EXPECT_EQ(result.trials[2].seed, 7u);
@@ -200,7 +200,7 @@ TEST_F(ExperimentsTest, EndsWhenAsked) {
   options.stop = [&asked] { return ++asked > 40; };
   const ExperimentResult result = RunExperiment("S6", options, &registry_);
   EXPECT_TRUE(result.interrupted);
-  EXPECT_LT(result.trials.size(), 24u);
+  EXPECT_LT(result.trials.size(), 27u);
   EXPECT_THAT(Text(result), HasSubstr("Cut short"));
   options.stop = [] { return true; };
   EXPECT_TRUE(RunExperiment("S2", options, &registry_).trials.empty());
@@ -238,7 +238,7 @@ TEST_F(ExperimentsTest, WritesItsFiles) {
             "converged");
   int rows = 0;
   for (std::string line; std::getline(csv, line);) ++rows;
-  EXPECT_EQ(rows, 16);
+  EXPECT_EQ(rows, 18);
   std::filesystem::remove_all(folder);
 }
 

@@ -17,8 +17,13 @@ constexpr double kCorridorRatio = 3.5;
 constexpr double kCorridorWidth = 4.0;
 // A wall of which only one face was seen is drawn this thick, m.
 constexpr double kThinnestWall = 0.1;
+// From this share of openings on a side of a room is no wall.
+constexpr double kOpenSide = 0.75;
 // Narrower openings are flaws of a wall, m.
 constexpr double kFlaw = 0.3;
+// A wide opening is a door when the wall between the two rooms goes on beside
+// it for so many samples.
+constexpr int kLeastJamb = 6;
 // Doors between the same rooms nearer to each other than this are one, m.
 constexpr double kSameDoor = 0.8;
 
@@ -36,9 +41,13 @@ double FaceOf(const DrawnLine& on, const Vector2d& begin, const Vector2d& end,
   const Vector2d left = is_forward ? line.normal() : Vector2d(-line.normal());
   const WallProfile& profile = on.profile;
   std::vector<double> faces;
-  for (int i = std::max(0, profile.IndexOf(from));
-       i <= std::min(profile.size() - 1, profile.IndexOf(to)); ++i) {
-    if (profile.marks[static_cast<std::size_t>(i)] != Mark::kWall) continue;
+  int open = 0;
+  const int first = std::max(0, profile.IndexOf(from));
+  const int last = std::min(profile.size() - 1, profile.IndexOf(to));
+  for (int i = first; i <= last; ++i) {
+    const Mark mark = profile.marks[static_cast<std::size_t>(i)];
+    open += mark == Mark::kOpen || mark == Mark::kDoor;
+    if (mark != Mark::kWall) continue;
     const Vector2d here = line.At(profile.MiddleOf(i));
     for (double v = high + kBesideWall; v >= low - kBesideWall;
          v -= 0.5 * space.resolution) {
@@ -48,6 +57,8 @@ double FaceOf(const DrawnLine& on, const Vector2d& begin, const Vector2d& end,
       break;
     }
   }
+  // Spaces that lie open to each other meet in the middle.
+  if (open > kOpenSide * (last - first + 1)) return 0.0;
   if (faces.size() < 4) return high;
   const auto middle =
       faces.begin() + static_cast<std::ptrdiff_t>(faces.size() / 2);
@@ -311,6 +322,21 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
                   std::max(-1, sides.right[middle])};
     const bool is_between = i > 0 && j < count && on.line.is_wall;
     const bool has_both = door.rooms[0] >= 0 && door.rooms[1] >= 0;
+    // Where a corridor ends as wide as it is there is no door.
+    const auto has_jamb = [&](int begin, int end) {
+      int wall = 0;
+      for (int k = std::max(0, begin); k < std::min(end, count); ++k) {
+        const auto at = static_cast<std::size_t>(k);
+        wall += sides.left[at] == sides.left[middle] &&
+                sides.right[at] == sides.right[middle] && !is_open[at];
+      }
+      return wall >= kLeastJamb;
+    };
+    if (door.width() > options.doors.narrow &&
+        !has_jamb(i - 2 * kLeastJamb, i) && !has_jamb(j, j + 2 * kLeastJamb)) {
+      i = j;
+      continue;
+    }
     if (is_between && door.width() >= options.min_door &&
         door.width() <=
             (has_both ? options.doors.wide : options.doors.narrow)) {

@@ -49,7 +49,7 @@ struct DoorOptions {
   /// Openings up to this width in a wall are doors, m, ...
   double narrow = 1.2;
   /// ... from this width on they are none, and in between more or less.
-  double wide = 2.2;
+  double wide = 3.0;
 };
 
 /// Occupied cells this far beside the faces of a wall still belong to it, m.

@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <tuple>
 #include <utility>
 
 namespace plumbline {
 namespace {
+
+using Eigen::Vector2d;
 
 // Space that was not seen is filled up to this, m^2.
 constexpr double kMaxPocket = 4.0;
@@ -20,6 +23,12 @@ constexpr double kMaxExposed = 0.2;
 // An opening, m, and its share of a region's width.
 constexpr double kLeastOpening = 0.5;
 constexpr double kWholeWidth = 0.6;
+// A corridor is at least so many times as long as it is wide, and so large,
+// m^2: niches and entrances belong to their rooms.
+constexpr double kLeastLength = 2.0;
+constexpr double kLeastCorridor = 5.0;
+// Corners nearer to each other are one, m.
+constexpr double kSameCorner = 2e-3;
 // Regions that touch in no more than a corner are no neighbors, m.
 constexpr double kLeastBorder = 0.1;
 
@@ -179,6 +188,154 @@ bool IsNarrow(const Polygon& polygon, double width) {
   return Offset(polygon, -0.5 * width).empty();
 }
 
+// Sets that grow together; the least member names each.
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t size) : parents_(size) {
+    std::iota(parents_.begin(), parents_.end(), 0);
+  }
+  int Find(int i) {
+    int root = i;
+    while (parents_[static_cast<std::size_t>(root)] != root) {
+      root = parents_[static_cast<std::size_t>(root)];
+    }
+    while (parents_[static_cast<std::size_t>(i)] != root) {
+      i = std::exchange(parents_[static_cast<std::size_t>(i)], root);
+    }
+    return root;
+  }
+  void Join(int a, int b) {
+    a = Find(a);
+    b = Find(b);
+    parents_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+  }
+
+ private:
+  std::vector<int> parents_;
+};
+
+// Which faces lie where their region is wider than a corridor.
+std::vector<bool> WideFaces(const Arrangement& arrangement,
+                            const std::vector<int>& region, double width) {
+  std::map<int, std::vector<Polygon>> parts;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    if (region[i] < 0) continue;
+    parts[region[i]].push_back(arrangement.faces[i]);
+  }
+  std::map<int, std::vector<Polygon>> wide;
+  for (const auto& [id, polygons] : parts) {
+    for (Polygon outline : UnionOf(polygons)) {
+      // Furniture makes no space narrower.
+      outline.holes.erase(
+          std::remove_if(outline.holes.begin(), outline.holes.end(),
+                         [](const Ring& hole) {
+                           return std::abs(SignedArea(hole)) <= kMaxPocket;
+                         }),
+          outline.holes.end());
+      for (const Polygon& core : Offset(outline, -0.5 * width)) {
+        const std::vector<Polygon> grown = Offset(core, 0.5 * width);
+        wide[id].insert(wide[id].end(), grown.begin(), grown.end());
+      }
+    }
+  }
+  std::vector<bool> is_wide(region.size(), false);
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    if (region[i] < 0) continue;
+    const Polygon& face = arrangement.faces[i];
+    double area = 0.0;
+    for (const Polygon& core : wide[region[i]]) {
+      for (const Polygon& part : IntersectionOf(face, core)) {
+        area += part.Area();
+      }
+    }
+    is_wide[i] = area >= 0.5 * face.Area();
+  }
+  return is_wide;
+}
+
+// Length of the longest part of `pieces` that hangs together, m.
+double LongestChain(const std::vector<StraightPiece>& pieces) {
+  DisjointSets chains(pieces.size());
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      for (const Vector2d& a : {pieces[i].first, pieces[i].second}) {
+        for (const Vector2d& b : {pieces[j].first, pieces[j].second}) {
+          if ((a - b).norm() < kSameCorner) {
+            chains.Join(static_cast<int>(i), static_cast<int>(j));
+          }
+        }
+      }
+    }
+  }
+  std::map<int, double> lengths;
+  double longest = 0.0;
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    double& length = lengths[chains.Find(static_cast<int>(i))];
+    length += (pieces[i].second - pieces[i].first).norm();
+    longest = std::max(longest, length);
+  }
+  return longest;
+}
+
+// Makes regions of their own of corridors that open into wide spaces.
+void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
+                  std::vector<int>* region) {
+  const std::vector<bool> is_wide =
+      WideFaces(arrangement, *region, options.corridor_width);
+  DisjointSets pieces(region->size());
+  const auto is_within = [&](const ArrangementEdge& edge) {
+    return edge.left >= 0 && edge.right >= 0 &&
+           (*region)[static_cast<std::size_t>(edge.left)] >= 0 &&
+           (*region)[static_cast<std::size_t>(edge.left)] ==
+               (*region)[static_cast<std::size_t>(edge.right)];
+  };
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    if (is_within(edge) && is_wide[static_cast<std::size_t>(edge.left)] ==
+                               is_wide[static_cast<std::size_t>(edge.right)]) {
+      pieces.Join(edge.left, edge.right);
+    }
+  }
+  // Narrow pieces and the wide ones beside them.
+  std::map<int, std::map<int, std::vector<StraightPiece>>> borders;
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    if (!is_within(edge)) continue;
+    int narrow = edge.left;
+    int wide = edge.right;
+    if (is_wide[static_cast<std::size_t>(narrow)]) std::swap(narrow, wide);
+    if (pieces.Find(narrow) == pieces.Find(wide)) continue;
+    borders[pieces.Find(narrow)][pieces.Find(wide)].emplace_back(edge.begin,
+                                                                 edge.end);
+  }
+  std::map<int, std::vector<Polygon>> faces;
+  for (std::size_t i = 0; i < region->size(); ++i) {
+    if ((*region)[i] < 0) continue;
+    faces[pieces.Find(static_cast<int>(i))].push_back(arrangement.faces[i]);
+  }
+  DisjointSets joined(region->size());
+  for (const auto& [narrow, wides] : borders) {
+    const std::vector<Polygon> outlines = UnionOf(faces[narrow]);
+    Extent extent;
+    extent.area = outlines.front().Area();
+    extent.perimeter = outlines.front().Perimeter();
+    const double width = extent.Width();
+    const bool is_corridor = extent.area >= kLeastLength * width * width &&
+                             extent.area >= kLeastCorridor &&
+                             width >= options.min_width;
+    for (const auto& [wide, border] : wides) {
+      const double least = 0.5 * options.widening * LongestChain(border);
+      const std::vector<Polygon> spaces = UnionOf(faces[wide]);
+      const bool is_space = std::any_of(
+          spaces.begin(), spaces.end(),
+          [&](const Polygon& space) { return !Offset(space, -least).empty(); });
+      if (!is_corridor || !is_space) joined.Join(narrow, wide);
+    }
+  }
+  for (std::size_t i = 0; i < region->size(); ++i) {
+    if ((*region)[i] < 0) continue;
+    (*region)[i] = joined.Find(pieces.Find(static_cast<int>(i)));
+  }
+}
+
 // What is too small for a room goes to the neighbor from which least keeps it
 // apart: space in front of and behind furniture, seen or not.
 void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
@@ -266,6 +423,7 @@ std::vector<int> FindRegions(const Arrangement& arrangement,
   regions.JoinThrough(options);
   std::vector<int> region = regions.region();
   FillPockets(arrangement, options, &region);
+  CutCorridors(arrangement, options, &region);
   return region;
 }
 

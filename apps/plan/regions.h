@@ -18,6 +18,10 @@ struct RegionOptions {
   /// Regions with a lower share of wall than this between them are one: an
   /// opening as wide as a corridor is no door.
   double least_wall_share = 0.2;
+  /// A corridor is no wider than this, m; where it opens into a space that is
+  /// wider by this factor, it ends.
+  double corridor_width = 3.0;
+  double widening = 1.5;
   /// What is smaller, m^2, or narrower, m, is no region of its own and goes to
   /// the neighbor from which least keeps it apart.
   double min_area = 2.0;
@@ -31,7 +35,7 @@ struct RegionOptions {
 ///
 /// A minimum cut says which faces are inside: free and unknown space against
 /// borders where there is no wall. Then faces join across the most open borders
-/// first.
+/// first, and corridors are cut off from the wide spaces that they lead to.
 std::vector<int> FindRegions(const Arrangement& arrangement,
                              const RegionOptions& options = {});
 

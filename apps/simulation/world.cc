@@ -246,6 +246,7 @@ class WorldReader {
         {"wall", &WorldReader::ReadWall},
         {"door", &WorldReader::ReadDoor},
         {"doorway", &WorldReader::ReadDoorway},
+        {"opening", &WorldReader::ReadDoorway},
         {"circle", &WorldReader::ReadCircle},
         {"arc", &WorldReader::ReadArc},
         {"box", &WorldReader::ReadBox},
@@ -254,7 +255,7 @@ class WorldReader {
     if (reader == readers.end()) {
       throw Error(world_.name, line_,
                   "'" + PrintableUtf8(keyword_) + "' is unknown",
-                  "wall, door, doorway, circle, arc, box or path");
+                  "wall, door, doorway, opening, circle, arc, box or path");
     }
     (this->*reader->second)();
   }
@@ -286,9 +287,12 @@ class WorldReader {
 
   void ReadDoorway() {
     Require(values_.size() == 4 || values_.size() == 5,
-            "doorway x1 y1 x2 y2 [thickness]");
-    const WorldDoor door{Point(0), Point(2),
-                         values_.size() == 5 ? values_[4] : 0.0};
+            keyword_ + " x1 y1 x2 y2 [thickness]");
+    WorldDoor door;
+    door.is_opening = keyword_ == "opening";
+    door.begin = Point(0);
+    door.end = Point(2);
+    door.thickness = values_.size() == 5 ? values_[4] : 0.0;
     Require((door.end - door.begin).norm() > 0.0 && door.thickness >= 0.0,
             "two different points and a thickness of at least 0");
     world_.doors.push_back(door);
@@ -353,8 +357,9 @@ void WriteWorld(const World& world, std::ostream& output) {
                    wall.thickness});
   }
   for (const WorldDoor& door : world.doors) {
-    write("doorway", {door.begin.x(), door.begin.y(), door.end.x(),
-                      door.end.y(), door.thickness});
+    write(door.is_opening ? "opening" : "doorway",
+          {door.begin.x(), door.begin.y(), door.end.x(), door.end.y(),
+           door.thickness});
   }
   for (const WorldCircle& c : world.circles) {
     if (c.sweep_deg >= 360.0) {
@@ -461,6 +466,14 @@ class BuildingMaker {
 
   void AddWall(const Vector2d& begin, const Vector2d& end, double thickness) {
     world_.walls.push_back({begin, end, thickness});
+  }
+
+  void AddOpening(const Vector2d& begin, const Vector2d& end) {
+    WorldDoor opening;
+    opening.is_opening = true;
+    opening.begin = begin;
+    opening.end = end;
+    world_.doors.push_back(opening);
   }
 
   // A shut door in the middle of a gap that was cut into a wall with direction
@@ -631,6 +644,12 @@ class BuildingMaker {
       const double x = middle.x() + (i % 2 == 0 ? -0.27 : 0.27) * (x1 - x0);
       world_.circles.push_back({{x, y}, radius, 0.0, 360.0});
     }
+    // The corridors end in the hall.
+    AddOpening({x0, y0 - half_}, {x0, y0 + half_});
+    AddOpening({x0, y1 - half_}, {x0, y1 + half_});
+    if (row + 1 < options_.rows) {
+      AddOpening({x1, y1 + half_}, {x1 + 2 * half_, y1 + half_});
+    }
     visits_.push_back({{middle.x(), y0},
                        {middle, {xs_[column + 1], middle.y()}, middle},
                        false});
@@ -652,8 +671,7 @@ class BuildingMaker {
     // stay clear of the lowest row.
     const Vector2d root(wall_x, ys_[0] + 0.6 * (ys_[1] - ys_[0]));
     CutDoor(root, 2 * half_ / cosine + t_ * tangent, &world_);
-    // As wide as the corridor: no door.
-    world_.doors.pop_back();
+    world_.doors.back().is_opening = true;
     const Vector2d along = Direction(a);
     const Frame left{root, along, LeftOf(along)};
     const Frame right{root, along, -LeftOf(along)};

@@ -66,6 +66,8 @@ struct WorldBox {
 /// A doorway: the gap between two jambs of a wall, m, by its centre line. It
 /// stops no beam, and tells where a room ends.
 struct WorldDoor {
+  /// Where a corridor ends in a wider space: as wide as itself, no door.
+  bool is_opening = false;
   Eigen::Vector2d begin = Eigen::Vector2d::Zero();
   Eigen::Vector2d end = Eigen::Vector2d::Zero();
   /// Of the wall.

@@ -12,6 +12,7 @@ using Eigen::Vector2d;
 // Smaller spaces are gaps between walls, m^2.
 constexpr double kLeastRoom = 0.5;
 constexpr double kChordDeg = 5.0;
+constexpr double kIntoWall = 0.02;  // m
 
 // A straight body by its centre line.
 struct Body {
@@ -55,7 +56,9 @@ std::vector<Polygon> WorldRooms(const World& world) {
     bodies.push_back({wall.begin, wall.end, wall.thickness});
   }
   for (const WorldDoor& door : world.doors) {
-    bodies.push_back({door.begin, door.end, door.thickness});
+    // Into the walls beside it, so that rounding leaves no gap.
+    const Vector2d more = kIntoWall * (door.end - door.begin).normalized();
+    bodies.push_back({door.begin - more, door.end + more, door.thickness});
   }
   std::vector<StraightPiece> pieces;
   for (const Body& body : bodies) body.AppendSides(&pieces);
@@ -98,6 +101,7 @@ std::vector<Polygon> WorldRooms(const World& world) {
 std::vector<TrueDoor> WorldDoors(const World& world) {
   std::vector<TrueDoor> doors;
   for (const WorldDoor& from : world.doors) {
+    if (from.is_opening) continue;
     TrueDoor door;
     door.begin = from.begin;
     door.end = from.end;

@@ -21,12 +21,13 @@ struct TrueDoor {
 };
 
 /// The closed spaces of a world between the faces of its walls, with all doors
-/// closed: those that the path or a door leads into, the largest first.
+/// closed: those that the path or a door leads into, the largest first. A
+/// corridor ends where it opens into a wider space (WorldDoor::is_opening).
 /// Furniture and columns take nothing away. Curved walls become chords of 5
 /// degrees.
 std::vector<Polygon> WorldRooms(const World& world);
 
-/// The doors of a world in their order.
+/// The doors of a world in their order, without openings.
 std::vector<TrueDoor> WorldDoors(const World& world);
 
 }  // namespace plumbline

@@ -89,6 +89,30 @@ TEST(BuildingPlanTest, RoomsAndDoorsOfACorridor) {
   EXPECT_EQ(entered, 2);
 }
 
+// A corridor of 2 by 8 m runs into a hall of 6 by 8 m; `room_width` makes the
+// hall narrower.
+BuildingPlan CorridorIntoHall(double room_width) {
+  Drawing drawing(18.0, 12.0);
+  const double half = 0.5 * room_width;
+  drawing.Room(1.0, 5.0, 9.1, 7.0).Room(9.1, 6.0 - half, 15.0, 6.0 + half);
+  drawing.Free(9.0, 5.0, 9.2, 7.0);
+  return PlanOf(drawing);
+}
+
+TEST(BuildingPlanTest, ACorridorEndsInAHall) {
+  const BuildingPlan plan = CorridorIntoHall(8.0);
+  ASSERT_EQ(plan.rooms.size(), 2u);
+  EXPECT_NEAR(plan.rooms[0].area, 5.9 * 8.0, 1.5);
+  EXPECT_NEAR(plan.rooms[1].area, 8.1 * 2.0, 1.0);
+  EXPECT_EQ(plan.rooms[1].kind, PlanRoom::Kind::kCorridor);
+  // As wide as the corridor, without a wall beside it: no door.
+  EXPECT_TRUE(plan.doors.empty());
+}
+
+TEST(BuildingPlanTest, ACorridorThatWidensALittleIsOne) {
+  EXPECT_EQ(CorridorIntoHall(2.6).rooms.size(), 1u);
+}
+
 // No wall stands in a door, and each is joined to others at its ends.
 TEST(BuildingPlanTest, WallsCloseTheRooms) {
   const BuildingPlan plan = PlanOf(TwoRooms());

@@ -52,6 +52,20 @@ TEST(WorldRoomsTest, AShutDoor) {
   EXPECT_EQ(WorldRooms(world).size(), 2u);
 }
 
+TEST(WorldRoomsTest, OpeningsCutCorridorsOff) {
+  const std::string walls =
+      "wall 0 -1 10 -1\nwall 0 1 10 1\nwall 0 -1 0 1\n"
+      "wall 10 -5 10 -1\nwall 10 1 10 5\nwall 10 -5 18 -5\n"
+      "wall 10 5 18 5\nwall 18 -5 18 5\npath 1 0 14 0\n";
+  ASSERT_EQ(WorldRooms(Read(walls)).size(), 1u);
+  const World world = Read(walls + "opening 10 -1 10 1\n");
+  const std::vector<Polygon> rooms = WorldRooms(world);
+  ASSERT_EQ(rooms.size(), 2u);
+  EXPECT_NEAR(rooms[0].Area(), 80.0, 0.1);
+  EXPECT_NEAR(rooms[1].Area(), 20.0, 0.1);
+  EXPECT_TRUE(WorldDoors(world).empty());
+}
+
 TEST(WorldRoomsTest, SpacesWithoutADoorAreNoRooms) {
   World world = Read(kTwoRooms);
   world.doors.clear();
@@ -84,8 +98,8 @@ TEST(WorldRoomsTest, WrittenWorldsKeepTheirRooms) {
   for (std::size_t i = 0; i < rooms.size(); ++i) {
     EXPECT_NEAR(again[i].Area(), rooms[i].Area(), 0.01);
   }
-  // The corridors with hall and wing, then a room for each door.
-  EXPECT_EQ(rooms.size(), world.doors.size() + 1);
+  // Corridors, hall and wing, then a room for each door.
+  EXPECT_EQ(rooms.size(), WorldDoors(world).size() + 3);
 }
 
 }  // namespace

@@ -1,8 +1,9 @@
 // What libFuzzer does, for compilers that have none: runs every file named
 // once, then mutations of them until --seconds=N have passed, or --mutations=N
-// of each. The same --seed=N makes the same mutations. With PLUMBLINE_FUZZ_KEEP
-// in the environment every input is written to ./crash-input before it is run,
-// so that the one that ends the process is there.
+// of each. The same --seed=N makes the same mutations. --dictionary=FILE has
+// further words, as libFuzzer takes them. With PLUMBLINE_FUZZ_KEEP in the
+// environment every input is written to ./crash-input before it is run, so that
+// the one that ends the process is there.
 
 #include <chrono>
 #include <cstddef>
@@ -14,6 +15,7 @@
 #include <iterator>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
@@ -32,7 +34,37 @@ const char* const kWords[] = {
     "}",      "[",          "]",           "\"",
     ",",      ":",          "\xEF\xBB\xBF"};
 
+// The words of a dictionary, a line each: "word" or name="word", with \\, \"
+// and \xAB in it.
+std::vector<std::string> ReadDictionary(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) {
+    std::fprintf(stderr, "%s: cannot be opened\n", path.c_str());
+    std::exit(1);
+  }
+  std::vector<std::string> words;
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t begin = line.find('"');
+    const std::size_t end = line.rfind('"');
+    if (line[0] == '#' || begin == std::string::npos || end <= begin) continue;
+    std::string word;
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      if (line[i] == '\\' && i + 3 < end && line[i + 1] == 'x') {
+        word +=
+            static_cast<char>(std::stoi(line.substr(i + 2, 2), nullptr, 16));
+        i += 3;
+      } else {
+        if (line[i] == '\\') ++i;
+        word += line[i];
+      }
+    }
+    words.push_back(word);
+  }
+  return words;
+}
+
 std::string Mutate(std::string text, const std::vector<std::string>& corpus,
+                   const std::vector<std::string>& words,
                    std::mt19937_64* random) {
   const auto below = [random](std::size_t end) {
     return static_cast<std::size_t>((*random)() % end);
@@ -41,7 +73,7 @@ std::string Mutate(std::string text, const std::vector<std::string>& corpus,
   for (int i = 0; i < times && !text.empty(); ++i) {
     const std::size_t position = below(text.size());
     const std::size_t length = 1 + below(40);
-    switch (below(8)) {
+    switch (below(9)) {
       case 0:
         text[position] = "0123456789.-+eE naif\n\r\t#"[below(24)];
         break;
@@ -58,9 +90,12 @@ std::string Mutate(std::string text, const std::vector<std::string>& corpus,
         // A word in the place of another.
         const std::size_t end = text.find_first_of(" \n,]}", position);
         text.replace(position, end == std::string::npos ? end : end - position,
-                     kWords[below(std::size(kWords))]);
+                     words[below(words.size())]);
         break;
       }
+      case 7:
+        text.insert(position, words[below(words.size())]);
+        break;
       case 5: {
         // A line once more, elsewhere.
         const std::size_t begin = text.rfind('\n', position) + 1;
@@ -105,7 +140,16 @@ bool TakeNumber(const char* argument, const char* flag, long* number) {
 int main(int argc, char** argv) {
   long mutations = 0, seconds = 0, seed = 1;
   std::vector<std::string> corpus;
+  std::vector<std::string> words(std::begin(kWords), std::end(kWords));
+  constexpr char kDictionary[] = "--dictionary=";
   for (int i = 1; i < argc; ++i) {
+    if (std::strncmp(argv[i], kDictionary, std::strlen(kDictionary)) == 0) {
+      for (std::string& word :
+           ReadDictionary(argv[i] + std::strlen(kDictionary))) {
+        words.push_back(std::move(word));
+      }
+      continue;
+    }
     if (TakeNumber(argv[i], "--mutations=", &mutations) ||
         TakeNumber(argv[i], "--seconds=", &seconds) ||
         TakeNumber(argv[i], "--seed=", &seed)) {
@@ -121,7 +165,8 @@ int main(int argc, char** argv) {
   }
   if (corpus.empty()) {
     std::fprintf(stderr,
-                 "usage: %s [--seconds=N] [--mutations=N] [--seed=N] FILE...\n",
+                 "usage: %s [--seconds=N] [--mutations=N] [--seed=N] "
+                 "[--dictionary=FILE] FILE...\n",
                  argv[0]);
     return 1;
   }
@@ -131,13 +176,13 @@ int main(int argc, char** argv) {
     Run(text);
     ++executions;
     for (long k = 0; k < mutations; ++k, ++executions) {
-      Run(Mutate(text, corpus, &random));
+      Run(Mutate(text, corpus, words, &random));
     }
   }
   const Clock::time_point end = Clock::now() + std::chrono::seconds(seconds);
   while (seconds > 0 && Clock::now() < end) {
     Run(Mutate(corpus[static_cast<std::size_t>(executions) % corpus.size()],
-               corpus, &random));
+               corpus, words, &random));
     ++executions;
   }
   std::printf("%zu files, %ld executions: no failure\n", corpus.size(),

@@ -1,7 +1,8 @@
 #!/bin/sh
 # Runs every fuzz target for so many seconds on its corpus:
 #   test/fuzz/run.sh SECONDS [BUILD_DIR] [SEED]
-# BUILD_DIR (build-asan): configured with -DPLUMBLINE_BUILD_FUZZERS=ON.
+# BUILD_DIR (build-asan, that of the asan preset): configured with
+# -DPLUMBLINE_BUILD_FUZZERS=ON.
 set -eu
 seconds=${1:?seconds}
 build=${2:-build-asan}
@@ -12,8 +13,9 @@ for fuzzer in "$build"/bin/*_fuzz; do
   printf '%s: ' "$name"
   if "$fuzzer" -help=1 2>&1 | grep -q max_total_time; then
     "$fuzzer" -max_total_time="$seconds" -seed="$seed" -timeout=20 \
-      "$folder/corpus/$name" 2>&1 | tail -n 1
+      -dict="$folder/dictionaries/$name.dict" "$folder/corpus/$name" 2>&1 | tail -n 1
   else
-    "$fuzzer" --seconds="$seconds" --seed="$seed" "$folder/corpus/$name"/*
+    "$fuzzer" --seconds="$seconds" --seed="$seed" \
+      --dictionary="$folder/dictionaries/$name.dict" "$folder/corpus/$name"/*
   fi
 done

@@ -18,10 +18,13 @@ struct BorderLengths {
   /// Sum of metres times what they hold (WallProfile::holds).
   double holds = 0.0;
 
+  /// Length with a mark, m.
   double Of(Mark mark) const { return metres[static_cast<std::size_t>(mark)]; }
+  /// Sum over all marks, m.
   double length() const {
     return metres[0] + metres[1] + metres[2] + metres[3];
   }
+  /// Adds those of another border.
   void Add(const BorderLengths& other) {
     for (std::size_t i = 0; i < 4; ++i) metres[i] += other.metres[i];
     holds += other.holds;
@@ -41,6 +44,7 @@ struct ArrangementEdge {
   int line = -1;
   BorderLengths lengths;
 
+  /// m
   double length() const { return (end - begin).norm(); }
 };
 

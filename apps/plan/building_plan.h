@@ -33,6 +33,7 @@ struct BuildingPlanOptions {
 
 /// A closed space.
 struct PlanRoom {
+  /// A corridor is long and narrow.
   enum class Kind { kRoom, kCorridor };
   Kind kind = Kind::kRoom;
   /// Inner faces of its walls, m, map frame.

@@ -27,12 +27,15 @@ struct WallProfile {
   /// Samples that lie in a row of occupied cells along the line.
   std::vector<bool> in_row;
 
+  /// Number of samples.
   int size() const { return static_cast<int>(marks.size()); }
+  /// The mark of a sample, 0 to size() - 1.
   Mark At(int i) const { return marks[static_cast<std::size_t>(i)]; }
   /// The sample at `t`, m; may lie outside.
   int IndexOf(double t) const {
     return static_cast<int>(std::floor((t - begin) / kStep));
   }
+  /// Middle of a sample, along the line, m.
   double MiddleOf(int i) const { return begin + (i + 0.5) * kStep; }
 };
 

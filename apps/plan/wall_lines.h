@@ -50,9 +50,13 @@ struct WallLine {
   /// anything that speaks for a wall.
   bool is_wall = true;
 
+  /// Unit vector to the left of `along`.
   Eigen::Vector2d normal() const { return {-along[1], along[0]}; }
+  /// The point t metres along from the origin, m, map frame.
   Eigen::Vector2d At(double t) const { return origin + t * along; }
+  /// Where a point (m, map frame) lies along the line, from its origin, m.
   double Along(const Eigen::Vector2d& p) const { return along.dot(p - origin); }
+  /// How far a point lies to the left of the line, m.
   double Across(const Eigen::Vector2d& p) const {
     return normal().dot(p - origin);
   }

@@ -70,6 +70,7 @@ class BagSource {
   const std::string& format() const { return format_; }
 
  protected:
+  /// `format`: for people, as format() says it.
   explicit BagSource(std::string format) : format_(std::move(format)) {}
 
   /// Adds a topic, or finds the one of that name and type; its index.

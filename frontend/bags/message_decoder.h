@@ -26,11 +26,17 @@ class MessageDecoder {
   /// an unknown representation makes ok() false.
   MessageDecoder(std::string_view bytes, MessageEncoding encoding);
 
+  /// The next field, of that type.
   std::uint8_t UInt8();
+  /// The next field, of that type.
   std::int32_t Int32();
+  /// The next field, of that type.
   std::uint32_t UInt32();
+  /// The next field, of that type.
   float Float32();
+  /// The next field, of that type.
   double Float64();
+  /// The next field, of that type, without a terminating zero.
   std::string String();
   /// Number of elements of a sequence whose elements take at least
   /// `element_size` bytes; 0, and ok() false, when so many cannot follow.

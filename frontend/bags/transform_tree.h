@@ -63,6 +63,7 @@ class TransformTree {
   /// "odom -> base_link -> laser, ...": every way from a root, for people.
   std::string Describe() const;
 
+  /// True before the first transform.
   bool empty() const { return edges_.empty(); }
 
  private:

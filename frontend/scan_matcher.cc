@@ -49,6 +49,33 @@ constexpr double kMostRotation = DegToRad(3.0);
 // Search nodes after which Peaks gives up.
 constexpr int kMaxNodes = 3000000;
 
+// Cosine of the largest angle between the normals of partners.
+constexpr double kSameSide = 0.7;
+// The reference points around a point are kept when it moved by less than this
+// since it was looked up last, m, and those so much farther away than its
+// partner, m.
+constexpr double kListStep = 0.02;
+constexpr double kListMargin = 0.004;
+// The list serves until the normal has changed by so much.
+constexpr double kListTurn = 0.05;
+constexpr double kRounding = 1e-9;
+
+// Reference points that are compared at a time, and what single precision may
+// be off by within kReferenceReach, m.
+constexpr int kBlock = 4;
+constexpr double kFloatMargin = 2e-4;
+
+// The nearest reference point found so far. Of two at the same distance the
+// first of the reference, whatever the order of the search.
+struct Nearest {
+  int index;
+  double squared_distance;
+  bool IsBetter(int i, double distance) const {
+    return distance < squared_distance ||
+           (distance == squared_distance && index >= 0 && i < index);
+  }
+};
+
 }  // namespace
 
 ScanMatcher::ScanMatcher(const ScanMatcherOptions& options)
@@ -127,37 +154,21 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
     if (cell_of[i] < 0) continue;
     reference_[next[cell_of[i]]++] = {points[i].position, points[i].normal};
   }
+  // The last block may be read beyond the end.
+  reference_x_.assign(reference_.size() + kBlock, 0.0f);
+  reference_y_.assign(reference_.size() + kBlock, 0.0f);
+  for (std::size_t i = 0; i < reference_.size(); ++i) {
+    const Eigen::Vector2d local = reference_[i].position - origin_;
+    reference_x_[i] = static_cast<float>(local.x());
+    reference_y_[i] = static_cast<float>(local.y());
+  }
 }
 
-int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
-                                  const Eigen::Vector2d& normal, double radius,
-                                  int hint) const {
-  if (reference_.empty()) return -1;
+template <typename Look>
+void ScanMatcher::VisitBuckets(const Eigen::Vector2d& point,
+                               const double* squared_radius,
+                               const Look& look) const {
   const Eigen::Vector2d local = point - origin_;
-  const bool has_normal = normal.squaredNorm() > 0.0;
-  int best = -1;
-  double best_distance = radius * radius;
-  // Of two at the same distance the first of the reference, whatever the order
-  // of the search.
-  const auto consider = [&](int i) {
-    const Surface& candidate = reference_[i];
-    const double distance = (candidate.position - point).squaredNorm();
-    if (distance > best_distance ||
-        (distance == best_distance && (best < 0 || i >= best))) {
-      return;
-    }
-    if (has_normal && candidate.normal.dot(normal) < 0.7) return;
-    best_distance = distance;
-    best = i;
-  };
-  const auto look = [&](int row, int column_begin, int column_end) {
-    column_end = std::min(bucket_columns_ - 1, column_end);
-    if (column_begin > column_end) return;
-    const int base = row * bucket_columns_;
-    const int end = bucket_begin_[base + column_end + 1];
-    for (int i = bucket_begin_[base + column_begin]; i < end; ++i) consider(i);
-  };
-  if (hint >= 0) consider(hint);
   // Of coordinates left of the first bucket the first.
   const double buckets_per_metre = 1.0 / bucket_size_;
   const auto cell = [&](double value) {
@@ -166,18 +177,20 @@ int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
   };
   const int own_row = cell(local.y());
   // Rows outwards from there.
-  const double reach = std::sqrt(best_distance);
+  const double reach = std::sqrt(*squared_radius);
   const int row_begin = std::max(0, cell(local.y() - reach));
   const int row_end = std::min(bucket_rows_ - 1, cell(local.y() + reach));
   const auto look_at_row = [&](int row) {
     const double low = row * bucket_size_ - local.y();
     const double across = std::max({low, -low - bucket_size_, 0.0});
-    const double left = best_distance - across * across;
+    const double left = *squared_radius - across * across;
     if (left < 0.0) return;
     const double half = std::sqrt(left);
     const int begin = cell(local.x() - half);
-    const int end = cell(local.x() + half);
-    look(row, begin, end);
+    const int end = std::min(bucket_columns_ - 1, cell(local.x() + half));
+    if (begin > end) return;
+    const int base = row * bucket_columns_;
+    look(bucket_begin_[base + begin], bucket_begin_[base + end + 1]);
   };
   for (int step = 0; own_row - step >= row_begin || own_row + step <= row_end;
        ++step) {
@@ -188,7 +201,119 @@ int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
       look_at_row(own_row + step);
     }
   }
-  return best;
+}
+
+template <typename Look>
+void ScanMatcher::VisitNear(int begin, int end, const Eigen::Vector2d& point,
+                            const double* squared_radius,
+                            const Look& look) const {
+  using Block = Eigen::Array<float, kBlock, 1>;
+  const Eigen::Vector2f local = (point - origin_).cast<float>();
+  double radius = -1.0;
+  float bound = 0.0f;
+  for (int i = begin; i < end; i += kBlock) {
+    if (radius != *squared_radius) {
+      radius = *squared_radius;
+      const double reach = std::sqrt(radius) + kFloatMargin;
+      bound = static_cast<float>(reach * reach);
+    }
+    const Block x = Eigen::Map<const Block>(&reference_x_[i]) - local.x();
+    const Block y = Eigen::Map<const Block>(&reference_y_[i]) - local.y();
+    if ((x * x + y * y).minCoeff() > bound) continue;
+    const int block_end = std::min(i + kBlock, end);
+    for (int j = i; j < block_end; ++j) look(j);
+  }
+}
+
+int ScanMatcher::NearestReference(const Eigen::Vector2d& point,
+                                  const Eigen::Vector2d& normal, double radius,
+                                  int hint) const {
+  if (reference_.empty()) return -1;
+  const bool has_normal = normal.squaredNorm() > 0.0;
+  Nearest nearest{-1, radius * radius};
+  const auto consider = [&](int i) {
+    const Surface& candidate = reference_[i];
+    const double distance = (candidate.position - point).squaredNorm();
+    if (!nearest.IsBetter(i, distance)) return;
+    if (has_normal && candidate.normal.dot(normal) < kSameSide) return;
+    nearest = {i, distance};
+  };
+  if (hint >= 0) consider(hint);
+  VisitBuckets(point, &nearest.squared_distance, [&](int begin, int end) {
+    VisitNear(begin, end, point, &nearest.squared_distance, consider);
+  });
+  return nearest.index;
+}
+
+int ScanMatcher::AnyReference(const Eigen::Vector2d& point,
+                              const Eigen::Vector2d& normal, double radius,
+                              int hint) const {
+  if (reference_.empty()) return -1;
+  const double squared_radius = radius * radius;
+  const auto fits = [&](int i) {
+    return (reference_[i].position - point).squaredNorm() < squared_radius &&
+           !(reference_[i].normal.dot(normal) < kSameSide);
+  };
+  if (hint >= 0 && fits(hint)) return hint;
+  int found = -1;
+  double left = squared_radius;
+  VisitBuckets(point, &left, [&](int begin, int end) {
+    for (int i = begin; i < end && found < 0; ++i) {
+      if (fits(i)) found = i;
+    }
+    if (found >= 0) left = -1.0;
+  });
+  return found;
+}
+
+int ScanMatcher::NearestAgain(const Eigen::Vector2d& point,
+                              const Eigen::Vector2d& normal, double radius,
+                              int hint, Lookup* lookup) const {
+  if (reference_.empty()) return -1;
+  if (lookup->reach >= 0.0 &&
+      (normal - lookup->normal).squaredNorm() < kListTurn * kListTurn) {
+    // What is not in the list is farther away than this, whatever was rounded.
+    const double known =
+        lookup->reach - (point - lookup->center).norm() - kRounding;
+    Nearest nearest{-1, radius * radius};
+    for (int k = lookup->begin; k < lookup->end; ++k) {
+      const Neighbour& candidate = around_[k];
+      const double distance =
+          (candidate.surface.position - point).squaredNorm();
+      if (!nearest.IsBetter(candidate.index, distance) ||
+          candidate.surface.normal.dot(normal) < kSameSide) {
+        continue;
+      }
+      nearest = {candidate.index, distance};
+    }
+    if (known > 0.0 && nearest.squared_distance < known * known) {
+      return nearest.index;
+    }
+  }
+  const int partner = NearestReference(point, normal, radius, hint);
+  // A list pays once the point hardly moves.
+  lookup->reach = -1.0;
+  const double step = (point - lookup->last).norm();
+  if (step < kListStep) {
+    lookup->center = point;
+    lookup->normal = normal;
+    lookup->begin = static_cast<int>(around_.size());
+    lookup->reach =
+        std::max(2.0 * step, kListMargin) +
+        (partner >= 0 ? (reference_[partner].position - point).norm() : radius);
+    const double squared_reach = lookup->reach * lookup->reach;
+    VisitBuckets(point, &squared_reach, [&](int begin, int end) {
+      VisitNear(begin, end, point, &squared_reach, [&](int i) {
+        const Surface& candidate = reference_[i];
+        if ((candidate.position - point).squaredNorm() <= squared_reach &&
+            candidate.normal.dot(normal) >= kSameSide - kListTurn - kRounding) {
+          around_.push_back({candidate, i});
+        }
+      });
+    });
+    lookup->end = static_cast<int>(around_.size());
+  }
+  return partner;
 }
 
 MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
@@ -196,7 +321,8 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
                                 const MatchPrior& prior) const {
   MatchResult result;
   result.pose = guess;
-  partners_.assign(scan.size(), -1);
+  lookups_.assign(scan.size(), Lookup());
+  around_.clear();
   const double inverse_variance =
       1.0 / (options_.point_sigma * options_.point_sigma);
   Eigen::Matrix3d information;
@@ -226,10 +352,12 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
       const Eigen::Vector2d normal(c * point.normal.x() - s * point.normal.y(),
                                    s * point.normal.x() + c * point.normal.y());
       // The partner that it had is near, as is that of the beam before.
-      const int index =
-          NearestReference(position, normal, radius,
-                           partners_[i] >= 0 ? partners_[i] : neighbour);
-      partners_[i] = index;
+      Lookup& lookup = lookups_[i];
+      const int index = NearestAgain(
+          position, normal, radius,
+          lookup.partner >= 0 ? lookup.partner : neighbour, &lookup);
+      lookup.partner = index;
+      lookup.last = position;
       neighbour = index;
       if (index < 0) {
         cost += 4.0;
@@ -286,9 +414,9 @@ double ScanMatcher::Overlap(const std::vector<ScanPoint>& scan,
   for (const ScanPoint& point : scan) {
     if (point.normal.squaredNorm() == 0.0) continue;
     ++tried;
-    neighbour = NearestReference(transform.Point(point.position),
-                                 transform.Direction(point.normal),
-                                 options_.initial_radius, neighbour);
+    neighbour = AnyReference(transform.Point(point.position),
+                             transform.Direction(point.normal),
+                             options_.initial_radius, neighbour);
     if (neighbour >= 0) ++found;
   }
   return tried > 0 ? static_cast<double>(found) / tried : 0.0;

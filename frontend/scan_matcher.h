@@ -151,6 +151,19 @@ class ScanMatcher {
   int NearestReference(const Eigen::Vector2d& point,
                        const Eigen::Vector2d& normal, double radius,
                        int hint) const;
+  // Index of any such reference point.
+  int AnyReference(const Eigen::Vector2d& point, const Eigen::Vector2d& normal,
+                   double radius, int hint) const;
+  // Calls `look(begin, end)` with the reference points of the buckets within
+  // `*squared_radius`, which it may lower, of a point: nearest rows first.
+  template <typename Look>
+  void VisitBuckets(const Eigen::Vector2d& point, const double* squared_radius,
+                    const Look& look) const;
+  // Calls `look(i)` with all in [begin, end) that lie within `*squared_radius`,
+  // which it may lower, of a point, and some that do not.
+  template <typename Look>
+  void VisitNear(int begin, int end, const Eigen::Vector2d& point,
+                 const double* squared_radius, const Look& look) const;
 
   ScanMatcherOptions options_;
   // What matching needs of a reference point: the search runs through many.
@@ -159,8 +172,33 @@ class ScanMatcher {
     Eigen::Vector2d normal;
   };
   std::vector<Surface> reference_;
-  // By point of the scan that is refined.
-  mutable std::vector<int> partners_;
+  // The positions again, from origin_ on, to leave out what is clearly too far
+  // away several at a time.
+  std::vector<float> reference_x_;
+  std::vector<float> reference_y_;
+  // A point of the scan that is refined: its partner, and copies of the
+  // reference points around the place where it was last looked up. While it
+  // stays near, its partner is one of them.
+  struct Lookup {
+    int partner = -1;
+    int begin = 0;
+    int end = 0;
+    // No other reference point whose normal may agree lies within `reach` of
+    // `center`; negative when the points around are not known.
+    double reach = -1.0;
+    Eigen::Vector2d center = Eigen::Vector2d::Zero();
+    Eigen::Vector2d normal = Eigen::Vector2d::Zero();
+    Eigen::Vector2d last = Eigen::Vector2d::Zero();
+  };
+  struct Neighbour {
+    Surface surface;
+    int index;
+  };
+  mutable std::vector<Lookup> lookups_;
+  mutable std::vector<Neighbour> around_;
+  // NearestReference for a point that was looked up before.
+  int NearestAgain(const Eigen::Vector2d& point, const Eigen::Vector2d& normal,
+                   double radius, int hint, Lookup* lookup) const;
   // Buckets of reference points, by counting sort over cells.
   double bucket_size_ = 0.1;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();

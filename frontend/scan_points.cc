@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -43,12 +44,15 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
 
   const int n = static_cast<int>(points->size());
   const Eigen::Vector2d laser = scan.laser_offset.head<2>();
+  // Whether a return lies on the surface of the one before it.
+  std::vector<char> goes_on(static_cast<std::size_t>(n), 0);
+  for (int i = 1; i < n; ++i) {
+    goes_on[i] =
+        SameSurface((*points)[i - 1], (*points)[i], scan.angle_step, options);
+  }
   int surface_begin = 0;
   for (int i = 0; i < n; ++i) {
-    if (i > 0 && !SameSurface((*points)[i - 1], (*points)[i], scan.angle_step,
-                              options)) {
-      surface_begin = i;
-    }
+    if (!goes_on[i]) surface_begin = i;
     ScanPoint& point = (*points)[i];
     // Far away neighbours are far apart: widen the fit to hold two on each
     // side where the surface allows.
@@ -62,9 +66,7 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
       --begin;
     }
     int end = i + 1;
-    while (end < n &&
-           SameSurface((*points)[end - 1], (*points)[end], scan.angle_step,
-                       options) &&
+    while (end < n && goes_on[end] &&
            ((*points)[end].position - point.position).squaredNorm() <=
                radius * radius) {
       ++end;

@@ -15,6 +15,10 @@ namespace {
 
 constexpr double kIndexCell = 1.0;
 constexpr double kCoveragePiece = 0.1;
+constexpr double kRounding = 1e-9;
+// Cells that are compared at a time, and what single precision may be off by.
+constexpr int kBlock = 4;
+constexpr float kFloatMargin = 1.001f;
 // A wall has at least so many cells.
 constexpr std::size_t kFewestCells = 6;
 
@@ -328,6 +332,7 @@ class Completion {
     }
     for (Bucket& bucket : buckets_) {
       bucket.around = BucketsAround(bucket.middle);
+      bucket.FillLocal();
     }
   }
 
@@ -374,6 +379,9 @@ class Completion {
 
   // Takes what has been used out of the buckets.
   void DropUsed() {
+    std::sort(used_up_.begin(), used_up_.end());
+    used_up_.erase(std::unique(used_up_.begin(), used_up_.end()),
+                   used_up_.end());
     for (const int k : used_up_) {
       std::vector<Bucket::Entry>& entries = buckets_[k].entries;
       entries.erase(std::remove_if(entries.begin(), entries.end(),
@@ -381,6 +389,7 @@ class Completion {
                                      return cells_[entry.index].used;
                                    }),
                     entries.end());
+      buckets_[k].FillLocal();
     }
     used_up_.clear();
   }
@@ -457,29 +466,36 @@ class Completion {
     for (std::size_t k = 0; k < members.size(); ++k) {
       const Cell& cell = cells_[members[k]];
       const std::size_t size = members.size();
-      for (const int bucket : buckets_[cell.bucket].around) {
-        if (bucket < 0 ||
-            std::abs(Cross(line->direction,
-                           buckets_[bucket].middle - line->point())) >
-                ReachAcross() + bucket_size_) {
-          continue;
-        }
-        for (const Bucket::Entry& entry : buckets_[bucket].entries) {
+      // Reaches of a bucket's square across the line, and of the line.
+      const double reach = ReachAcross();
+      const double half_width =
+          0.5 * bucket_size_ *
+              (std::abs(line->direction.x()) + std::abs(line->direction.y())) +
+          kRounding;
+      for (const int k_bucket : buckets_[cell.bucket].around) {
+        if (k_bucket < 0) continue;
+        const Bucket& bucket = buckets_[k_bucket];
+        const double across =
+            Cross(line->direction, bucket.middle - line->point());
+        if (std::abs(across) > reach + half_width) continue;
+        const auto look = [&](const Bucket::Entry& entry) {
           if ((entry.mean - cell.mean).squaredNorm() > squared_gap ||
-              in[entry.index] || line->Distance(entry.mean) > ReachAcross()) {
-            continue;
+              in[entry.index] || line->Distance(entry.mean) > reach) {
+            return;
           }
           const Cell& other = cells_[entry.index];
           // Seen from the same side.
-          if (other.view.dot(cells_[seed].view) < 0.0) continue;
+          if (other.view.dot(cells_[seed].view) < 0.0) return;
           if (other.direction.squaredNorm() > 0.0 &&
               std::abs(other.direction.dot(line->direction)) < cos_turn) {
-            continue;
+            return;
           }
           in[entry.index] = 1;
           members.push_back(entry.index);
           fit.Add(entry.mean - line->origin, 1.0);
-        }
+        };
+        bucket.VisitNear(cell.mean, squared_gap, line->direction, across, reach,
+                         look);
       }
       if (members.size() >= kFewestCells && members.size() > size) {
         line->FitTo(fit);
@@ -737,6 +753,50 @@ class Completion {
     Eigen::Vector2d middle;
     // Itself and those beside it, -1 for none.
     std::array<int, 9> around;
+    // The means once more, from the middle on, to leave out what is clearly too
+    // far away several at a time.
+    std::vector<float> x, y;
+
+    // After every change of the entries.
+    void FillLocal() {
+      constexpr float kNowhere = 1e6f;
+      x.assign(entries.size() + kBlock, kNowhere);
+      y.assign(entries.size() + kBlock, kNowhere);
+      for (std::size_t i = 0; i < entries.size(); ++i) {
+        const Eigen::Vector2d local = entries[i].mean - middle;
+        x[i] = static_cast<float>(local.x());
+        y[i] = static_cast<float>(local.y());
+      }
+    }
+
+    // Calls `look(entry)`, in their order, with those within the gap of a place
+    // and within `reach` of a line, and some more. The line has a direction and
+    // passes the middle at `across`, which is to its left.
+    template <typename Look>
+    void VisitNear(const Eigen::Vector2d& place, double squared_gap,
+                   const Eigen::Vector2d& direction, double across,
+                   double reach, const Look& look) const {
+      using Block = Eigen::Array<float, kBlock, 1>;
+      const Eigen::Vector2f local = (place - middle).cast<float>();
+      const Eigen::Vector2f along = direction.cast<float>();
+      const auto offset = static_cast<float>(across);
+      const auto per_gap = static_cast<float>(1.0 / squared_gap);
+      const auto per_reach = static_cast<float>(1.0 / reach);
+      const std::size_t count = entries.size();
+      for (std::size_t i = 0; i < count; i += kBlock) {
+        const Eigen::Map<const Block> own_x(&x[i]);
+        const Eigen::Map<const Block> own_y(&y[i]);
+        const Block dx = own_x - local.x();
+        const Block dy = own_y - local.y();
+        const Block gaps = (dx * dx + dy * dy) * per_gap;
+        const Block offsets =
+            (offset + (along.x() * own_y - along.y() * own_x)).abs() *
+            per_reach;
+        if (gaps.max(offsets).minCoeff() > kFloatMargin) continue;
+        const std::size_t end = std::min<std::size_t>(i + kBlock, count);
+        for (std::size_t j = i; j < end; ++j) look(entries[j]);
+      }
+    }
   };
   std::vector<Bucket> buckets_;
   std::unordered_map<std::int64_t, int> bucket_of_;

@@ -95,6 +95,7 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
         options.independence / (options.point_sigma * options.point_sigma *
                                 std::max(1, places[k].num_scans));
     std::map<FeatureId, WallVote> of_wall;
+    WallVote* last = nullptr;
     // Neighbouring returns mostly fall into one cell.
     WallGrid::Cell cell = WallGrid::Key(poses[k].head<2>());
     const std::vector<int>* near = grid.In(cell);
@@ -122,8 +123,12 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
         }
       }
       if (hit == kNoId) continue;
-      WallVote& vote = of_wall[hit];
-      vote.wall = hit;
+      // Neighbouring returns mostly lie on one wall.
+      if (last == nullptr || last->wall != hit) {
+        last = &of_wall[hit];
+        last->wall = hit;
+      }
+      WallVote& vote = *last;
       ++vote.points;
       const Eigen::Vector3d homogeneous(point.position.x(), point.position.y(),
                                         1.0);

@@ -102,6 +102,70 @@ TEST(ScanMatcherTest, CovarianceCoversTheErrorsOfNoisyScans) {
   EXPECT_LT(sum / kScans, 4.5);
 }
 
+// Every step of the refinement must pair returns with the nearest reference
+// points, whatever is remembered from the step before: each match, begun anew
+// with one more step allowed, is compared with a search through all points.
+TEST(ScanMatcherTest, EveryStepPairsWithTheNearest) {
+  Laser laser = FullCircle();
+  laser.sigma = 0.02;
+  Noise noise(11);
+  std::vector<ScanPoint> reference;
+  for (const double x : {-0.5, -0.3, 0.0, 0.2}) {
+    const Pose2 robot(x, 0.5 * x, 0.3 * x);
+    const std::vector<ScanPoint> seen = Transformed(
+        PointsOf(MakeScan(RoomWithPillar(), robot, laser, &noise)), robot);
+    reference.insert(reference.end(), seen.begin(), seen.end());
+  }
+  const Pose2 truth(-0.2, 0.3, 0.25);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), truth, laser, &noise));
+  const Pose2 guess = truth + Pose2(0.15, -0.1, DegToRad(3.0));
+  ScanMatcherOptions options = Options();
+  options.convergence = 0.0;
+  Pose2 pose = guess;
+  for (int steps = 1; steps <= 12; ++steps) {
+    SCOPED_TRACE(steps);
+    options.max_iterations = steps;
+    ScanMatcher matcher(options);
+    matcher.SetReference(reference);
+    const MatchResult match = matcher.Refine(scan, guess, MatchPrior());
+    // What the last step saw from where the one before it had led.
+    const double progress = std::min(1.0, (steps - 1) / 6.0);
+    const double radius =
+        options.initial_radius +
+        progress * (options.final_radius - options.initial_radius);
+    const PoseTransform transform(pose);
+    int inliers = 0;
+    int tried = 0;
+    double cost = 0.0;
+    for (const ScanPoint& point : scan) {
+      if (point.normal.squaredNorm() == 0.0) continue;
+      ++tried;
+      const Eigen::Vector2d position = transform.Point(point.position);
+      const Eigen::Vector2d normal = transform.Direction(point.normal);
+      const ScanPoint* nearest = nullptr;
+      double least = radius;
+      for (const ScanPoint& candidate : reference) {
+        const double distance = (candidate.position - position).norm();
+        if (distance < least && candidate.normal.dot(normal) >= 0.7) {
+          least = distance;
+          nearest = &candidate;
+        }
+      }
+      if (nearest != nullptr) ++inliers;
+      const double error =
+          nearest == nullptr
+              ? 1e9
+              : nearest->normal.dot(position - nearest->position) /
+                    options.point_sigma;
+      cost += std::min(4.0, error * error);
+    }
+    EXPECT_EQ(match.inliers, inliers);
+    EXPECT_NEAR(match.cost, cost / tried, 1e-9);
+    pose = match.pose;
+  }
+}
+
 TEST(ScanMatcherTest, SearchFindsAWrongTurn) {
   ScanMatcher matcher(Options());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)));

@@ -466,6 +466,32 @@ void JointAdjustment::Adjust() {
     if (moved <= options_.settled_distance || (stop_ && stop_())) break;
     if (pass + 1 < options_.max_passes) Match();
   }
+  DropWallsWithoutVotes();
+}
+
+void JointAdjustment::DropWallsWithoutVotes() {
+  Transaction change;
+  for (const Feature* feature : std::as_const(*graph_).Features()) {
+    if (!feature->type->Is(FeatureRole::kWall) || feature->level != 0 ||
+        feature->fixed) {
+      continue;
+    }
+    bool is_held = false;
+    for (const ConstraintId id : graph_->ConstraintsOf(feature->id)) {
+      const Constraint& constraint = std::as_const(*graph_).GetConstraint(id);
+      // What holds it along itself holds nothing else.
+      is_held = is_held ||
+                (constraint.state == ConstraintState::kLive &&
+                 constraint.kind == ConstraintClass::kMeasurement &&
+                 constraint.information.trace() > constraint.information(0, 0));
+    }
+    if (is_held) continue;
+    for (const ConstraintId id : graph_->ConstraintsOf(feature->id)) {
+      change.RemoveConstraint(id);
+    }
+    change.RemoveFeature(feature->id);
+  }
+  if (!change.empty()) graph_->Apply(std::move(change));
 }
 
 std::vector<Pose2> JointAdjustment::PlacePoses() const {

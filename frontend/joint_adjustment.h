@@ -35,7 +35,7 @@ struct JointAdjustmentOptions {
   /// Chi-square at which a scan relation counts half (Cauchy).
   double loss_scale = 2.0;
   /// Bounds of the factors by which EstimateVariances changes variances.
-  double min_variance_factor = 0.1;
+  double min_variance_factor = 0.05;
   double max_variance_factor = 4.0;
   /// Rounds of taking votes and weights anew, each followed by a solve.
   int rounds = 3;
@@ -128,7 +128,8 @@ class JointAdjustment {
 
   /// Takes votes and weights anew at the present state and solves, `rounds`
   /// times, then matches what has come near and starts again, until the poses
-  /// have settled or `stop` returns true. Throws Error when a solve fails.
+  /// have settled or `stop` returns true. Walls that have lost all their
+  /// returns to others go then. Throws Error when a solve fails.
   void Adjust();
 
   /// The key poses as they stand (KeyPosesOfPlaces).
@@ -162,6 +163,8 @@ class JointAdjustment {
                                              Transaction* change) const;
   void Match();
   void Vote();
+  // Others have taken all its returns.
+  void DropWallsWithoutVotes();
   void Reweigh();
   void Solve();
 

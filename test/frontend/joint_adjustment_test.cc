@@ -210,6 +210,33 @@ TEST_F(JointAdjustmentTest, PosesFirstThenWalls) {
   EXPECT_EQ(adjustment.KeyPoses()[0], keys_[0]);
 }
 
+// A wall to which the adjustment leaves no return is held along itself only:
+// its place across would mean nothing.
+TEST_F(JointAdjustmentTest, AWallThatLosesItsReturnsGoes) {
+  Graph graph;
+  SolverSession session(&graph, registry_, {});
+  JointAdjustment adjustment(&graph, &session, registry_, scans_, refined_,
+                             records_, keys_, kNoId, options_);
+  adjustment.Adjust();
+  Transaction walls;
+  for (const FeatureId id : walls_) {
+    Feature wall = std::as_const(graph_).GetFeature(id);
+    wall.fixed = false;
+    walls.AddFeature(wall);
+  }
+  adjustment.AddWalls(std::move(walls));
+  std::vector<FeatureId> found;
+  for (const Feature* feature : std::as_const(graph).Features()) {
+    if (feature->type->Is(FeatureRole::kWall)) found.push_back(feature->id);
+  }
+  ASSERT_EQ(found.size(), 4u);
+  Feature& lost = graph.GetFeature(found[2]);
+  lost.parameters[1] += 0.5;
+  adjustment.Adjust();
+  EXPECT_EQ(graph.FindFeature(found[2]), nullptr);
+  for (const int i : {0, 1, 3}) EXPECT_NE(graph.FindFeature(found[i]), nullptr);
+}
+
 // Odometry and matches that promise too little are believed as far as they
 // agree, within bounds; what few links say is not.
 TEST_F(JointAdjustmentTest, VariancesComeFromResiduals) {

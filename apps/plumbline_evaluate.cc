@@ -236,7 +236,7 @@ Json EvaluateAgainstReference(const TrajectoryFile& trajectory) {
   const Json alignment_json = TellAlignment(alignment, transform);
   comparison.absolute = ComputeAbsoluteErrors(comparison.pairs);
   comparison.steps.delta = FLAGS_rpe_delta;
-  comparison.steps.delta_is_m = FLAGS_rpe_unit != "frames";
+  comparison.steps.delta_is_m = std::string("m") == FLAGS_rpe_unit;
   comparison.steps.all_pairs = FLAGS_rpe_all_pairs;
   comparison.relative = ForFlag("rpe_delta", [&] {
     return ComputeRelativeErrors(comparison.pairs, comparison.steps);

@@ -25,6 +25,7 @@
 #include <plumbline/outputs/summary.h>
 #include <plumbline/pipeline/graph_solver.h>
 #include <plumbline/pipeline/log_solver.h>
+#include <plumbline/pipeline/several_logs.h>
 #include <plumbline/pipeline/without_structure.h>
 
 #include <algorithm>
@@ -162,8 +163,10 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin,
 
 // All files that the run reads, as far as flags name them.
 std::vector<std::filesystem::path> InputFiles() {
-  std::vector<std::filesystem::path> files = {
-      FLAGS_input == "-" ? "/dev/stdin" : FLAGS_input, FLAGS_structure_prior};
+  std::vector<std::filesystem::path> files = {FLAGS_structure_prior};
+  for (const std::string& input : InputsFromFlags()) {
+    files.emplace_back(input == "-" ? "/dev/stdin" : input);
+  }
   std::istringstream plugins(FLAGS_plugins);
   std::string plugin;
   while (std::getline(plugins, plugin, ',')) files.push_back(plugin);
@@ -430,6 +433,60 @@ CheckpointFile::Identity IdentityOfRun(const Log& log) {
   return identity;
 }
 
+// What there is to say and to write of a log's map. `result` has to stay until
+// the outputs are written.
+void TakeMap(const std::string& name, const std::vector<Scan>& scans,
+             const LogSolver& solver, const Registry& registry,
+             const LogSolverOptions& options, LogSolverResult* result,
+             SolveOutcome* outcome) {
+  Summary& summary = outcome->summary;
+  for (const EmPhase& phase : solver.trace()) TellPhase(phase);
+  summary.scans = static_cast<std::int64_t>(result->trajectory.size());
+  summary.scans_in_log = static_cast<std::int64_t>(scans.size());
+  for (const LooseTrack& part : result->loose) {
+    const Scan& begin_scan = scans[static_cast<std::size_t>(part.begin)];
+    const Scan& end_scan = scans[static_cast<std::size_t>(part.end)];
+    summary.tracking.loose.push_back(
+        {begin_scan.timestamp, end_scan.timestamp, part.why});
+    if (!part.found) ++summary.tracking.pieces;
+    Remark("%s: the map hangs by a thread, %.3f s to %.3f s: %s", name.c_str(),
+           begin_scan.timestamp, end_scan.timestamp, part.why.c_str());
+  }
+  if (result->second_map_refused) {
+    summary.notes.push_back(
+        "the map from adjusted poses has hardly any walls: the map of the "
+        "front-end stands");
+    Remark("%s: %s", name.c_str(), summary.notes.back().c_str());
+  }
+  summary.frontend_seconds =
+      result->frontend_seconds + result->relocalization_seconds;
+  summary.scan_seconds.assign(result->scan_seconds.begin(),
+                              result->scan_seconds.end());
+
+  for (std::size_t i = 0; i < result->trajectory.size(); ++i) {
+    TimedPose timed;
+    timed.timestamp = scans[i].timestamp;
+    timed.timestamp_text = scans[i].timestamp_text;
+    timed.pose = result->trajectory[i];
+    outcome->trajectory.push_back(timed);
+  }
+  result->em.detect_seconds = result->detect_seconds;
+  result->em.solve_seconds = result->solve_seconds;
+  Summarize(result->initial_cost, result->final_cost, result->em, &summary);
+  outcome->graph = &solver.graph();
+  outcome->registry = &registry;
+  if (!InterruptRequested()) TakeMarginals(nullptr, outcome);
+  outcome->scans = &scans;
+  outcome->without_structure = [&scans, &registry, &options, result] {
+    return ReplayWithoutStructure(scans, registry, options, *result,
+                                  [] { return InterruptRequested(); });
+  };
+  outcome->trace = solver.trace();
+  outcome->occupancy = OccupancyOptionsFromFlags();
+  outcome->title = TitleOf(name) + (FLAGS_structure ? ", with structure"
+                                                    : ", without structure");
+}
+
 int SolveLog(const LogInput& input, const Registry& registry, double begin,
              OutputFolder* folder) {
   SolveOutcome outcome;
@@ -505,55 +562,199 @@ int SolveLog(const LogInput& input, const Registry& registry, double begin,
         state ? solver.Resume(log, *state, control) : solver.Run(log, control);
     state.reset();
   }
-  for (const EmPhase& phase : solver.trace()) TellPhase(phase);
-  summary.scans = static_cast<std::int64_t>(result.trajectory.size());
-  summary.scans_in_log = static_cast<std::int64_t>(log.scans.size());
-  for (const LooseTrack& part : result.loose) {
-    const Scan& begin_scan = log.scans[static_cast<std::size_t>(part.begin)];
-    const Scan& end_scan = log.scans[static_cast<std::size_t>(part.end)];
-    summary.tracking.loose.push_back(
-        {begin_scan.timestamp, end_scan.timestamp, part.why});
-    if (!part.found) ++summary.tracking.pieces;
-    Remark("%s: the map hangs by a thread, %.3f s to %.3f s: %s",
-           input.name.c_str(), begin_scan.timestamp, end_scan.timestamp,
-           part.why.c_str());
-  }
-  if (result.second_map_refused) {
-    summary.notes.push_back(
-        "the map from adjusted poses has hardly any walls: the map of the "
-        "front-end stands");
-    Remark("%s: %s", input.name.c_str(), summary.notes.back().c_str());
-  }
-  summary.frontend_seconds =
-      result.frontend_seconds + result.relocalization_seconds;
-  summary.scan_seconds.assign(result.scan_seconds.begin(),
-                              result.scan_seconds.end());
-
-  for (std::size_t i = 0; i < result.trajectory.size(); ++i) {
-    TimedPose timed;
-    timed.timestamp = log.scans[i].timestamp;
-    timed.timestamp_text = log.scans[i].timestamp_text;
-    timed.pose = result.trajectory[i];
-    outcome.trajectory.push_back(timed);
-  }
-  result.em.detect_seconds = result.detect_seconds;
-  result.em.solve_seconds = result.solve_seconds;
-  Summarize(result.initial_cost, result.final_cost, result.em, &summary);
-  outcome.graph = &solver.graph();
-  outcome.registry = &registry;
-  if (!InterruptRequested()) TakeMarginals(nullptr, &outcome);
-  outcome.scans = &log.scans;
-  outcome.without_structure = [&] {
-    return ReplayWithoutStructure(log.scans, registry, options, result,
-                                  [] { return InterruptRequested(); });
-  };
-  outcome.trace = solver.trace();
-  outcome.occupancy = OccupancyOptionsFromFlags();
-  outcome.title =
-      TitleOf(input.name) +
-      (FLAGS_structure ? ", with structure" : ", without structure");
+  TakeMap(input.name, log.scans, solver, registry, options, &result, &outcome);
   WriteOutputs(&outcome, begin, folder);
   if (!summary.partial) checkpoint.Remove();
+  return kExitSuccess;
+}
+
+// An input, and its stream where it is not read by its path.
+struct OpenInput {
+  LogInput log;
+  std::optional<InputStream> stream;
+  bool is_graph = false;
+};
+
+// Null when that was interrupted. `reader`: that of --log_reader, or null.
+std::unique_ptr<OpenInput> Open(const std::string& name,
+                                const Registry& registry,
+                                const LogReaderType* reader) {
+  auto input = std::make_unique<OpenInput>();
+  input->log.name = name;
+  if (name != "-") {
+    const bool takes_path = reader != nullptr && reader->read_path != nullptr &&
+                            reader->recognizes_path != nullptr &&
+                            reader->recognizes_path(name);
+    input->log.reader = takes_path          ? reader
+                        : reader == nullptr ? RecognizeLogPath(registry, name)
+                                            : nullptr;
+  }
+  if (input->log.reader != nullptr) return input;
+  input->stream.emplace(name, [] { return InterruptRequested(); });
+  const std::string_view prefix = input->stream->Peek(1 << 16);
+  if (prefix.empty() && InterruptRequested()) return nullptr;
+  if (reader == nullptr) reader = RecognizeLog(registry, prefix);
+  input->is_graph = reader == nullptr && LooksLikeG2o(prefix);
+  // What nobody recognizes is for the reader of the commonest format to
+  // refuse: it says what it found.
+  if (reader == nullptr) reader = &registry.Get<LogReaderType>("carmen");
+  input->log.reader = reader;
+  input->log.stream = &*input->stream;
+  input->log.name = input->stream->name();
+  return input;
+}
+
+// What a summary says of several logs: their notes and what was passed over.
+void AddNotes(const std::string& title, const Summary& log, Summary* summary) {
+  for (SkipReport skip : log.skipped) {
+    skip.reason = title + ": " + skip.reason;
+    summary->skipped.push_back(std::move(skip));
+  }
+  for (const std::string& note : log.notes) {
+    summary->notes.push_back(title + ": " + note);
+  }
+  summary->log_format = log.log_format;
+  summary->scan_source = log.scan_source;
+  summary->odometry_source = log.odometry_source;
+}
+
+// Where the files of a map go: those of the first log's map into the output
+// folder itself.
+std::string FolderOfMap(std::size_t map) {
+  return map == 0 ? "" : "map_" + std::to_string(map + 1);
+}
+
+// What became of each log.
+std::vector<Summary::LogInput> DescribeLogs(
+    const std::vector<std::unique_ptr<OpenInput>>& inputs,
+    const SeveralLogsResult& solved) {
+  std::vector<Summary::LogInput> logs;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const LogInMap& in_map = solved.logs[i];
+    const TrackPlacement& placement = in_map.placement;
+    Summary::LogInput log;
+    log.input = inputs[i]->log.name;
+    log.trajectory = "trajectory_" + std::to_string(i + 1) + ".tum";
+    log.scans = static_cast<std::int64_t>(in_map.end - in_map.begin);
+    log.map = FolderOfMap(in_map.map);
+    log.parts = placement.windows;
+    log.agreeing = placement.agreeing;
+    log.contradicting = placement.contradicting;
+    if (!placement.found && in_map.map > 0) log.why_apart = placement.why_not;
+    if (placement.found) {
+      Remark(
+          "%s: placed in the map: %d of %d parts of it agree with it, to "
+          "%.2f m; %d contradict it",
+          log.input.c_str(), log.agreeing, log.parts, placement.misfit,
+          log.contradicting);
+    } else if (!log.why_apart.empty()) {
+      Remark("%s: kept apart, in %s: %s", log.input.c_str(),
+             (std::filesystem::path(FLAGS_output_dir) / log.map).c_str(),
+             log.why_apart.c_str());
+    }
+    logs.push_back(std::move(log));
+  }
+  return logs;
+}
+
+int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
+              const std::vector<std::optional<Pose2>>& starts,
+              const Registry& registry, double begin, OutputFolder* folder) {
+  SeveralLogsOptions options;
+  options.solver = LogSolverOptionsFromFlags(registry);
+  options.starts = starts;
+  CheckHierarchy(options.solver, registry);
+  RemarkOnFlags("--input", "list of logs", "graphs", GraphFlags());
+  if (options.solver.features != RawFeatures::kSegments ||
+      options.solver.refine != Refinement::kFull) {
+    throw Error("--input", 0,
+                "several logs do not go with --features=points, "
+                "--refine=map or --refine=none",
+                "segments and full refinement");
+  }
+  Summary common;
+  common.input = FLAGS_input;
+  common.seed = FLAGS_seed;
+  common.flags = ChangedFlags();
+  std::vector<Log> logs;
+  const double parse_begin = Now();
+  for (const std::unique_ptr<OpenInput>& input : inputs) {
+    const std::string& name = input->log.name;
+    Log log = ReadInput(input->log);
+    Summary of_log;
+    TellOfLog(name, log, &of_log);
+    if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
+    if (!log.has_odometry) {
+      MatchScansAlone(name, options.solver, &log, &of_log);
+    }
+    AddNotes(TitleOf(name), of_log, &common);
+    logs.push_back(std::move(log));
+  }
+  common.parse_seconds = Now() - parse_begin;
+
+  SeveralLogsResult solved;
+  {
+    const double begin_solving = Now();
+    std::unique_ptr<Progress> progress;
+    bool is_taking_scans = false;
+    std::int64_t steps = 0;
+    std::vector<std::int64_t> scans;
+    for (const Log& log : logs) {
+      scans.push_back(static_cast<std::int64_t>(log.scans.size()));
+    }
+    SeveralLogsControl control;
+    control.begin_log = [&](std::size_t i) {
+      progress.reset();
+      progress =
+          std::make_unique<Progress>("log " + std::to_string(i + 1) + " of " +
+                                         std::to_string(scans.size()),
+                                     "scans", scans[i]);
+      is_taking_scans = true;
+    };
+    control.run.progress = [&](std::size_t done, std::size_t total) {
+      progress->Update(static_cast<std::int64_t>(done));
+      if (done < total) return;
+      progress.reset();
+      progress = std::make_unique<Progress>("adjusting", "steps", 0);
+      is_taking_scans = false;
+    };
+    control.run.stop = [&] {
+      if (!is_taking_scans && progress != nullptr) progress->Update(++steps);
+      return InterruptRequested();
+    };
+    control.run.step = [&](const char* step) {
+      Detail("%s, after %.1f s", step, Now() - begin_solving);
+    };
+    solved = SolveSeveralLogs(registry, std::move(logs), options, control);
+  }
+  if (solved.interrupted) {
+    std::fprintf(stderr,
+                 "interrupted: the logs are not put together, nothing is "
+                 "written\n");
+    return kExitInterrupted;
+  }
+  common.logs = DescribeLogs(inputs, solved);
+
+  // The output folder's own map comes last: its summary is the run's.
+  for (std::size_t m = solved.maps.size(); m-- > 0;) {
+    MapOfLogs& map = solved.maps[m];
+    SolveOutcome outcome;
+    outcome.summary = common;
+    std::string title;
+    for (const std::size_t i : map.logs) {
+      title += (title.empty() ? "" : ", ") + TitleOf(inputs[i]->log.name);
+      outcome.logs.push_back({i + 1, solved.logs[i].begin, solved.logs[i].end});
+    }
+    TakeMap(title, map.scans, *map.solver, registry, options.solver,
+            &map.result, &outcome);
+    if (m == 0) {
+      WriteOutputs(&outcome, begin, folder);
+      continue;
+    }
+    OutputFolder apart(std::filesystem::path(FLAGS_output_dir) / FolderOfMap(m),
+                       NamesOfAllOutputs(registry), InputFiles());
+    WriteOutputs(&outcome, begin, &apart);
+  }
   return kExitSuccess;
 }
 
@@ -710,34 +911,24 @@ int Run() {
                 "log_reader", [&]() -> const auto& {
                   return registry.Get<LogReaderType>(FLAGS_log_reader);
                 });
-  LogInput log_input;
-  log_input.name = FLAGS_input;
-  if (FLAGS_input != "-") {
-    const bool takes_path = reader != nullptr && reader->read_path != nullptr &&
-                            reader->recognizes_path != nullptr &&
-                            reader->recognizes_path(FLAGS_input);
-    log_input.reader = takes_path ? reader
-                       : reader == nullptr
-                           ? RecognizeLogPath(registry, FLAGS_input)
-                           : nullptr;
+  const std::vector<std::string> names = InputsFromFlags();
+  if (names.empty() || names.size() > kMostLogs) {
+    throw Error("--input", 0, std::to_string(names.size()) + " names",
+                "1 to " + std::to_string(kMostLogs) + " separated by commas");
   }
-  std::optional<InputStream> input;
-  bool is_graph = false;
-  if (log_input.reader == nullptr) {
-    input.emplace(FLAGS_input, [] { return InterruptRequested(); });
-    const std::string_view prefix = input->Peek(1 << 16);
-    if (prefix.empty() && InterruptRequested()) {
+  const auto starts =
+      ForFlag("start_pose", [&] { return StartPosesFromFlags(names.size()); });
+  std::vector<std::unique_ptr<OpenInput>> inputs;
+  for (const std::string& name : names) {
+    inputs.push_back(Open(name, registry, reader));
+    if (inputs.back() == nullptr) {
       std::fprintf(stderr, "interrupted: nothing was read yet\n");
       return kExitInterrupted;
     }
-    if (reader == nullptr) reader = RecognizeLog(registry, prefix);
-    is_graph = reader == nullptr && LooksLikeG2o(prefix);
-    // What nobody recognizes is for the reader of the commonest format to
-    // refuse: it says what it found.
-    if (reader == nullptr) reader = &registry.Get<LogReaderType>("carmen");
-    log_input.reader = reader;
-    log_input.stream = &*input;
-    log_input.name = input->name();
+    if (names.size() > 1 && inputs.back()->is_graph) {
+      throw Error("--input", 0, name + " is a graph",
+                  "one graph alone, or logs");
+    }
   }
   // What is wrong with the folder is said before the work, not after it.
   OutputFolder folder(FLAGS_output_dir, NamesOfAllOutputs(registry),
@@ -748,8 +939,13 @@ int Run() {
     Remark("%s: removed what a run that was killed had left: %s",
            FLAGS_output_dir.c_str(), Joined(folder.cleaned()).c_str());
   }
-  return is_graph ? SolveGraph(&*input, registry, begin, &folder)
-                  : SolveLog(log_input, registry, begin, &folder);
+  if (inputs.size() > 1) {
+    return SolveLogs(inputs, starts, registry, begin, &folder);
+  }
+  const OpenInput& input = *inputs.front();
+  return input.is_graph
+             ? SolveGraph(&*inputs.front()->stream, registry, begin, &folder)
+             : SolveLog(input.log, registry, begin, &folder);
 }
 
 }  // namespace

@@ -10,7 +10,9 @@
 
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -19,10 +21,16 @@
 
 DEFINE_string(input, "",
               "Robot log (ROS 1 or 2 bag, a file or a folder; CARMEN) or graph "
-              "(g2o), plain or compressed; - reads standard input");
+              "(g2o), plain or compressed; - reads standard input. Several "
+              "logs of one building, separated by commas, become one map");
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 DEFINE_string(log_reader, "",
               "Format of the log; empty: recognized by content");
+DEFINE_string(start_pose, "",
+              "Where the first scan of a log is in the frame of the first "
+              "log's map, roughly, as log:x,y,degrees, several separated by "
+              "slashes (2:3.5,-1,90/3:0,0,0); empty: found by what the logs "
+              "saw");
 
 DEFINE_string(
     initial_guess, "file",
@@ -333,7 +341,8 @@ void RefuseForPoints(const std::string& flag, const std::string& value,
 std::vector<FlagGroup> SolveFlagGroups() {
   return {
       {"Input and output",
-       {"input", "output_dir", "log_reader", "outputs", "grid_resolution"}},
+       {"input", "output_dir", "log_reader", "start_pose", "outputs",
+        "grid_resolution"}},
       {"Graphs", GraphFlags()},
       {"Uncertainty", {"marginals", "marginals_hold_gauge", "ellipse_sigmas"}},
       {"Structure",
@@ -364,11 +373,12 @@ std::vector<std::string> GraphFlags() {
 }
 
 std::vector<std::string> LogFlags() {
-  return {"grid_resolution",   "checkpoint_every",    "em_every",
-          "features",          "odometry_refinement", "link_radius",
-          "association_depth", "global_association",  "refine",
-          "usable_range",      "laser_start_angle",   "laser_step",
-          "laser_max_range",   "scan_topic",          "odometry_topic"};
+  return {"grid_resolution", "checkpoint_every",    "em_every",
+          "features",        "odometry_refinement", "link_radius",
+          "start_pose",      "association_depth",   "global_association",
+          "refine",          "usable_range",        "laser_start_angle",
+          "laser_step",      "laser_max_range",     "scan_topic",
+          "odometry_topic"};
 }
 
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
@@ -471,6 +481,50 @@ int NumThreadsFromFlags() {
     return GrantedThreads(wanted);
   }();
   return threads;
+}
+
+std::vector<std::string> InputsFromFlags() {
+  std::error_code ignored;
+  if (FLAGS_input.find(',') == std::string::npos ||
+      std::filesystem::exists(FLAGS_input, ignored)) {
+    return {FLAGS_input};
+  }
+  std::vector<std::string> names;
+  std::istringstream list(FLAGS_input);
+  std::string name;
+  while (std::getline(list, name, ',')) {
+    if (!name.empty()) names.push_back(name);
+  }
+  return names;
+}
+
+std::vector<std::optional<Pose2>> StartPosesFromFlags(std::size_t num_logs) {
+  std::vector<std::optional<Pose2>> starts(num_logs);
+  std::istringstream entries(FLAGS_start_pose);
+  std::string entry;
+  while (std::getline(entries, entry, '/')) {
+    const std::size_t colon = entry.find(':');
+    const auto refuse = [&] {
+      throw Error("--start_pose", 0, "'" + entry + "'",
+                  "log:x,y,degrees, the log from 2 to " +
+                      std::to_string(num_logs) +
+                      " by its place in --input: 2:3.5,-1,90");
+    };
+    if (colon == std::string::npos) refuse();
+    std::size_t log = 0;
+    const auto [end, error] =
+        std::from_chars(entry.data(), entry.data() + colon, log);
+    if (error != std::errc() || end != entry.data() + colon || log < 2 ||
+        log > num_logs) {
+      refuse();
+    }
+    const std::vector<double> numbers =
+        ParseList("start_pose", entry.substr(colon + 1));
+    if (numbers.size() != 3) refuse();
+    starts[log - 1] =
+        Pose2(numbers[0], numbers[1], NormalizeAngle(DegToRad(numbers[2])));
+  }
+  return starts;
 }
 
 }  // namespace plumbline

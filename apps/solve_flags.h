@@ -11,12 +11,14 @@
 #include <plumbline/pipeline/graph_solver.h>
 #include <plumbline/pipeline/log_solver.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
 DECLARE_string(input);
 DECLARE_string(output_dir);
 DECLARE_string(log_reader);
+DECLARE_string(start_pose);
 DECLARE_string(outputs);
 DECLARE_double(checkpoint_every);
 DECLARE_bool(structure);
@@ -60,6 +62,14 @@ OccupancyOptions OccupancyOptionsFromFlags();
 
 /// Laser flags for the log reader.
 LaserOptions LaserOptionsFromFlags();
+
+/// The logs or graph of --input, one name or several separated by commas. A
+/// file whose name has commas is one.
+std::vector<std::string> InputsFromFlags();
+
+/// By log: where --start_pose says that it starts, in the first log's frame.
+/// Throws Error when it does not parse or names a log that is not there.
+std::vector<std::optional<Pose2>> StartPosesFromFlags(std::size_t num_logs);
 
 /// Threads to use: --num_threads, or all cores when it is 0.
 int NumThreadsFromFlags();

@@ -44,6 +44,8 @@ struct OutputWriterType {
   std::string name;
   /// Names of further files that it writes with it: "occupancy.yaml".
   std::vector<std::string> further_files;
+  /// Names of files that it writes with it in some runs only.
+  std::vector<std::string> optional_files;
   /// One line.
   std::string description;
   /// Written unless somebody says otherwise.

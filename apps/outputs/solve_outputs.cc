@@ -144,6 +144,35 @@ std::string WriteOccupancy(const SolveOutcome& outcome, const path& folder) {
   return "";
 }
 
+std::string TrajectoryOfLog(std::size_t number) {
+  return "trajectory_" + std::to_string(number) + ".tum";
+}
+
+std::vector<std::string> TrajectoriesOfLogs() {
+  std::vector<std::string> names;
+  for (std::size_t i = 1; i <= kMostLogs; ++i) {
+    names.push_back(TrajectoryOfLog(i));
+  }
+  return names;
+}
+
+// Of all scans, and of each log where there are several.
+void WriteTrajectories(const SolveOutcome& outcome, const path& folder) {
+  const auto write = [&](const std::string& name, std::size_t begin,
+                         std::size_t end) {
+    const auto first = outcome.trajectory.begin();
+    WriteFileAtomically(folder / name, [&](std::ostream& output) {
+      WriteTum({first + static_cast<std::ptrdiff_t>(begin),
+                first + static_cast<std::ptrdiff_t>(end)},
+               output);
+    });
+  };
+  write("trajectory.tum", 0, outcome.trajectory.size());
+  for (const LogPart& log : outcome.logs) {
+    write(TrajectoryOfLog(log.number), log.begin, log.end);
+  }
+}
+
 // For writers that have no reason not to write.
 template <typename Write>
 auto Always(Write write) {
@@ -181,6 +210,10 @@ WriteResult RunWriter(const OutputWriterType& writer,
                            .what();
     }
   }
+  for (const std::string& name : writer.optional_files) {
+    const std::string digest = Sha256OfFile((folder / name).string());
+    if (!digest.empty()) result.digests[name] = digest;
+  }
   return result;
 }
 
@@ -191,11 +224,13 @@ SolveOutcome::SolveOutcome() : parts(std::make_shared<SharedParts>()) {}
 void RegisterBuiltinOutputWriters(Registry* registry) {
   const auto add = [&](const char* name, const char* description,
                        bool by_default, bool of_scans, auto write,
-                       const std::vector<std::string>& further_files = {}) {
+                       const std::vector<std::string>& further_files = {},
+                       const std::vector<std::string>& optional_files = {}) {
     if (registry->Find<OutputWriterType>(name) != nullptr) return;
     OutputWriterType type;
     type.name = name;
     type.further_files = further_files;
+    type.optional_files = optional_files;
     type.description = description;
     type.by_default = by_default;
     type.of_scans = of_scans;
@@ -235,12 +270,7 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
         WriteEmTrace(rows, folder / "em_trace.csv");
       }));
   add("trajectory.tum", "the pose of every scan", true, true,
-      Always([](const SolveOutcome& outcome, const path& folder) {
-        WriteFileAtomically(folder / "trajectory.tum",
-                            [&](std::ostream& output) {
-                              WriteTum(outcome.trajectory, output);
-                            });
-      }));
+      Always(WriteTrajectories), {}, TrajectoriesOfLogs());
   add("floorplan.dxf", "walls as CAD lines, layers by direction", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {
         WriteFloorPlanDxf(Plan(outcome), folder / "floorplan.dxf");
@@ -311,6 +341,7 @@ std::set<std::string> FilesOfOutputs(const std::set<std::string>& names,
     const auto& writer = registry.Get<OutputWriterType>(name);
     files.insert(writer.name);
     files.insert(writer.further_files.begin(), writer.further_files.end());
+    files.insert(writer.optional_files.begin(), writer.optional_files.end());
   }
   return files;
 }

@@ -20,10 +20,22 @@ namespace plumbline {
 
 class SharedParts;
 
+/// One of several logs that a map is made of.
+struct LogPart {
+  /// Its place among the inputs, from 1.
+  std::size_t number = 1;
+  /// Its poses in the trajectory: [begin, end).
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
 /// All that the files of plumbline_solve are made of.
 struct SolveOutcome : SolvedRun {
   OccupancyOptions occupancy;
   double delta_threshold = 0.0;
+  /// Of a run on several logs: those in this map, each of which gets a
+  /// trajectory_<number>.tum; empty otherwise.
+  std::vector<LogPart> logs;
   /// All of them, for the report.
   std::vector<FlagValue> flags;
   /// For map.json, and of how many standard deviations ellipses are drawn (0:
@@ -39,6 +51,9 @@ struct SolveOutcome : SolvedRun {
 
   SolveOutcome();
 };
+
+/// So many logs can be solved together.
+inline constexpr std::size_t kMostLogs = 50;
 
 /// Registers the output writers of this folder. They take a SolveOutcome and no
 /// other SolvedRun. Does nothing for what is there already.

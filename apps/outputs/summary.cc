@@ -155,6 +155,18 @@ Json FrontendToJson(const Summary& summary) {
   return json;
 }
 
+Json LogToJson(const Summary::LogInput& log) {
+  return {{"input", log.input},
+          {"trajectory", log.trajectory},
+          {"scans", log.scans},
+          {"map", log.map},
+          {"parts", log.parts},
+          {"agreeing", log.agreeing},
+          {"contradicting", log.contradicting},
+          {"why_apart",
+           log.why_apart.empty() ? Json(nullptr) : Json(log.why_apart)}};
+}
+
 Json TrackingToJson(const Summary::Tracking& tracking) {
   Json loose = Json::array();
   for (const Summary::Tracking::Loose& part : tracking.loose) {
@@ -288,6 +300,9 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
   if (summary.scans > 0) {
     json["frontend"] = FrontendToJson(summary);
     json["tracking"] = TrackingToJson(summary.tracking);
+    for (const Summary::LogInput& log : summary.logs) {
+      json["logs"].push_back(LogToJson(log));
+    }
   }
   // A path may hold bytes that are no UTF-8.
   output << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';

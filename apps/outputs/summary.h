@@ -139,6 +139,26 @@ struct Summary {
   };
   Tracking tracking;
 
+  /// One of several logs that were solved together.
+  struct LogInput {
+    /// The file, and its trajectory among the outputs.
+    std::string input;
+    std::string trajectory;
+    std::int64_t scans = 0;
+    /// Folder of its map below the output folder; empty: the output folder.
+    std::string map;
+    /// How it was placed among the logs before it in this map: parts of it that
+    /// were compared with what they saw, those that agree with it, those that
+    /// contradict it. All 0 for the first log of a map.
+    int parts = 0;
+    int agreeing = 0;
+    int contradicting = 0;
+    /// Why it was kept apart; empty when it was not.
+    std::string why_apart;
+  };
+  /// Empty where there is one.
+  std::vector<LogInput> logs;
+
   /// Of a log only (scans > 0): what was passed over, and the time that each
   /// scan took, s, in the order of scans; may be empty.
   std::vector<SkipReport> skipped;
@@ -170,8 +190,10 @@ std::string CountsAsJson(const Summary& summary);
 /// log also frontend {skipped [{reason, count, first_lines}],
 /// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
 /// (their quotient), format, scans, odometry (names; of logs that tell), notes
-/// [text]}, tracking {pieces, loose [{begin, end, why}]}. Numbers that are not
-/// finite become null.
+/// [text]}, tracking {pieces, loose [{begin, end, why}]}, and where there were
+/// several logs [{input, trajectory, scans, map, parts, agreeing,
+/// contradicting, why_apart (or null)}]. Numbers that are not finite become
+/// null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// Writes it to a file, whole or not at all. Throws Error when it cannot be

@@ -21,6 +21,14 @@ constexpr std::size_t kSmallMapGrowth = 10;
 // lost what the scans show, and is no better.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
 
+void AddSameWall(HierarchySpec* hierarchy) {
+  if (!hierarchy->Contains(kSameWallDetector)) {
+    hierarchy->Add(0, kSameWallDetector);
+  }
+}
+
+}  // namespace
+
 double LengthOfWalls(const Graph& graph) {
   double length = 0.0;
   for (const Feature* feature : graph.Features()) {
@@ -30,14 +38,6 @@ double LengthOfWalls(const Graph& graph) {
   }
   return length;
 }
-
-void AddSameWall(HierarchySpec* hierarchy) {
-  if (!hierarchy->Contains(kSameWallDetector)) {
-    hierarchy->Add(0, kSameWallDetector);
-  }
-}
-
-}  // namespace
 
 KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
                     const std::vector<ScanPoint>& returns) {
@@ -120,6 +120,14 @@ void LogSolver::RequireUnfinished() const {
   if (is_finished_) {
     throw PLUMBLINE_ERROR("the log of this solver is solved",
                           "a new solver for each log");
+  }
+}
+
+void LogSolver::RequireFresh() const {
+  RequireUnfinished();
+  if (!refined_.empty()) {
+    throw PLUMBLINE_ERROR("scans were added before Run",
+                          "Finish, or a new solver");
   }
 }
 
@@ -231,18 +239,41 @@ std::vector<Pose2> LogSolver::Trajectory() const {
 }
 
 LogSolverResult LogSolver::Run(const Log& log, const RunControl& control) {
-  RequireUnfinished();
-  if (!refined_.empty()) {
-    throw PLUMBLINE_ERROR("scans were added before Run",
-                          "Finish, or a new solver");
-  }
+  RequireFresh();
   TakeScans(log.scans, control);
-  return FinishWith(log.scans, control);
+  return FinishWith(log.scans, Stage::kEnd, control);
+}
+
+LogSolverResult LogSolver::RunFirst(const Log& log, const RunControl& control) {
+  RequireFresh();
+  TakeScans(log.scans, control);
+  return FinishWith(log.scans, Stage::kAdjustPoses, control);
+}
+
+LogSolverResult LogSolver::GoOn(const std::vector<Scan>& scans,
+                                LogSolverResult first, double wall_length,
+                                const RunControl& control) {
+  if (first.refined.size() != scans.size() ||
+      first.trajectory.size() != scans.size()) {
+    throw PLUMBLINE_ERROR(
+        "a first map of " + std::to_string(first.refined.size()) + " scans",
+        std::to_string(scans.size()));
+  }
+  is_finished_ = true;
+  builder_.reset();
+  Context context(scans, control);
+  context.result = std::move(first);
+  context.first_length = wall_length;
+  for (const KeyScanRecord& record : context.result.records) {
+    context.keys.push_back(
+        context.result.trajectory[static_cast<std::size_t>(record.scan)]);
+  }
+  return FinishFrom(Stage::kAdjustPoses, Stage::kEnd, &context);
 }
 
 LogSolverResult LogSolver::Finish(const RunControl& control) {
   RequireUnfinished();
-  return FinishWith(scans_, control);
+  return FinishWith(scans_, Stage::kEnd, control);
 }
 
 LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
@@ -267,7 +298,7 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
     Renew(StructureDetectors());
     if (control.progress) control.progress(refined_.size(), log.scans.size());
     TakeScans(log.scans, control);
-    return FinishWith(log.scans, control);
+    return FinishWith(log.scans, Stage::kEnd, control);
   }
   is_finished_ = true;
   builder_.reset();
@@ -285,10 +316,10 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
         options_.adjustment, control.stop);
   }
   if (control.progress) control.progress(log.scans.size(), log.scans.size());
-  return FinishFrom(stage, &context);
+  return FinishFrom(stage, Stage::kEnd, &context);
 }
 
-LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
+LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
                                       const RunControl& control) {
   is_finished_ = true;
   Context context(scans, control);
@@ -314,10 +345,11 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans,
   result.records = builder_->records();
   result.refined = std::move(refined_);
   builder_.reset();
-  return FinishFrom(Stage::kFindStructure, &context);
+  return FinishFrom(Stage::kFindStructure, end, &context);
 }
 
-LogSolverResult LogSolver::FinishFrom(Stage stage, Context* context) {
+LogSolverResult LogSolver::FinishFrom(Stage stage, Stage end,
+                                      Context* context) {
   if (stage == Stage::kFindStructure) {
     FindStructure(context);
     BeginStage(stage = Stage::kCloseLoops, context);
@@ -328,7 +360,7 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Context* context) {
     CompleteWalls(context);
     BeginStage(stage = Stage::kAdjustPoses, context);
   }
-  if (stage == Stage::kAdjustPoses) {
+  if (stage == Stage::kAdjustPoses && stage != end) {
     AdjustPoses(context);
     BeginStage(stage = context->adjustment == nullptr
                            ? Stage::kFindStructureAgain
@@ -469,7 +501,9 @@ void LogSolver::AdjustPoses(Context* context) {
   Exchange(first_map, registry_, *graph_);
   context->first_map = first_map.bytes();
   context->first_trajectory = result.trajectory;
-  context->first_length = LengthOfWalls(*graph_);
+  if (context->first_length == 0.0) {
+    context->first_length = LengthOfWalls(*graph_);
+  }
   ClearGraph();
   context->adjustment = std::make_unique<JointAdjustment>(
       graph_.get(), session_.get(), registry_, context->scans, result.refined,

@@ -186,6 +186,20 @@ class LogSolver {
   LogSolverResult Resume(const Log& log, const std::string& state,
                          const RunControl& control = {});
 
+  /// Run as far as the first map, in which structure is found and loops are
+  /// closed, but poses are not adjusted yet: what is left for GoOn. The result
+  /// has its trajectory, the refined scans and the records of key scans.
+  LogSolverResult RunFirst(const Log& log, const RunControl& control = {});
+
+  /// Does what RunFirst has left. In a new solver `first` may be of a log that
+  /// was put together of several (SolveSeveralLogs): `trajectory`, `refined`
+  /// and `records` are what the second map is made of, and `wall_length`, the
+  /// length of the walls of the first map, m, is what it is measured by (0: the
+  /// solver's own first map).
+  LogSolverResult GoOn(const std::vector<Scan>& scans, LogSolverResult first,
+                       double wall_length = 0.0,
+                       const RunControl& control = {});
+
   /// The map as it stands: after any scan, and after Finish.
   const Graph& graph() const { return *graph_; }
   const SolverSession& session() const { return *session_; }
@@ -207,6 +221,7 @@ class LogSolver {
   struct Context;
 
   void RequireUnfinished() const;
+  void RequireFresh() const;
   // A scan by itself: key scans enter the map, now and then with an EM step.
   // Takes the next of the scans.
   void TakeScan(const std::vector<Scan>& scans);
@@ -217,9 +232,11 @@ class LogSolver {
   void RunEmNearRobot();
 
   // The stages once all scans are in, in order.
-  LogSolverResult FinishWith(const std::vector<Scan>& scans,
+  LogSolverResult FinishWith(const std::vector<Scan>& scans, Stage end,
                              const RunControl& control);
-  LogSolverResult FinishFrom(Stage stage, Context* context);
+  // The stages from `stage` on; `end` is kAdjustPoses, which is left then, or
+  // kEnd.
+  LogSolverResult FinishFrom(Stage stage, Stage end, Context* context);
   void FindStructure(Context* context);
   void CloseLoops(Context* context);
   void FindScansAgain(Context* context);
@@ -285,6 +302,9 @@ class LogSolver {
   EmReport em_before_;
   std::vector<EmPhase> trace_;
 };
+
+/// Length of the walls of a map (level 0), m.
+double LengthOfWalls(const Graph& graph);
 
 }  // namespace plumbline
 

@@ -743,6 +743,64 @@ TEST_F(SolveTest, AKilledRunIsGoneOnWith) {
 }
 
 // Said, since a reader of the command would think otherwise.
+TEST_F(SolveTest, SeveralLogs) {
+  const std::vector<std::string> lines = OfficeLines(400);
+  std::vector<std::string> scans;
+  for (const std::string& line : lines) {
+    if (line.substr(0, 6) == "FLASER") scans.push_back(line);
+  }
+  const std::string first =
+      Write("first.clf", Join({scans.begin(), scans.begin() + 250}));
+  const std::string second =
+      Write("second.clf", Join({scans.begin() + 150, scans.end()}));
+  std::string output;
+  ASSERT_EQ(Solve(second + "," + first, "both",
+                  "--outputs=trajectory.tum,map.json", &output),
+            0)
+      << output;
+  EXPECT_EQ(Files("both"),
+            (std::set<std::string>{"map.json", "summary.json", "trajectory.tum",
+                                   "trajectory_1.tum", "trajectory_2.tum"}));
+  EXPECT_EQ(Lines(Out("both", "trajectory_1.tum")).size(), 250u);
+  EXPECT_EQ(Out("both", "trajectory.tum"),
+            Out("both", "trajectory_1.tum") + Out("both", "trajectory_2.tum"));
+  const auto summary = nlohmann::json::parse(Out("both", "summary.json"));
+  ASSERT_EQ(summary["logs"].size(), 2u);
+  EXPECT_EQ(summary["logs"][0]["input"], second);
+  EXPECT_EQ(summary["logs"][1]["trajectory"], "trajectory_2.tum");
+  EXPECT_EQ(summary["logs"][1]["map"], "");
+  EXPECT_GE(summary["logs"][1]["agreeing"], 3);
+  EXPECT_TRUE(summary["logs"][1]["why_apart"].is_null());
+  EXPECT_EQ(summary["counts"]["scans"], 500);
+
+  // A start where it is not: a map of its own.
+  ASSERT_EQ(Solve(second + "," + first, "both",
+                  "--outputs=trajectory.tum --start_pose=2:30,40,180", &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("kept apart"));
+  EXPECT_EQ(Files("both"),
+            (std::set<std::string>{"map_2", "summary.json", "trajectory.tum",
+                                   "trajectory_1.tum"}));
+  EXPECT_EQ(Files("both/map_2"),
+            (std::set<std::string>{"summary.json", "trajectory.tum",
+                                   "trajectory_2.tum"}));
+
+  const auto refuses = [&](const std::string& input, const std::string& flags,
+                           const char* why) {
+    EXPECT_NE(Solve(input, "none", flags, &output), 0);
+    EXPECT_THAT(output, HasSubstr(why));
+  };
+  const std::string both = first + "," + second;
+  refuses(both, "--start_pose=3:0,0,0", "2:3.5,-1,90");
+  refuses(both, "--start_pose=2:0,0", "2:3.5,-1,90");
+  refuses(both, "--features=points", "full refinement");
+  refuses(both, "--refine=map", "full refinement");
+  refuses(first + "," + Write("graph.g2o", "VERTEX_SE2 0 0 0 0\n"), "",
+          "is a graph");
+  refuses(first + ",/nowhere.clf", "", "/nowhere.clf");
+}
+
 TEST_F(SolveTest, FlagsOfTheOtherInput) {
   const std::string log = Write("office.log", Join(OfficeLines(30)));
   std::string output;

@@ -278,6 +278,22 @@ TEST_F(LogSolverTest, ASecondMapWithoutWallsIsRefused) {
   EXPECT_EQ(result.trajectory, without.trajectory);
 }
 
+TEST_F(LogSolverTest, TellsOfATrackThatHangsByAGuess) {
+  Log log = Office(400);
+  // From here on another building, which nothing that was seen before fits.
+  for (std::size_t i = 200; i < log.scans.size(); ++i) {
+    std::vector<float>& ranges = log.scans[i].ranges;
+    std::reverse(ranges.begin(), ranges.end());
+    for (float& range : ranges) range *= 0.6f;
+    log.scans[i].timestamp += 100.0;
+  }
+  LogSolver solver(registry_, {});
+  const LogSolverResult result = solver.Run(log);
+  ASSERT_FALSE(result.loose.empty());
+  EXPECT_FALSE(result.loose.front().found);
+  EXPECT_NEAR(result.loose.front().begin, 199, 2);
+}
+
 TEST_F(LogSolverTest, SameBytesEveryTime) {
   const Log log = Office(150);
   LogSolver first(registry_, {});

@@ -1,0 +1,319 @@
+#include <plumbline/core/error.h>
+#include <plumbline/pipeline/several_logs.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <string>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Standard deviations of the tie between two logs, m and rad, and what they
+// gain by a metre of way from where the logs were compared to the first scan:
+// a weak pull, since matches of scans hold them once they are near.
+constexpr double kTieSigma = 0.1;
+constexpr double kTieSigmaPerMetre = 0.02;
+constexpr double kTieAngle = DegToRad(1.0);
+constexpr double kTieAnglePerMetre = DegToRad(0.1);
+
+// A log as far as its own first map.
+struct FirstMap {
+  std::unique_ptr<LogSolver> solver;
+  LogSolverResult result;
+  double wall_length = 0.0;
+  std::size_t num_scans = 0;
+  // By record of a key scan, frame of this map.
+  std::vector<KeyView> views;
+  // Of its frame in that of the first log of its group, and its first key scan
+  // in that of the one that it hangs on there.
+  Pose2 pose = Pose2::Zero();
+  UncertainPose2 tie;
+};
+
+// Logs that were placed in each other's building.
+struct Group {
+  std::vector<std::size_t> logs;
+  // Of all of them, frame of the first.
+  std::vector<KeyView> views;
+};
+
+UncertainPose2 TieOf(const TrackPlacement& placement, const FirstMap& log,
+                     const Group& group) {
+  double way = 0.0;
+  for (int k = 1; k <= placement.to; ++k) {
+    way += (log.views[static_cast<std::size_t>(k)].pose -
+            log.views[static_cast<std::size_t>(k) - 1].pose)
+               .head<2>()
+               .norm();
+  }
+  const double sigma = kTieSigma + kTieSigmaPerMetre * way;
+  const double angle = kTieAngle + kTieAnglePerMetre * way;
+  UncertainPose2 tie;
+  tie.mean = Between(group.views[static_cast<std::size_t>(placement.from)].pose,
+                     Compose(placement.pose, log.views.front().pose));
+  tie.covariance =
+      Eigen::Vector3d(sigma * sigma, sigma * sigma, angle * angle).asDiagonal();
+  return tie;
+}
+
+// Appends a log to a map of several, as if the robot had been lost and found
+// again.
+void Append(int from_record, FirstMap* log, LogSolverResult* whole) {
+  LogSolverResult& part = log->result;
+  const bool is_first = whole->records.empty();
+  const int scans = static_cast<int>(whole->refined.size());
+  const int records = static_cast<int>(whole->records.size());
+  // From the frame of refined odometry to the first log's map.
+  const Pose2 shift = Compose(Compose(log->pose, part.trajectory.front()),
+                              Inverse(part.refined.front().pose));
+  for (RefinedScan& scan : part.refined) {
+    scan.pose = Compose(shift, scan.pose);
+    if (scan.since >= 0) scan.since += scans;
+  }
+  for (KeyScanRecord& record : part.records) {
+    record.scan += scans;
+    if (record.from >= 0) record.from += records;
+    record.pose = Compose(log->pose, record.pose);
+    // Features of a map that does not outlive this.
+    record.matches.clear();
+    record.points.clear();
+  }
+  if (!is_first) {
+    RefinedScan& first = part.refined.front();
+    first.tie = TrackTie::kMatched;
+    first.since = whole->records[static_cast<std::size_t>(from_record)].scan;
+    first.since_key = log->tie;
+    part.records.front().from = from_record;
+    part.records.front().motion = log->tie;
+  }
+  for (LooseTrack& loose : part.loose) {
+    loose.begin += scans;
+    loose.end += scans;
+  }
+  for (Pose2& pose : part.trajectory) pose = Compose(log->pose, pose);
+  const auto append = [](auto& to, const auto& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  append(whole->trajectory, part.trajectory);
+  append(whole->refined, part.refined);
+  append(whole->records, part.records);
+  append(whole->loose, part.loose);
+  append(whole->scan_seconds, part.scan_seconds);
+  whole->frontend_seconds += part.frontend_seconds;
+  whole->relocalization_seconds += part.relocalization_seconds;
+  whole->key_scans += part.key_scans;
+  whole->wide_searches += part.wide_searches;
+  whole->refused_matches += part.refused_matches;
+  whole->lost_tracks += part.lost_tracks;
+  whole->feature_matches += part.feature_matches;
+  whole->features_created += part.features_created;
+  whole->em.iterations += part.em.iterations;
+  whole->initial_cost.measurement += part.initial_cost.measurement;
+  whole->initial_cost.structure += part.initial_cost.structure;
+}
+
+class Merger {
+ public:
+  Merger(const Registry& registry, std::vector<Log> logs,
+         const SeveralLogsOptions& options, const SeveralLogsControl& control)
+      : registry_(registry),
+        logs_(std::move(logs)),
+        options_(options),
+        control_(control) {
+    control_.run.checkpoint = nullptr;
+    options_.placement.points = options_.solver.odometry.points;
+    options_.placement.matcher = options_.solver.odometry.matcher;
+    result_.logs.resize(logs_.size());
+  }
+
+  SeveralLogsResult Run() {
+    for (std::size_t i = 0; i < logs_.size(); ++i) {
+      if (control_.begin_log) control_.begin_log(i);
+      MakeFirstMap(i);
+      if (result_.interrupted) return std::move(result_);
+    }
+    if (control_.run.step) control_.run.step("placing of logs");
+    std::vector<std::size_t> left;
+    for (std::size_t i = 0; i < logs_.size(); ++i) left.push_back(i);
+    while (!left.empty()) {
+      const Group group = Gather(&left);
+      if (IsStopped()) return std::move(result_);
+      Finish(group);
+      if (result_.interrupted) return std::move(result_);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  bool IsStopped() {
+    if (!result_.interrupted && control_.run.stop && control_.run.stop()) {
+      result_.interrupted = true;
+    }
+    return result_.interrupted;
+  }
+
+  void MakeFirstMap(std::size_t i) {
+    FirstMap log;
+    log.solver = std::make_unique<LogSolver>(registry_, options_.solver);
+    log.result = log.solver->RunFirst(logs_[i], control_.run);
+    result_.interrupted = result_.interrupted || log.result.interrupted;
+    log.num_scans = logs_[i].scans.size();
+    log.wall_length = LengthOfWalls(log.solver->graph());
+    std::vector<int> keys;
+    std::vector<Pose2> poses;
+    for (const KeyScanRecord& record : log.result.records) {
+      keys.push_back(record.scan);
+      poses.push_back(
+          log.result.trajectory[static_cast<std::size_t>(record.scan)]);
+    }
+    log.views =
+        MakeKeyViews(logs_[i].scans, keys, poses, options_.placement.points);
+    maps_.push_back(std::move(log));
+  }
+
+  std::optional<Pose2> StartOf(std::size_t i) const {
+    return i < options_.starts.size() ? options_.starts[i] : std::nullopt;
+  }
+
+  // The first log that is left and all that can be placed with it. They leave
+  // `left`.
+  Group Gather(std::vector<std::size_t>* left) {
+    Group group;
+    group.logs.push_back(left->front());
+    group.views = maps_[left->front()].views;
+    left->erase(left->begin());
+    bool grows = true;
+    while (grows) {
+      grows = false;
+      for (std::size_t k = 0; k < left->size();) {
+        if (IsStopped()) return group;
+        if (!Place((*left)[k], &group)) {
+          ++k;
+          continue;
+        }
+        left->erase(left->begin() + static_cast<std::ptrdiff_t>(k));
+        // What did not fit before may fit now.
+        grows = true;
+      }
+    }
+    return group;
+  }
+
+  // Adds a log to the group if it has its place there.
+  bool Place(std::size_t i, Group* group) {
+    FirstMap& log = maps_[i];
+    // The start is given in the first log's frame.
+    const TrackPlacement placement =
+        PlaceTrack(group->views, log.views,
+                   group->logs.front() == 0 ? StartOf(i) : std::nullopt,
+                   options_.placement, control_.run.stop);
+    // What came nearest to being its place is what there is to say of it.
+    TrackPlacement& told = result_.logs[i].placement;
+    if (placement.found || placement.agreeing >= told.agreeing) {
+      told = placement;
+    }
+    if (!placement.found) return false;
+    log.tie = TieOf(placement, log, *group);
+    log.pose = placement.pose;
+    group->logs.push_back(i);
+    for (KeyView view : log.views) {
+      view.pose = Compose(log.pose, view.pose);
+      group->views.push_back(std::move(view));
+    }
+    return true;
+  }
+
+  void Finish(const Group& group) {
+    if (group.logs.size() > 1 && FinishTogether(group)) return;
+    for (const std::size_t i : group.logs) {
+      if (group.logs.size() > 1) {
+        result_.logs[i].placement.found = false;
+        result_.logs[i].placement.why_not =
+            "the map of the logs together has hardly any walls";
+      }
+      MapOfLogs map;
+      map.logs = {i};
+      map.scans = std::move(logs_[i].scans);
+      map.solver = std::move(maps_[i].solver);
+      map.result = map.solver->GoOn(map.scans, std::move(maps_[i].result), 0.0,
+                                    control_.run);
+      Add(std::move(map));
+      if (result_.interrupted) return;
+    }
+  }
+
+  // False when the logs have no map together.
+  bool FinishTogether(const Group& group) {
+    MapOfLogs map;
+    map.logs = group.logs;
+    LogSolverResult first;
+    double wall_length = 0.0;
+    std::vector<LogSolverResult> before;
+    for (const std::size_t i : group.logs) {
+      before.push_back(maps_[i].result);
+      const TrackPlacement& placement = result_.logs[i].placement;
+      Append(placement.from, &maps_[i], &first);
+      std::move(logs_[i].scans.begin(), logs_[i].scans.end(),
+                std::back_inserter(map.scans));
+      wall_length = std::max(wall_length, maps_[i].wall_length);
+    }
+    map.solver = std::make_unique<LogSolver>(registry_, options_.solver);
+    map.result = map.solver->GoOn(map.scans, std::move(first), wall_length,
+                                  control_.run);
+    if (map.result.second_map_refused) {
+      std::size_t at = 0;
+      for (std::size_t k = 0; k < group.logs.size(); ++k) {
+        const std::size_t i = group.logs[k];
+        for (Scan& scan : logs_[i].scans) scan = std::move(map.scans[at++]);
+        maps_[i].result = std::move(before[k]);
+      }
+      return false;
+    }
+    Add(std::move(map));
+    return true;
+  }
+
+  void Add(MapOfLogs map) {
+    std::size_t begin = 0;
+    for (const std::size_t i : map.logs) {
+      LogInMap& log = result_.logs[i];
+      log.map = result_.maps.size();
+      log.begin = begin;
+      log.end = begin += maps_[i].num_scans;
+    }
+    result_.interrupted = result_.interrupted || map.result.interrupted;
+    result_.maps.push_back(std::move(map));
+  }
+
+  const Registry& registry_;
+  std::vector<Log> logs_;
+  SeveralLogsOptions options_;
+  SeveralLogsControl control_;
+  std::vector<FirstMap> maps_;
+  SeveralLogsResult result_;
+};
+
+}  // namespace
+
+SeveralLogsResult SolveSeveralLogs(const Registry& registry,
+                                   std::vector<Log> logs,
+                                   const SeveralLogsOptions& options,
+                                   const SeveralLogsControl& control) {
+  if (logs.empty()) throw PLUMBLINE_ERROR("no logs", "one or more");
+  if (!ProfileOf(options.solver.features).has_walls ||
+      options.solver.refine != Refinement::kFull) {
+    throw PLUMBLINE_ERROR("several logs without a second map",
+                          "segments and full refinement");
+  }
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    if (logs[i].scans.empty()) {
+      throw PLUMBLINE_ERROR("log " + std::to_string(i + 1) + " has no scans",
+                            "scans");
+    }
+  }
+  return Merger(registry, std::move(logs), options, control).Run();
+}
+
+}  // namespace plumbline

@@ -1,0 +1,178 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/error.h>
+#include <plumbline/detectors/builtins.h>
+#include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/pipeline/several_logs.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+class SeveralLogsTest : public ::testing::Test {
+ protected:
+  SeveralLogsTest() {
+    RegisterBuiltins(&registry_);
+    std::ifstream file(std::string(PLUMBLINE_SOURCE_DIR) +
+                       "/datasets/office.truth.json");
+    const auto json = nlohmann::json::parse(file);
+    for (const auto& pose : json["poses"]) {
+      truth_[std::lround(1e3 * pose[0].get<double>())] =
+          Pose2(pose[1], pose[2], pose[3]);
+    }
+  }
+
+  static Log Office() {
+    return ReadCarmenLog(
+        std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/office.clf.gz", {});
+  }
+
+  // Scans [begin, end), with odometry that starts at zero.
+  static Log Piece(const Log& log, std::size_t begin, std::size_t end) {
+    Log piece;
+    piece.has_odometry = true;
+    piece.scans.assign(log.scans.begin() + static_cast<std::ptrdiff_t>(begin),
+                       log.scans.begin() + static_cast<std::ptrdiff_t>(end));
+    const Pose2 first = Inverse(piece.scans.front().odometry);
+    for (Scan& scan : piece.scans)
+      scan.odometry = Compose(first, scan.odometry);
+    return piece;
+  }
+
+  // The same drive through a building of the same kind, a little larger.
+  static Log Enlarged(Log log) {
+    for (Scan& scan : log.scans) {
+      for (float& range : scan.ranges) range *= 1.1f;
+      scan.odometry.head<2>() *= 1.1;
+      scan.laser_offset.head<2>() *= 1.1;
+    }
+    return log;
+  }
+
+  // Largest error of the relative poses of scans that lie `stride` apart in a
+  // map, with those of other logs, m.
+  double LargestError(const MapOfLogs& map) const {
+    double largest = 0.0;
+    const std::size_t n = map.scans.size();
+    for (std::size_t i = 0; i < n; i += 7) {
+      const std::size_t j = (i + n / 2) % n;
+      const Pose2 error =
+          Between(Between(TruthOf(map.scans[i]), TruthOf(map.scans[j])),
+                  Between(map.result.trajectory[i], map.result.trajectory[j]));
+      largest = std::max(largest, error.head<2>().norm());
+    }
+    return largest;
+  }
+
+  const Pose2& TruthOf(const Scan& scan) const {
+    return truth_.at(std::lround(1e3 * scan.timestamp));
+  }
+
+  Registry registry_;
+  // By time stamp, ms.
+  std::map<long, Pose2> truth_;
+};
+
+TEST_F(SeveralLogsTest, PiecesOfADriveBecomeOneMapInAnyOrder) {
+  const Log office = Office();
+  const std::size_t n = office.scans.size();
+  std::vector<std::size_t> begun;
+  SeveralLogsControl control;
+  control.begin_log = [&](std::size_t log) { begun.push_back(log); };
+  const SeveralLogsResult result =
+      SolveSeveralLogs(registry_,
+                       {Piece(office, n / 3, 2 * n / 3),
+                        Piece(office, 2 * n / 3, n), Piece(office, 0, n / 3)},
+                       {}, control);
+  EXPECT_EQ(begun, (std::vector<std::size_t>{0, 1, 2}));
+  EXPECT_FALSE(result.interrupted);
+  ASSERT_EQ(result.maps.size(), 1u);
+  const MapOfLogs& map = result.maps.front();
+  ASSERT_EQ(map.scans.size(), n);
+  ASSERT_EQ(map.result.trajectory.size(), n);
+  EXPECT_LT(LargestError(map), 0.25);
+  EXPECT_TRUE(map.result.loose.empty());
+  EXPECT_GT(LengthOfWalls(map.solver->graph()), 100.0);
+  ASSERT_EQ(result.logs.size(), 3u);
+  EXPECT_FALSE(result.logs[0].placement.found);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const LogInMap& log = result.logs[i];
+    EXPECT_EQ(log.map, 0u);
+    EXPECT_EQ(log.placement.found, i > 0);
+    ASSERT_LT(log.begin, log.end);
+    // Its scans are where it says.
+    const std::size_t first = i == 0 ? n / 3 : i == 1 ? 2 * n / 3 : 0;
+    EXPECT_EQ(map.scans[log.begin].timestamp, office.scans[first].timestamp);
+  }
+}
+
+TEST_F(SeveralLogsTest, DifferentBuildingsAreKeptApart) {
+  const Log office = Office();
+  Log other = Enlarged(Piece(office, 0, 500));
+  const SeveralLogsResult result = SolveSeveralLogs(
+      registry_, {Piece(office, 0, 500), std::move(other)}, {});
+  ASSERT_EQ(result.maps.size(), 2u);
+  EXPECT_EQ(result.logs[0].map, 0u);
+  EXPECT_EQ(result.logs[1].map, 1u);
+  EXPECT_FALSE(result.logs[1].placement.found);
+  EXPECT_FALSE(result.logs[1].placement.why_not.empty());
+  for (const MapOfLogs& map : result.maps) {
+    EXPECT_EQ(map.scans.size(), 500u);
+    EXPECT_EQ(map.result.trajectory.size(), 500u);
+    EXPECT_GT(LengthOfWalls(map.solver->graph()), 30.0);
+  }
+  // What is kept apart is solved as if it were alone.
+  LogSolver alone(registry_, {});
+  EXPECT_EQ(result.maps[0].result.trajectory,
+            alone.Run(Piece(office, 0, 500)).trajectory);
+}
+
+TEST_F(SeveralLogsTest, AWrongStartKeepsALogApart) {
+  const Log office = Office();
+  SeveralLogsOptions options;
+  const Log first = Piece(office, 0, 500);
+  const Log second = Piece(office, 200, 500);
+  const auto solve = [&](const std::optional<Pose2>& start) {
+    options.starts = {std::nullopt, start};
+    return SolveSeveralLogs(registry_, {first, second}, options);
+  };
+  const Pose2 truth =
+      Between(TruthOf(first.scans.front()), TruthOf(second.scans.front()));
+  EXPECT_EQ(solve(Compose(truth, Pose2(0.5, -0.5, 0.2))).maps.size(), 1u);
+  EXPECT_EQ(solve(Compose(truth, Pose2(20.0, 5.0, 3.0))).maps.size(), 2u);
+}
+
+TEST_F(SeveralLogsTest, AnInterruptLeavesNoHalfMap) {
+  const Log office = Office();
+  SeveralLogsControl control;
+  int questions = 0;
+  control.run.stop = [&] { return ++questions > 150; };
+  const SeveralLogsResult result = SolveSeveralLogs(
+      registry_, {Piece(office, 0, 100), Piece(office, 100, 200)}, {}, control);
+  EXPECT_TRUE(result.interrupted);
+  EXPECT_TRUE(result.maps.empty());
+}
+
+TEST_F(SeveralLogsTest, RefusesWhatHasNoSecondMap) {
+  const Log piece = Piece(Office(), 0, 50);
+  SeveralLogsOptions options;
+  EXPECT_THROW(SolveSeveralLogs(registry_, {}, options), Error);
+  EXPECT_THROW(SolveSeveralLogs(registry_, {piece, Log()}, options), Error);
+  options.solver.refine = Refinement::kMap;
+  EXPECT_THROW(SolveSeveralLogs(registry_, {piece, piece}, options), Error);
+  options.solver.refine = Refinement::kFull;
+  options.solver.features = RawFeatures::kPoints;
+  EXPECT_THROW(SolveSeveralLogs(registry_, {piece, piece}, options), Error);
+}
+
+}  // namespace
+}  // namespace plumbline

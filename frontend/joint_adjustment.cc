@@ -4,6 +4,7 @@
 #include <plumbline/factors/information.h>
 #include <plumbline/frontend/frontend_state.h>
 #include <plumbline/frontend/joint_adjustment.h>
+#include <plumbline/frontend/place_chain.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -36,20 +37,6 @@ void AddReturns(const std::vector<ScanPoint>& points, const Pose2& pose,
     if (point.normal.squaredNorm() == 0.0) continue;
     returns->push_back(Moved(point, transform));
   }
-}
-
-// The records that places begin with: every so many, and where the robot was
-// lost.
-std::vector<std::size_t> PlaceBegins(const std::vector<KeyScanRecord>& records,
-                                     std::size_t stride) {
-  std::vector<std::size_t> begins;
-  for (std::size_t k = 0; k < records.size(); ++k) {
-    if (begins.empty() || k - begins.back() == stride || records[k].from >= 0 ||
-        records[k].is_loose) {
-      begins.push_back(k);
-    }
-  }
-  return begins;
 }
 
 std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
@@ -142,31 +129,14 @@ double VarianceFactor(std::vector<double> chi_squares, double expected,
                   (links + prior_links));
 }
 
-// How the robot came to a place: from which one, and by what motion.
-struct Arrival {
-  std::size_t from;
+// The motion from the place before to this one, which is not the first.
+UncertainPose2 MotionTo(const std::vector<KeyScanRecord>& records,
+                        const PlaceArrival& arrival) {
   UncertainPose2 motion;
-};
-
-// `begins`: the record that each place begins with; `place`: not the first.
-Arrival ArrivalAt(const std::vector<KeyScanRecord>& records,
-                  const std::vector<std::size_t>& begins, std::size_t place) {
-  const std::size_t end = begins[place];
-  Arrival arrival{place - 1, {}};
-  std::size_t until = end - 1;
-  // Its first record's motion counts from another place when the robot was lost
-  // and found.
-  if (records[end].from >= 0) {
-    until = static_cast<std::size_t>(records[end].from);
-    arrival.from = static_cast<std::size_t>(
-        std::upper_bound(begins.begin(), begins.end(), until) - begins.begin() -
-        1);
+  for (const std::size_t k : arrival.steps) {
+    motion = Compose(motion, records[k].motion);
   }
-  for (std::size_t k = begins[arrival.from] + 1; k <= until; ++k) {
-    arrival.motion = Compose(arrival.motion, records[k].motion);
-  }
-  arrival.motion = Compose(arrival.motion, records[end].motion);
-  return arrival;
+  return motion;
 }
 
 }  // namespace
@@ -184,11 +154,6 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
       options_(options),
       stop_(std::move(stop)),
       records_(records) {
-  if (options_.place_stride < 1) {
-    throw PLUMBLINE_ERROR(
-        "place_stride is " + std::to_string(options_.place_stride),
-        "1 or more");
-  }
   options_.relations.num_threads = options_.num_threads;
   options_.votes.num_threads = options_.num_threads;
   begins_ = PlaceBegins(records_, options_.place_stride);
@@ -197,7 +162,8 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
     const KeyScanRecord& record = records_[begins_[p]];
     places_[p].follows_previous = record.from < 0 && !record.is_loose;
     if (p > 0) {
-      places_[p].since_previous = ArrivalAt(records_, begins_, p).motion.mean;
+      places_[p].since_previous =
+          MotionTo(records_, ArrivalAt(records_, begins_, p)).mean;
     }
   }
   finder_ = std::make_unique<ScanMatchFinder>(places_, options_.relations);
@@ -262,10 +228,11 @@ JointAdjustment::JointAdjustment(
     provisional.push_back(transaction.AddFeature(feature));
   }
   for (std::size_t p = 1; p < poses.size(); ++p) {
-    const auto [before, motion] = ArrivalAt(records_, begins_, p);
+    const PlaceArrival arrival = ArrivalAt(records_, begins_, p);
+    const UncertainPose2 motion = MotionTo(records_, arrival);
     const Eigen::Matrix3d information = motion.covariance.inverse();
     transaction.AddConstraint(MakeMeasurement(
-        pose_pose, {provisional[before], provisional[p]}, motion.mean,
+        pose_pose, {provisional[arrival.from], provisional[p]}, motion.mean,
         0.5 * (information + information.transpose()), kSource));
   }
   const TransactionResult places = graph_->Apply(std::move(transaction));

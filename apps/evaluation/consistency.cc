@@ -170,24 +170,20 @@ Consistency EvaluateConsistency(const Graph& graph,
     gauge.row(2 * i + 1) << 0.0, 0.0, 1.0;
     error.segment<2>(2 * i) = pair.error;
   }
-  // A frame that is not known at all is one that is fitted.
-  constexpr double kUnknown = 1e6;
   Eigen::MatrixXd covariance = jacobian * joint * jacobian.transpose();
   // What the map says in rounding only, m^2 and rad^2.
   covariance.diagonal().array() += 1e-12;
-  const Eigen::MatrixXd free =
-      covariance + kUnknown * gauge * gauge.transpose();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(free);
-  result.nees = error.dot(factor.solve(error));
-  result.degrees_of_freedom = n - 3;
-
+  const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
+  // The frame is not known: it is fitted.
   const Eigen::MatrixXd weighted = factor.solve(gauge);
   const Eigen::Matrix3d information = gauge.transpose() * weighted;
-  const Eigen::Vector3d fit =
-      information.ldlt().solve(weighted.transpose() * error);
-  const Eigen::VectorXd left = error - gauge * fit;
+  const Eigen::LDLT<Eigen::Matrix3d> frame(information);
+  const Eigen::VectorXd left =
+      error - gauge * frame.solve(weighted.transpose() * error);
+  result.nees = left.dot(factor.solve(left));
+  result.degrees_of_freedom = n - 3;
   const Eigen::MatrixXd left_covariance =
-      free - gauge * information.ldlt().solve(gauge.transpose());
+      covariance - gauge * frame.solve(gauge.transpose());
   const double share = 1.0 / result.walls;
   for (int i = 0; i < result.walls; ++i) {
     const Eigen::Vector2d e = left.segment<2>(2 * i);

@@ -5,6 +5,7 @@
 #include <plumbline/pipeline/log_solver_state.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -20,6 +21,11 @@ constexpr std::size_t kSmallMapGrowth = 10;
 // A second map with less than this share of the first one's length of walls has
 // lost what the scans show, and is no better.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
+
+// How well a wall of glimpses is known relative to a place beside it, m and
+// rad.
+constexpr double kGlimpsedPosition = 0.03;
+constexpr double kGlimpsedDirection = DegToRad(0.3);
 
 void AddSameWall(HierarchySpec* hierarchy) {
   if (!hierarchy->Contains(kSameWallDetector)) {
@@ -37,6 +43,20 @@ double LengthOfWalls(const Graph& graph) {
     if (std::isfinite(part)) length += part;
   }
   return length;
+}
+
+bool RecoversPoses(const LogSolverOptions& options) {
+  return options.refine == Refinement::kMap &&
+         options.features == RawFeatures::kSegments &&
+         options.odometry.match_scans;
+}
+
+PoseRecoveryOptions RecoveryOptions(const LogSolverOptions& options) {
+  PoseRecoveryOptions recovery;
+  recovery.place_stride = options.adjustment.place_stride;
+  recovery.noise = options.odometry.noise;
+  recovery.drift = options.odometry.drift;
+  return recovery;
 }
 
 KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
@@ -62,7 +82,7 @@ struct LogSolver::Context {
   LogSolverResult result;
   // As the scans were found again last.
   std::vector<Pose2> keys;
-  // Features of the places of the second map.
+  // Features of the places of the second map, or of those that were recovered.
   std::vector<FeatureId> places;
   // While the second map is made: what makes it, and the first one.
   std::unique_ptr<JointAdjustment> adjustment;
@@ -356,6 +376,7 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Stage end,
   }
   if (stage == Stage::kCloseLoops) {
     CloseLoops(context);
+    if (RecoversPoses(options_)) BringPosesBack(context);
     FindScansAgain(context);
     CompleteWalls(context);
     BeginStage(stage = Stage::kAdjustPoses, context);
@@ -460,11 +481,38 @@ void LogSolver::CloseLoops(Context* context) {
   RunEm(context);
 }
 
+// The relations that stood for the poses have served to find structure. What
+// they claim of their errors is not sound: structure is weighed anew by what
+// was measured.
+void LogSolver::BringPosesBack(Context* context) {
+  if (context->IsStopped()) return;
+  context->Begin("recovery of poses");
+  {
+    const ScopedTimer timer(&context->result.relocalization_seconds);
+    FeatureId robot = kNoId;
+    for (const Feature* feature : std::as_const(*graph_).Features()) {
+      if (feature->type->Is(FeatureRole::kPose)) robot = feature->id;
+    }
+    context->places =
+        RecoverPoses(context->result.records, KeyPoses(context->result.records),
+                     robot, RecoveryOptions(options_), registry_, graph_.get())
+            .places;
+  }
+  Renew();
+  context->result.initial_cost = session_->Cost();
+  TraceEm();
+  RunEm(context);
+}
+
 void LogSolver::FindScansAgain(Context* context) {
   LogSolverResult& result = context->result;
   result.final_cost = session_->Cost();
   context->IsStopped();
   const ScopedTimer timer(&result.relocalization_seconds);
+  if (!context->places.empty()) {
+    TakeTrajectory(context);
+    return;
+  }
   context->keys = KeyPoses(result.records);
   result.trajectory =
       InterpolateScans(result.refined, result.records, context->keys);
@@ -487,9 +535,38 @@ void LogSolver::CompleteWalls(Context* context) {
   result.glimpsed_walls =
       static_cast<std::int64_t>(walls.added_features().size());
   if (walls.empty()) return;
+  if (!context->places.empty()) walls = BindToPlaces(walls, *context);
   graph_->Apply(std::move(walls));
   RunEm(context);
   FindScansAgain(context);
+}
+
+Transaction LogSolver::BindToPlaces(const Transaction& walls,
+                                    const Context& context) const {
+  Transaction bound;
+  const Eigen::Vector3d sigma(kGlimpsedPosition, kGlimpsedPosition,
+                              kGlimpsedDirection);
+  const Eigen::Matrix3d information =
+      sigma.array().square().inverse().matrix().asDiagonal();
+  for (const Feature& wall : walls.added_features()) {
+    const Pose2 pose = wall.type->frame(wall);
+    const Feature* nearest = nullptr;
+    double smallest = std::numeric_limits<double>::infinity();
+    for (const FeatureId id : context.places) {
+      const Feature& place = graph_->GetFeature(id);
+      const double distance =
+          (place.type->frame(place) - pose).head<2>().norm();
+      if (distance >= smallest) continue;
+      smallest = distance;
+      nearest = &place;
+    }
+    bound.AddConstraint(
+        MakeMeasurement(registry_.GetRelation("pose_pose"),
+                        {nearest->id, bound.AddFeature(wall)},
+                        Between(nearest->type->frame(*nearest), pose),
+                        information, wall.source));
+  }
+  return bound;
 }
 
 void LogSolver::AdjustPoses(Context* context) {
@@ -565,11 +642,20 @@ void LogSolver::ReturnToFirstMap(Context* context) {
   context->first_trajectory.clear();
   context->first_map.clear();
   result.scan_relations = result.wall_votes = 0;
+  if (!result.second_map_refused ||
+      options_.features != RawFeatures::kSegments) {
+    return;
+  }
+  BringPosesBack(context);
+  FindScansAgain(context);
 }
 
 void LogSolver::FindStructureAgain(Context* context) {
-  if (options_.refine != Refinement::kFull || context->places.empty()) return;
   LogSolverResult& result = context->result;
+  if (options_.refine != Refinement::kFull || context->places.empty() ||
+      result.second_map_refused) {
+    return;
+  }
   const ScopedTimer timer(&result.adjustment_seconds);
   HierarchySpec hierarchy = HierarchyOfOptions();
   if (options_.global_association) AddSameWall(&hierarchy);

@@ -12,6 +12,7 @@
 #include <plumbline/frontend/map_check.h>
 #include <plumbline/frontend/odometry_refinement.h>
 #include <plumbline/frontend/point_map_builder.h>
+#include <plumbline/frontend/pose_recovery.h>
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/wall_completion.h>
@@ -131,6 +132,13 @@ struct LogSolverResult {
   std::vector<KeyScanRecord> records;
 };
 
+/// Whether poses are recovered once all scans are in (pose_recovery.h): the map
+/// of segments is final, and odometry was refined.
+bool RecoversPoses(const LogSolverOptions& options);
+
+/// The options of the recovery of poses that go with those of the log.
+PoseRecoveryOptions RecoveryOptions(const LogSolverOptions& options);
+
 /// A scan as a GraphBuilder takes it: `refined` and `returns` are what odometry
 /// refinement made of the scan with this index.
 KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
@@ -239,8 +247,13 @@ class LogSolver {
   LogSolverResult FinishFrom(Stage stage, Stage end, Context* context);
   void FindStructure(Context* context);
   void CloseLoops(Context* context);
+  void BringPosesBack(Context* context);
   void FindScansAgain(Context* context);
   void CompleteWalls(Context* context);
+  // The walls, each bound to the place next to it, which saw it: what they are
+  // relative to other walls goes by way of the places.
+  Transaction BindToPlaces(const Transaction& walls,
+                           const Context& context) const;
   // The second map, in three stages.
   void AdjustPoses(Context* context);
   void MakeWalls(Context* context);

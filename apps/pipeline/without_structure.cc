@@ -77,12 +77,24 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
     builder->AddScan(MakeKeyScan(record.scan, scan, refined, points));
   }
   builder->WriteRobot();
+  std::vector<FeatureId> places;
+  if (RecoversPoses(options)) {
+    places = RecoverPoses(builder->records(),
+                          RelocalizeKeyScans(graph, builder->records(),
+                                             options.relocalization),
+                          builder->robot_id(), RecoveryOptions(options),
+                          registry, &graph)
+                 .places;
+  }
   SolverSession session(&graph, registry, options.session);
   session.SetStop(is_stopped);
   if (!session.SolveGlobal().usable || is_stopped()) return map;
 
   std::vector<Pose2> keys;
-  if (options.refine != Refinement::kNone) {
+  if (!places.empty()) {
+    keys = KeyPosesOfPlaces(graph, places, builder->records(),
+                            options.adjustment.place_stride);
+  } else if (options.refine != Refinement::kNone) {
     keys =
         RelocalizeKeyScans(graph, builder->records(), options.relocalization);
   }

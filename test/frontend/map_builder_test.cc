@@ -162,7 +162,10 @@ TEST_F(MapBuilderTest, SquareRoomDrivenAroundGivesFourWalls) {
   Laser laser;  // the half circle ahead
   laser.sigma = 0.01;
   Noise noise(21);
-  MapBuilder builder(&graph_, registry_, Options());
+  // Gaps in a wall may be bridged.
+  MapBuilderOptions options = Options();
+  options.association.max_gap = 0.4;
+  MapBuilder builder(&graph_, registry_, options);
   SegmentExtractionOptions extraction;
   std::vector<Pose2> motions;
   for (int side = 0; side < 4; ++side) {
@@ -339,7 +342,10 @@ TEST_F(MapBuilderTest, TheLastLinkStaysWhenAllAreBeyondTheRadius) {
 
 // The scan begins in the middle of a wall, or a column hides it.
 TEST_F(MapBuilderTest, TwoPiecesOfAWallInTheFirstScanAreOneFeature) {
-  MapBuilder builder(&graph_, registry_, Options());
+  // Gaps in a wall may be bridged.
+  MapBuilderOptions options = Options();
+  options.association.max_gap = 0.4;
+  MapBuilder builder(&graph_, registry_, options);
   const Pose2 robot(0.0, 2.0, 0.0);
   const std::vector<SegmentObservation> pieces =
       ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
@@ -364,7 +370,10 @@ TEST_F(MapBuilderTest, TwoPiecesOfAWallInTheFirstScanAreOneFeature) {
 
 // The longest piece belongs to a wall that a shorter one has made.
 TEST_F(MapBuilderTest, TheGaugeIsFixedWhereTheLongestPieceIsOfAnothersWall) {
-  MapBuilder builder(&graph_, registry_, Options());
+  // Gaps in a wall may be bridged.
+  MapBuilderOptions options = Options();
+  options.association.max_gap = 0.4;
+  MapBuilder builder(&graph_, registry_, options);
   const Pose2 robot(0.0, 2.0, 0.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
@@ -375,6 +384,21 @@ TEST_F(MapBuilderTest, TheGaugeIsFixedWhereTheLongestPieceIsOfAnothersWall) {
   ASSERT_EQ(segments.size(), 2u);
   EXPECT_TRUE(segments[0]->fixed);
   EXPECT_FALSE(segments[1]->fixed);
+}
+
+// What begins where a wall ended may be another wall at a small angle.
+TEST_F(MapBuilderTest, AContinuationIsNoSighting) {
+  MapBuilder builder(&graph_, registry_, Options());
+  const Pose2 robot(0.0, 2.0, 0.0);
+  builder.AddKeyScan(0, Motion(Pose2::Zero()),
+                     {Observe(robot, Wall{{-2.0, 0.0}, {0.0, 0.0}})}, robot);
+  builder.AddKeyScan(1, Motion(Pose2::Zero()),
+                     {Observe(robot, Wall{{-2.0, 0.0}, {0.0, 0.0}}),
+                      Observe(robot, Wall{{0.02, 0.0}, {2.0, 0.06}})},
+                     robot);
+  const std::vector<const Feature*> segments = Segments();
+  ASSERT_EQ(segments.size(), 2u);
+  EXPECT_NEAR(segments[0]->extent_end - segments[0]->extent_begin, 2.0, 1e-3);
 }
 
 // A door leaf 10 cm behind its wall, or a wall at an angle, is another feature.

@@ -3,6 +3,8 @@
 #include <plumbline/apps/simulation/bent_world.h>
 #include <plumbline/detectors/builtins.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <set>
 #include <string>
 #include <vector>
@@ -94,6 +96,40 @@ TEST(BuildingTrialTest, Stopped) {
       Ring(), SimulatorOptions(), 5, registry, {}, [] { return true; });
   EXPECT_TRUE(trial.is_stopped);
   EXPECT_EQ(trial.scans, 0);
+}
+
+// Covariances of walls are of the size of their errors, in every mode: over
+// five small offices the ratio of NEES to its degrees of freedom, with room for
+// what is not reached yet (datasets/RESULTS.md).
+TEST(BuildingTrialTest, CovariancesHold) {
+  struct Mode {
+    const char* name;
+    bool structure, closures;
+    Refinement refine;
+    double least, most;
+  };
+  const Mode modes[] = {{"none", false, false, Refinement::kMap, 0.6, 1.5},
+                        {"structure", true, false, Refinement::kMap, 0.6, 1.5},
+                        {"default", true, true, Refinement::kFull, 0.3, 1.5}};
+  Registry registry;
+  RegisterBuiltins(&registry);
+  for (const Mode& mode : modes) {
+    LogSolverOptions options;
+    options.structure = mode.structure;
+    options.global_association = mode.closures;
+    options.refine = mode.refine;
+    std::vector<double> ratios;
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      const BuildingTrial trial =
+          RunBuildingTrial(MakeWorld("office", seed, 0.5), SimulatorOptions(),
+                           seed, registry, options);
+      EXPECT_GT(trial.consistency.degrees_of_freedom, 20) << mode.name;
+      ratios.push_back(trial.consistency.ratio());
+    }
+    std::sort(ratios.begin(), ratios.end());
+    EXPECT_GT(ratios[2], mode.least) << mode.name;
+    EXPECT_LT(ratios[2], mode.most) << mode.name;
+  }
 }
 
 }  // namespace

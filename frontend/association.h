@@ -23,9 +23,9 @@ struct AssociationOptions {
   double feature_offset_sigma = 0.03;
   double feature_angle_sigma = DegToRad(0.7);
   /// An observation that ends this far before the feature begins may still be
-  /// the same wall, m. What begins where a wall ended is no sighting of it: it
-  /// may be another wall at a small angle.
-  double max_gap = 0.0;
+  /// the same wall, m. 0: what begins where a wall ended is no sighting of it;
+  /// it may be another wall at a small angle.
+  double max_gap = 0.4;
 };
 
 /// A feature that may have been observed.

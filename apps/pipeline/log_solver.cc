@@ -116,6 +116,9 @@ LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
   em_ =
       std::make_unique<EmOrchestrator>(graph_.get(), session_.get(), registry_,
                                        StructureDetectors(), options_.em);
+  if (RecoversPoses(options_)) {
+    options_.builder.association.max_gap = options_.max_gap_of_final_map;
+  }
   builder_ = profile_.make_builder(options_, graph_.get(), registry_);
 }
 

@@ -50,6 +50,10 @@ struct LogSolverOptions {
   /// Of segments, and of points.
   MapBuilderOptions builder;
   PointMapBuilderOptions point_builder;
+  /// In place of AssociationOptions::max_gap where poses are recovered
+  /// (RecoversPoses): the first map's walls are final there, and a wall that
+  /// was joined with what goes on behind it bends them.
+  double max_gap_of_final_map = 0.0;
   SessionOptions session;
   EmOptions em;
   RelocalizationOptions relocalization;

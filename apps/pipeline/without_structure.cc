@@ -65,8 +65,12 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
   const auto is_stopped = [&stop] { return stop && stop(); };
   if (!options.structure || result.records.empty()) return map;
   Graph graph;
+  LogSolverOptions front_end = options;
+  if (RecoversPoses(options)) {
+    front_end.builder.association.max_gap = options.max_gap_of_final_map;
+  }
   const std::unique_ptr<GraphBuilder> builder =
-      ProfileOf(options.features).make_builder(options, &graph, registry);
+      ProfileOf(options.features).make_builder(front_end, &graph, registry);
   std::vector<ScanPoint> points;
   for (const KeyScanRecord& record : result.records) {
     if (is_stopped()) return map;

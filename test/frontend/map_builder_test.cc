@@ -162,10 +162,7 @@ TEST_F(MapBuilderTest, SquareRoomDrivenAroundGivesFourWalls) {
   Laser laser;  // the half circle ahead
   laser.sigma = 0.01;
   Noise noise(21);
-  // Gaps in a wall may be bridged.
-  MapBuilderOptions options = Options();
-  options.association.max_gap = 0.4;
-  MapBuilder builder(&graph_, registry_, options);
+  MapBuilder builder(&graph_, registry_, Options());
   SegmentExtractionOptions extraction;
   std::vector<Pose2> motions;
   for (int side = 0; side < 4; ++side) {
@@ -342,10 +339,7 @@ TEST_F(MapBuilderTest, TheLastLinkStaysWhenAllAreBeyondTheRadius) {
 
 // The scan begins in the middle of a wall, or a column hides it.
 TEST_F(MapBuilderTest, TwoPiecesOfAWallInTheFirstScanAreOneFeature) {
-  // Gaps in a wall may be bridged.
-  MapBuilderOptions options = Options();
-  options.association.max_gap = 0.4;
-  MapBuilder builder(&graph_, registry_, options);
+  MapBuilder builder(&graph_, registry_, Options());
   const Pose2 robot(0.0, 2.0, 0.0);
   const std::vector<SegmentObservation> pieces =
       ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
@@ -370,10 +364,7 @@ TEST_F(MapBuilderTest, TwoPiecesOfAWallInTheFirstScanAreOneFeature) {
 
 // The longest piece belongs to a wall that a shorter one has made.
 TEST_F(MapBuilderTest, TheGaugeIsFixedWhereTheLongestPieceIsOfAnothersWall) {
-  // Gaps in a wall may be bridged.
-  MapBuilderOptions options = Options();
-  options.association.max_gap = 0.4;
-  MapBuilder builder(&graph_, registry_, options);
+  MapBuilder builder(&graph_, registry_, Options());
   const Pose2 robot(0.0, 2.0, 0.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
@@ -388,7 +379,9 @@ TEST_F(MapBuilderTest, TheGaugeIsFixedWhereTheLongestPieceIsOfAnothersWall) {
 
 // What begins where a wall ended may be another wall at a small angle.
 TEST_F(MapBuilderTest, AContinuationIsNoSighting) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilderOptions options = Options();
+  options.association.max_gap = 0.0;
+  MapBuilder builder(&graph_, registry_, options);
   const Pose2 robot(0.0, 2.0, 0.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      {Observe(robot, Wall{{-2.0, 0.0}, {0.0, 0.0}})}, robot);

@@ -270,6 +270,7 @@ TEST_F(LogSolverTest, ASecondMapWithoutWallsIsRefused) {
   LogSolverOptions first_only = options;
   first_only.refine = Refinement::kMap;
   first_only.complete_walls = false;
+  first_only.max_gap_of_final_map = options.builder.association.max_gap;
   LogSolver first(registry_, first_only);
   const LogSolverResult without = first.Run(Office(250));
   EXPECT_FALSE(without.second_map_refused);

@@ -26,7 +26,8 @@ if(DOXYGEN_FOUND)
   endforeach()
   doxygen_add_docs(documentation README.md core/method.md core/graph_files.md core/plugins.md
     factors/relations.md frontend/bags.md datasets/README.md datasets/RESULTS.md datasets/sweeps/README.md
-    apps/plan/plan.md test/benchmark/README.md ${headers}
+    apps/plan/plan.md apps/evaluation/evaluation.md
+    test/benchmark/README.md ${headers}
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   set(PLUMBLINE_DOXYFILE ${PROJECT_BINARY_DIR}/Doxyfile.documentation)
 endif()

@@ -29,7 +29,6 @@
 #include <plumbline/pipeline/without_structure.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -43,12 +42,6 @@
 
 namespace plumbline {
 namespace {
-
-double Now() {
-  return std::chrono::duration<double>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 void LoadPlugins(Registry* registry) {
   std::istringstream list(FLAGS_plugins);
@@ -121,13 +114,13 @@ void TellChanges(const OutputFolder::Changes& changes, const Summary& summary) {
 
 // Writes all files and puts them in place together, the summary last: it knows
 // what the others took.
-void WriteOutputs(SolveOutcome* outcome, double total_begin,
+void WriteOutputs(SolveOutcome* outcome, const Stopwatch& of_run,
                   OutputFolder* folder) {
-  const double begin = Now();
+  const Stopwatch watch;
   outcome->summary.partial = InterruptRequested();
   CountGraph(*outcome->graph, &outcome->summary);
   // What the report says; the summary, written last, has the whole.
-  outcome->summary.total_seconds = begin - total_begin;
+  outcome->summary.total_seconds = of_run.Seconds();
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   outcome->flags = OwnFlags();
   outcome->delta_threshold = FLAGS_delta_threshold;
@@ -149,8 +142,8 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin,
     }
     outcome->summary.files = std::move(written.files);
     outcome->summary.digests = written.digests;
-    outcome->summary.write_seconds = Now() - begin;
-    outcome->summary.total_seconds = Now() - total_begin;
+    outcome->summary.write_seconds = watch.Seconds();
+    outcome->summary.total_seconds = of_run.Seconds();
     outcome->summary.peak_memory_bytes = PeakMemoryBytes();
     WriteSummary(outcome->summary,
                  (folder->staging() / OutputFolder::kSummary).string());
@@ -158,7 +151,7 @@ void WriteOutputs(SolveOutcome* outcome, double total_begin,
   } catch (const Error& error) {
     throw folder->InPlace(error);
   }
-  Detail("written to %s in %.1f s", FLAGS_output_dir.c_str(), Now() - begin);
+  Detail("written to %s in %.1f s", FLAGS_output_dir.c_str(), watch.Seconds());
 }
 
 // All files that the run reads, as far as flags name them.
@@ -201,7 +194,7 @@ void RemarkOnFlags(const std::string& name, const char* kind,
 
 // Covariances and ellipses that were asked for.
 void TakeMarginals(const SolverSession* session, SolveOutcome* outcome) {
-  const double begin = Now();
+  const Stopwatch watch;
   outcome->covariances = ComputeMarginals(
       *outcome->graph, session,
       ParseMarginalsSelection(FLAGS_marginals, *outcome->registry),
@@ -209,7 +202,7 @@ void TakeMarginals(const SolverSession* session, SolveOutcome* outcome) {
   outcome->ellipse_sigmas = FLAGS_ellipse_sigmas;
   if (!outcome->covariances.empty()) {
     Detail("covariances of %zu features in %.1f s", outcome->covariances.size(),
-           Now() - begin);
+           watch.Seconds());
   }
 }
 
@@ -433,52 +426,145 @@ CheckpointFile::Identity IdentityOfRun(const Log& log) {
   return identity;
 }
 
-// What there is to say and to write of a log's map. `result` has to stay until
-// the outputs are written.
-void TakeMap(const std::string& name, const std::vector<Scan>& scans,
-             const LogSolver& solver, const Registry& registry,
-             const LogSolverOptions& options, LogSolverResult* result,
-             SolveOutcome* outcome) {
-  Summary& summary = outcome->summary;
-  for (const EmPhase& phase : solver.trace()) TellPhase(phase);
-  summary.scans = static_cast<std::int64_t>(result->trajectory.size());
-  summary.scans_in_log = static_cast<std::int64_t>(scans.size());
-  for (const LooseTrack& part : result->loose) {
-    const Scan& begin_scan = scans[static_cast<std::size_t>(part.begin)];
-    const Scan& end_scan = scans[static_cast<std::size_t>(part.end)];
-    summary.tracking.loose.push_back(
-        {begin_scan.timestamp, end_scan.timestamp, part.why});
-    if (!part.found) ++summary.tracking.pieces;
-    Remark("%s: the map hangs by a thread, %.3f s to %.3f s: %s", name.c_str(),
-           begin_scan.timestamp, end_scan.timestamp, part.why.c_str());
+// Bars and lines on the way through one log or several.
+class SolvingProgress {
+ public:
+  // A log begins.
+  void BeginLog(const std::string& title, std::size_t num_scans) {
+    // One bar at a time.
+    finishing_.reset();
+    taking_scans_.reset();
+    taking_scans_ = std::make_unique<Progress>(
+        title, "scans", static_cast<std::int64_t>(num_scans));
   }
-  if (result->second_map_refused) {
-    summary.notes.push_back(
+
+  // For a solver; this has to stay while it runs.
+  RunControl Control() {
+    RunControl control;
+    control.progress = [this](std::size_t done, std::size_t total) {
+      TakeScan(done, total);
+    };
+    control.stop = [this] {
+      if (finishing_ != nullptr) finishing_->Update(++steps_);
+      return InterruptRequested();
+    };
+    control.step = [this](const char* step) {
+      Detail("%s, after %.1f s", step, watch_.Seconds());
+    };
+    return control;
+  }
+
+ private:
+  void TakeScan(std::size_t done, std::size_t total) {
+    taking_scans_->Update(static_cast<std::int64_t>(done));
+    if (done % 500 == 0 || done == total) {
+      Detail("%zu of %zu scans in %.1f s", done, total, watch_.Seconds());
+    }
+    if (done < total) return;
+    taking_scans_->Finish();
+    finishing_ = std::make_unique<Progress>("adjusting", "steps", 0);
+  }
+
+  Stopwatch watch_;
+  std::unique_ptr<Progress> taking_scans_;
+  // What comes after the last scan: its steps are not known beforehand.
+  std::unique_ptr<Progress> finishing_;
+  std::int64_t steps_ = 0;
+};
+
+// Solves a log, from where a run that did not end had got to if there is one,
+// and leaves checkpoints on the way.
+LogSolverResult RunWithCheckpoints(const Log& log, CheckpointFile* checkpoint,
+                                   LogSolver* solver) {
+  bool may_write = FLAGS_checkpoint_every > 0.0;
+  std::optional<std::string> state;
+  if (may_write) state = checkpoint->Read();
+  if (state) {
+    Remark("%s: goes on where a run that did not end had got to",
+           FLAGS_output_dir.c_str());
+  }
+  SolvingProgress progress;
+  progress.BeginLog("solving", log.scans.size());
+  RunControl control = progress.Control();
+  if (may_write) {
+    control.checkpoint = [&](const std::function<std::string()>& make_state) {
+      if (!may_write) return;
+      try {
+        checkpoint->Offer(make_state);
+      } catch (const Error& error) {
+        // The run can do without.
+        may_write = false;
+        Remark("goes on without checkpoints: %s", error.what());
+      }
+    };
+  }
+  return state ? solver->Resume(log, *state, control)
+               : solver->Run(log, control);
+}
+
+// How the track hangs together, and which of the two maps stands.
+void TellOfTrack(const std::string& name, const std::vector<Scan>& scans,
+                 const LogSolverResult& result, Summary* summary) {
+  for (const LooseTrack& part : result.loose) {
+    const Scan& begin = scans[static_cast<std::size_t>(part.begin)];
+    const Scan& end = scans[static_cast<std::size_t>(part.end)];
+    summary->tracking.loose.push_back(
+        {begin.timestamp, end.timestamp, part.why});
+    if (!part.found) ++summary->tracking.pieces;
+    Remark("%s: the map hangs by a thread, %.3f s to %.3f s: %s", name.c_str(),
+           begin.timestamp, end.timestamp, part.why.c_str());
+  }
+  if (result.second_map_refused) {
+    summary->notes.push_back(
         "the map from adjusted poses has hardly any walls: the map of the "
         "front-end stands");
-    Remark("%s: %s", name.c_str(), summary.notes.back().c_str());
+    Remark("%s: %s", name.c_str(), summary->notes.back().c_str());
   }
-  summary.frontend_seconds =
-      result->frontend_seconds + result->relocalization_seconds;
-  summary.scan_seconds.assign(result->scan_seconds.begin(),
-                              result->scan_seconds.end());
+}
 
-  for (std::size_t i = 0; i < result->trajectory.size(); ++i) {
-    TimedPose timed;
-    timed.timestamp = scans[i].timestamp;
-    timed.timestamp_text = scans[i].timestamp_text;
-    timed.pose = result->trajectory[i];
-    outcome->trajectory.push_back(timed);
+// What the summary says of the solve of a log's map.
+void SummarizeLog(const std::vector<Scan>& scans, const LogSolverResult& result,
+                  Summary* summary) {
+  summary->scans = static_cast<std::int64_t>(result.trajectory.size());
+  summary->scans_in_log = static_cast<std::int64_t>(scans.size());
+  summary->frontend_seconds =
+      result.frontend_seconds + result.relocalization_seconds;
+  summary->scan_seconds.assign(result.scan_seconds.begin(),
+                               result.scan_seconds.end());
+  EmReport em = result.em;
+  em.detect_seconds = result.detect_seconds;
+  em.solve_seconds = result.solve_seconds;
+  Summarize(result.initial_cost, result.final_cost, em, summary);
+}
+
+// The pose of every scan that was solved, with its time.
+std::vector<TimedPose> TimedTrajectory(const std::vector<Scan>& scans,
+                                       const std::vector<Pose2>& poses) {
+  std::vector<TimedPose> trajectory(poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    trajectory[i].timestamp = scans[i].timestamp;
+    trajectory[i].timestamp_text = scans[i].timestamp_text;
+    trajectory[i].pose = poses[i];
   }
-  result->em.detect_seconds = result->detect_seconds;
-  result->em.solve_seconds = result->solve_seconds;
-  Summarize(result->initial_cost, result->final_cost, result->em, &summary);
+  return trajectory;
+}
+
+// What there is to say and to write of a log's map. All but `name` have to stay
+// until the outputs are written.
+void TakeMap(const std::string& name, const std::vector<Scan>& scans,
+             const LogSolver& solver, const Registry& registry,
+             const LogSolverOptions& options, const LogSolverResult& result,
+             SolveOutcome* outcome) {
+  for (const EmPhase& phase : solver.trace()) TellPhase(phase);
+  TellOfTrack(name, scans, result, &outcome->summary);
+  SummarizeLog(scans, result, &outcome->summary);
+  outcome->trajectory = TimedTrajectory(scans, result.trajectory);
   outcome->graph = &solver.graph();
   outcome->registry = &registry;
   if (!InterruptRequested()) TakeMarginals(nullptr, outcome);
   outcome->scans = &scans;
-  outcome->without_structure = [&scans, &registry, &options, result] {
-    return ReplayWithoutStructure(scans, registry, options, *result,
+  outcome->without_structure = [&scans, &registry, &options, &result] {
+    return ReplayWithoutStructure(scans, registry, options, result,
                                   [] { return InterruptRequested(); });
   };
   outcome->trace = solver.trace();
@@ -487,20 +573,27 @@ void TakeMap(const std::string& name, const std::vector<Scan>& scans,
                                                     : ", without structure");
 }
 
-int SolveLog(const LogInput& input, const Registry& registry, double begin,
-             OutputFolder* folder) {
-  SolveOutcome outcome;
-  Summary& summary = outcome.summary;
+// A summary that says what the run is asked to do.
+Summary BeginSummary() {
+  Summary summary;
   summary.input = FLAGS_input;
   summary.seed = FLAGS_seed;
   summary.flags = ChangedFlags();
+  return summary;
+}
+
+int SolveLog(const LogInput& input, const Registry& registry,
+             const Stopwatch& of_run, OutputFolder* folder) {
+  SolveOutcome outcome;
+  Summary& summary = outcome.summary;
+  summary = BeginSummary();
   const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
   CheckHierarchy(options, registry);
   RemarkOnFlags(input.name, "log", "graphs", GraphFlags());
 
-  const double parse_begin = Now();
+  const Stopwatch reading;
   Log log = ReadInput(input);
-  summary.parse_seconds = Now() - parse_begin;
+  summary.parse_seconds = reading.Seconds();
   TellOfLog(input.name, log, &summary);
   Detail("read %zu scans in %.1f s", log.scans.size(), summary.parse_seconds);
   if (!log.has_odometry) {
@@ -510,60 +603,10 @@ int SolveLog(const LogInput& input, const Registry& registry, double begin,
   CheckpointFile checkpoint(
       std::filesystem::path(FLAGS_output_dir) / CheckpointFile::kName,
       [&log] { return IdentityOfRun(log); }, FLAGS_checkpoint_every);
-  std::optional<std::string> state;
-  if (FLAGS_checkpoint_every > 0.0) state = checkpoint.Read();
-  if (state) {
-    Remark("%s: goes on where a run that did not end had got to",
-           FLAGS_output_dir.c_str());
-  }
-
   LogSolver solver(registry, options);
-  LogSolverResult result;
-  {
-    const double begin_solving = Now();
-    Progress progress("solving", "scans",
-                      static_cast<std::int64_t>(log.scans.size()));
-    // What comes after the last scan: its steps are not known beforehand.
-    std::unique_ptr<Progress> finishing;
-    std::int64_t steps = 0;
-    RunControl control;
-    control.progress = [&](std::size_t done, std::size_t total) {
-      progress.Update(static_cast<std::int64_t>(done));
-      if (done % 500 == 0 || done == total) {
-        Detail("%zu of %zu scans in %.1f s", done, total,
-               Now() - begin_solving);
-      }
-      if (done == total) {
-        progress.Finish();
-        finishing = std::make_unique<Progress>("adjusting", "steps", 0);
-      }
-    };
-    control.stop = [&] {
-      if (finishing != nullptr) finishing->Update(++steps);
-      return InterruptRequested();
-    };
-    control.step = [&](const char* step) {
-      Detail("%s, after %.1f s", step, Now() - begin_solving);
-    };
-    bool may_write = FLAGS_checkpoint_every > 0.0;
-    if (may_write) {
-      control.checkpoint = [&](const std::function<std::string()>& make_state) {
-        if (!may_write) return;
-        try {
-          checkpoint.Offer(make_state);
-        } catch (const Error& error) {
-          // The run can do without.
-          may_write = false;
-          Remark("goes on without checkpoints: %s", error.what());
-        }
-      };
-    }
-    result =
-        state ? solver.Resume(log, *state, control) : solver.Run(log, control);
-    state.reset();
-  }
-  TakeMap(input.name, log.scans, solver, registry, options, &result, &outcome);
-  WriteOutputs(&outcome, begin, folder);
+  const LogSolverResult result = RunWithCheckpoints(log, &checkpoint, &solver);
+  TakeMap(input.name, log.scans, solver, registry, options, result, &outcome);
+  WriteOutputs(&outcome, of_run, folder);
   if (!summary.partial) checkpoint.Remove();
   return kExitSuccess;
 }
@@ -657,9 +700,43 @@ std::vector<Summary::LogInput> DescribeLogs(
   return logs;
 }
 
+// Reads all logs; each has odometry in the end.
+std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
+                          const LogSolverOptions& options, Summary* summary) {
+  std::vector<Log> logs;
+  for (const std::unique_ptr<OpenInput>& input : inputs) {
+    const std::string& name = input->log.name;
+    Log log = ReadInput(input->log);
+    Summary of_log;
+    TellOfLog(name, log, &of_log);
+    if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
+    if (!log.has_odometry) MatchScansAlone(name, options, &log, &of_log);
+    AddNotes(TitleOf(name), of_log, summary);
+    logs.push_back(std::move(log));
+  }
+  return logs;
+}
+
+SeveralLogsResult RunSeveralLogs(const Registry& registry,
+                                 std::vector<Log> logs,
+                                 const SeveralLogsOptions& options) {
+  std::vector<std::size_t> num_scans;
+  for (const Log& log : logs) num_scans.push_back(log.scans.size());
+  SolvingProgress progress;
+  SeveralLogsControl control;
+  control.begin_log = [&](std::size_t i) {
+    progress.BeginLog("log " + std::to_string(i + 1) + " of " +
+                          std::to_string(num_scans.size()),
+                      num_scans[i]);
+  };
+  control.run = progress.Control();
+  return SolveSeveralLogs(registry, std::move(logs), options, control);
+}
+
 int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
               const std::vector<std::optional<Pose2>>& starts,
-              const Registry& registry, double begin, OutputFolder* folder) {
+              const Registry& registry, const Stopwatch& of_run,
+              OutputFolder* folder) {
   SeveralLogsOptions options;
   options.solver = LogSolverOptionsFromFlags(registry);
   options.starts = starts;
@@ -672,61 +749,13 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
                 "--refine=map or --refine=none",
                 "segments and full refinement");
   }
-  Summary common;
-  common.input = FLAGS_input;
-  common.seed = FLAGS_seed;
-  common.flags = ChangedFlags();
-  std::vector<Log> logs;
-  const double parse_begin = Now();
-  for (const std::unique_ptr<OpenInput>& input : inputs) {
-    const std::string& name = input->log.name;
-    Log log = ReadInput(input->log);
-    Summary of_log;
-    TellOfLog(name, log, &of_log);
-    if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
-    if (!log.has_odometry) {
-      MatchScansAlone(name, options.solver, &log, &of_log);
-    }
-    AddNotes(TitleOf(name), of_log, &common);
-    logs.push_back(std::move(log));
-  }
-  common.parse_seconds = Now() - parse_begin;
+  Summary common = BeginSummary();
+  const Stopwatch reading;
+  std::vector<Log> logs = ReadLogs(inputs, options.solver, &common);
+  common.parse_seconds = reading.Seconds();
 
-  SeveralLogsResult solved;
-  {
-    const double begin_solving = Now();
-    std::unique_ptr<Progress> progress;
-    bool is_taking_scans = false;
-    std::int64_t steps = 0;
-    std::vector<std::int64_t> scans;
-    for (const Log& log : logs) {
-      scans.push_back(static_cast<std::int64_t>(log.scans.size()));
-    }
-    SeveralLogsControl control;
-    control.begin_log = [&](std::size_t i) {
-      progress.reset();
-      progress =
-          std::make_unique<Progress>("log " + std::to_string(i + 1) + " of " +
-                                         std::to_string(scans.size()),
-                                     "scans", scans[i]);
-      is_taking_scans = true;
-    };
-    control.run.progress = [&](std::size_t done, std::size_t total) {
-      progress->Update(static_cast<std::int64_t>(done));
-      if (done < total) return;
-      progress.reset();
-      progress = std::make_unique<Progress>("adjusting", "steps", 0);
-      is_taking_scans = false;
-    };
-    control.run.stop = [&] {
-      if (!is_taking_scans && progress != nullptr) progress->Update(++steps);
-      return InterruptRequested();
-    };
-    control.run.step = [&](const char* step) {
-      Detail("%s, after %.1f s", step, Now() - begin_solving);
-    };
-    solved = SolveSeveralLogs(registry, std::move(logs), options, control);
-  }
+  const SeveralLogsResult solved =
+      RunSeveralLogs(registry, std::move(logs), options);
   if (solved.interrupted) {
     std::fprintf(stderr,
                  "interrupted: the logs are not put together, nothing is "
@@ -737,7 +766,7 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
 
   // The output folder's own map comes last: its summary is the run's.
   for (std::size_t m = solved.maps.size(); m-- > 0;) {
-    MapOfLogs& map = solved.maps[m];
+    const MapOfLogs& map = solved.maps[m];
     SolveOutcome outcome;
     outcome.summary = common;
     std::string title;
@@ -745,15 +774,15 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
       title += (title.empty() ? "" : ", ") + TitleOf(inputs[i]->log.name);
       outcome.logs.push_back({i + 1, solved.logs[i].begin, solved.logs[i].end});
     }
-    TakeMap(title, map.scans, *map.solver, registry, options.solver,
-            &map.result, &outcome);
+    TakeMap(title, map.scans, *map.solver, registry, options.solver, map.result,
+            &outcome);
     if (m == 0) {
-      WriteOutputs(&outcome, begin, folder);
+      WriteOutputs(&outcome, of_run, folder);
       continue;
     }
     OutputFolder apart(std::filesystem::path(FLAGS_output_dir) / FolderOfMap(m),
                        NamesOfAllOutputs(registry), InputFiles());
-    WriteOutputs(&outcome, begin, &apart);
+    WriteOutputs(&outcome, of_run, &apart);
   }
   return kExitSuccess;
 }
@@ -812,21 +841,19 @@ void SummarizeSolves(const GraphSolverResult& result,
   figures->setup_seconds = result.solves.setup_seconds;
 }
 
-int SolveGraph(InputStream* input, const Registry& registry, double begin,
-               OutputFolder* folder) {
+int SolveGraph(InputStream* input, const Registry& registry,
+               const Stopwatch& of_run, OutputFolder* folder) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
-  summary.input = FLAGS_input;
-  summary.seed = FLAGS_seed;
-  summary.flags = ChangedFlags();
+  summary = BeginSummary();
   const GraphSolverOptions options = GraphSolverOptionsFromFlags(registry);
   RemarkOnFlags(input->name(), "graph", "logs", LogFlags());
 
-  const double parse_begin = Now();
+  const Stopwatch reading;
   Graph graph;
   const std::optional<G2oFile> g2o = ReadGraph(input, registry, &graph);
   if (!g2o) return kExitInterrupted;
-  summary.parse_seconds = Now() - parse_begin;
+  summary.parse_seconds = reading.Seconds();
   for (const auto& tag : g2o->unknown_tags) {
     Remark("%s: %d lines with the unknown tag %s kept as they are",
            input->name().c_str(), tag.second, PrintableUtf8(tag.first).c_str());
@@ -876,12 +903,12 @@ int SolveGraph(InputStream* input, const Registry& registry, double begin,
     return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
   };
   outcome.title = TitleOf(input->name());
-  WriteOutputs(&outcome, begin, folder);
+  WriteOutputs(&outcome, of_run, folder);
   return kExitSuccess;
 }
 
 int Run() {
-  const double begin = Now();
+  const Stopwatch of_run;
   Registry& registry = Registry::Global();
   RegisterBuiltins(&registry);
   RegisterBuiltinLogReaders(&registry);
@@ -940,12 +967,12 @@ int Run() {
            FLAGS_output_dir.c_str(), Joined(folder.cleaned()).c_str());
   }
   if (inputs.size() > 1) {
-    return SolveLogs(inputs, starts, registry, begin, &folder);
+    return SolveLogs(inputs, starts, registry, of_run, &folder);
   }
   const OpenInput& input = *inputs.front();
   return input.is_graph
-             ? SolveGraph(&*inputs.front()->stream, registry, begin, &folder)
-             : SolveLog(input.log, registry, begin, &folder);
+             ? SolveGraph(&*inputs.front()->stream, registry, of_run, &folder)
+             : SolveLog(input.log, registry, of_run, &folder);
 }
 
 }  // namespace

@@ -40,31 +40,32 @@ std::string PolygonText(const Polygon& polygon) {
   return text + "]";
 }
 
-// Numbers of rooms in the files begin with 1.
-std::string RoomId(int index) {
+// Numbers of rooms and doors in the files begin with 1.
+std::string NumberOf(int index) {
   return index < 0 ? "null" : std::to_string(index + 1);
 }
 
 std::string RoomFeature(const PlanRoom& room, int index) {
   std::string properties = "\"kind\": \"" +
                            std::string(RoomKindName(room.kind)) +
-                           "\", \"id\": " + RoomId(index) + ", \"area_m2\": ";
+                           "\", \"id\": " + NumberOf(index) + ", \"area_m2\": ";
   AppendFixed(room.area, 3, &properties);
   properties += ", \"entered\": ";
   properties += room.is_entered ? "true" : "false";
   properties += ", \"neighbors\": [";
   for (std::size_t i = 0; i < room.neighbors.size(); ++i) {
     if (i > 0) properties += ", ";
-    properties += RoomId(room.neighbors[i]);
+    properties += NumberOf(room.neighbors[i]);
   }
   return Feature(properties + "]", "Polygon", PolygonText(room.outline));
 }
 
-std::string DoorFeature(const PlanDoor& door) {
-  std::string properties = "\"kind\": \"door\", \"width_m\": ";
+std::string DoorFeature(const PlanDoor& door, int index) {
+  std::string properties =
+      "\"kind\": \"door\", \"id\": " + NumberOf(index) + ", \"width_m\": ";
   AppendFixed(door.width(), 3, &properties);
-  properties += ", \"rooms\": [" + RoomId(door.rooms[0]) + ", " +
-                RoomId(door.rooms[1]) + "], \"driven\": ";
+  properties += ", \"rooms\": [" + NumberOf(door.rooms[0]) + ", " +
+                NumberOf(door.rooms[1]) + "], \"driven\": ";
   properties += door.is_driven ? "true" : "false";
   return Feature(properties, "LineString",
                  "[" + Position(door.begin) + ", " + Position(door.end) + "]");
@@ -146,7 +147,9 @@ void WriteFloorPlanGeoJson(const FloorPlan& plan, std::ostream& output) {
   for (std::size_t i = 0; i < building.rooms.size(); ++i) {
     write(RoomFeature(building.rooms[i], static_cast<int>(i)));
   }
-  for (const PlanDoor& door : building.doors) write(DoorFeature(door));
+  for (std::size_t i = 0; i < building.doors.size(); ++i) {
+    write(DoorFeature(building.doors[i], static_cast<int>(i)));
+  }
   for (const PlanWall& wall : building.walls) write(BodyFeature(wall));
   for (const FloorPlanWall& wall : plan.walls) write(WallFeature(plan, wall));
   for (const auto& solid : plan.solids) write(SolidFeature(solid));

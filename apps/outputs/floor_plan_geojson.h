@@ -12,8 +12,9 @@ namespace plumbline {
 /// a feature is:
 ///
 ///     room, corridor  Polygon: id (from 1), area_m2, entered, neighbors (ids)
-///     door            LineString from jamb to jamb: width_m, rooms (two ids,
-///                     null for what is no room), driven
+///     door            LineString from jamb to jamb: id (from 1), width_m,
+///     rooms
+///                     (two ids, null for what is no room), driven
 ///     wall            Polygon: length_m, thickness_m
 ///     face            LineString, a face of a wall as the map has it: layer,
 ///                     direction_deg, length_m, features

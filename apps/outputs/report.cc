@@ -248,6 +248,40 @@ Json PathToJson(const std::vector<Pose2>& path,
   return json;
 }
 
+// Rooms and doors by their numbers less one; null when they were not looked
+// for.
+Json BuildingToJson(const BuildingPlan* plan) {
+  if (plan == nullptr) return nullptr;
+  const auto ring_to_json = [](const Ring& ring) {
+    std::vector<double> values;
+    for (const Eigen::Vector2d& corner : ring) {
+      values.insert(values.end(), {corner[0], corner[1]});
+    }
+    return RoundedArray(values);
+  };
+  Json rooms = Json::array(), doors = Json::array();
+  for (const PlanRoom& room : plan->rooms) {
+    Json rings = Json::array({ring_to_json(room.outline.shell)});
+    for (const Ring& hole : room.outline.holes) {
+      rings.push_back(ring_to_json(hole));
+    }
+    const Eigen::Vector2d middle = InnerPoint(room.outline);
+    rooms.push_back({{"kind", RoomKindName(room.kind)},
+                     {"area", Rounded(room.area, 1e3)},
+                     {"entered", room.is_entered ? 1 : 0},
+                     {"middle", RoundedArray({middle[0], middle[1]})},
+                     {"rings", std::move(rings)}});
+  }
+  for (const PlanDoor& door : plan->doors) {
+    doors.push_back({{"ends", RoundedArray({door.begin[0], door.begin[1],
+                                            door.end[0], door.end[1]})},
+                     {"width", Rounded(door.width(), 1e3)},
+                     {"rooms", door.rooms},
+                     {"driven", door.is_driven ? 1 : 0}});
+  }
+  return {{"rooms", std::move(rooms)}, {"doors", std::move(doors)}};
+}
+
 Json TraceToJson(const std::vector<EmTraceRow>& trace) {
   Json json = Json::array();
   for (const EmTraceRow& row : trace) {
@@ -311,6 +345,7 @@ Json DataToJson(const Report& report) {
   json["path_before"] = report.before.path.size() == report.path.size()
                             ? PathToJson(report.before.path, way)
                             : Json(nullptr);
+  json["building"] = BuildingToJson(report.building);
   json["trace"] = TraceToJson(report.trace);
   return json;
 }

@@ -7,6 +7,7 @@
 #include <plumbline/frontend/map_without_structure.h>
 #include <plumbline/outputs/em_trace.h>
 #include <plumbline/outputs/summary.h>
+#include <plumbline/plan/building_plan.h>
 
 #include <ostream>
 #include <string>
@@ -23,6 +24,8 @@ struct Report {
   MapWithoutStructure before;
   /// Map frame; what lies nearer than 10 cm to the one before is left out.
   std::vector<Pose2> path;
+  /// Null when rooms were not looked for: the section on them is left out.
+  const BuildingPlan* building = nullptr;
   std::vector<EmTraceRow> trace;
   Summary summary;
   /// All of them, not only those that were changed.
@@ -32,8 +35,9 @@ struct Report {
 };
 
 /// Writes one page that needs nothing but a browser: the map with and without
-/// structure, what supports each wall, the levels of structure, delta, costs by
-/// phase of EM, broken constraints, times, flags. Names and paths are data in
+/// structure, rooms with their areas and doors, what supports each wall, the
+/// levels of structure, delta, costs by phase of EM, broken constraints, times,
+/// flags. Names and paths are data in
 /// it, never markup. The same report gives the same bytes; what differs between
 /// two runs of the same input (times, memory, flags) stands on one line, in the
 /// element with the id "run".

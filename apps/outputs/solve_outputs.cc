@@ -1,6 +1,5 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
-#include <plumbline/core/graph_json.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/sha256.h>
 #include <plumbline/frontend/tum.h>
@@ -10,6 +9,7 @@
 #include <plumbline/outputs/floor_plan_geojson.h>
 #include <plumbline/outputs/floor_plan_svg.h>
 #include <plumbline/outputs/map_drawing.h>
+#include <plumbline/outputs/map_json.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/report.h>
 #include <plumbline/outputs/rooms_csv.h>
@@ -67,11 +67,19 @@ class SharedParts {
       // A plan without rooms is better than none.
       try {
         FindRooms(outcome);
+        are_rooms_found_ = no_rooms_.empty();
       } catch (const Error& error) {
         no_rooms_ = error.what();
       }
     });
     return plan_;
+  }
+
+  // Rooms and doors; null without scans, and when they could not be looked
+  // for.
+  const BuildingPlan* Building(const SolveOutcome& outcome) {
+    const FloorPlan& plan = Plan(outcome);
+    return are_rooms_found_ ? &plan.building : nullptr;
   }
 
   // Why the plan of a log has no rooms; empty when they were looked for.
@@ -99,6 +107,7 @@ class SharedParts {
   std::string no_grid_;
   std::once_flag plan_once_;
   FloorPlan plan_;
+  bool are_rooms_found_ = false;
   std::string no_rooms_;
 };
 
@@ -127,6 +136,7 @@ Report MakeReport(const SolveOutcome& outcome) {
   report.graph = outcome.graph;
   if (outcome.without_structure) report.before = outcome.without_structure();
   report.path = Poses(outcome);
+  report.building = outcome.parts->Building(outcome);
   for (const EmPhase& phase : outcome.trace)
     report.trace.push_back({phase, {}});
   report.summary = outcome.summary;
@@ -251,11 +261,10 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
       Always([](const SolveOutcome& outcome, const path& folder) {
         WriteMapSvg(Drawing(outcome), folder / "map.svg");
       }));
-  add("map.json", "every feature and constraint", true, false,
+  add("map.json", "every feature and constraint, rooms and doors", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {
-        WriteFileAtomically(folder / "map.json", [&](std::ostream& output) {
-          WriteGraphJson(*outcome.graph, output, &outcome.covariances);
-        });
+        WriteMapJson(*outcome.graph, &outcome.covariances,
+                     outcome.parts->Building(outcome), folder / "map.json");
       }));
   add("graph.g2o", "the same as g2o text", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {

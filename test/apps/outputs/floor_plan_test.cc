@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/graph_json.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/outputs/floor_plan.h>
 #include <plumbline/outputs/floor_plan_dxf.h>
 #include <plumbline/outputs/floor_plan_geojson.h>
 #include <plumbline/outputs/floor_plan_svg.h>
+#include <plumbline/outputs/map_json.h>
 #include <plumbline/outputs/rooms_csv.h>
 
 #include <cmath>
@@ -400,6 +402,7 @@ TEST_F(FloorPlanTest, GeoJsonOfRooms) {
   EXPECT_EQ(corridor["properties"]["neighbors"], nlohmann::json({2}));
   EXPECT_EQ(corridor["geometry"]["coordinates"][0].size(), 5u);
   const auto& door = of_kind["door"][0]["properties"];
+  EXPECT_EQ(door["id"], 1);
   EXPECT_EQ(door["width_m"], 0.9);
   EXPECT_EQ(door["rooms"], nlohmann::json({2, 1}));
   EXPECT_EQ(door["driven"], true);
@@ -420,6 +423,57 @@ TEST_F(FloorPlanTest, SvgOfRooms) {
   // The face at the wall of the corridor is shown by it, the other is not.
   EXPECT_THAT(svg, HasSubstr("x1=\"30.0000\""));
   EXPECT_THAT(svg, Not(HasSubstr("x2=\"4.0000\"")));
+}
+
+TEST_F(FloorPlanTest, MapJsonOfRooms) {
+  Feature wall;
+  wall.type = &registry_.GetFeature("segment");
+  wall.parameters = {1.0, 2.0, 0.5};
+  wall.extent_end = 4.0;
+  Transaction transaction;
+  transaction.AddFeature(wall);
+  graph_.Apply(std::move(transaction));
+  FloorPlan plan = PlanWithRooms();
+  plan.building.rooms[1].outline.holes = {{{1, 1}, {1, 2}, {2, 2}}};
+  std::ostringstream text;
+  WriteMapJson(graph_, nullptr, &plan.building, text);
+  const auto json = nlohmann::json::parse(text.str());
+  ASSERT_EQ(json["rooms"].size(), 2u);
+  const auto& corridor = json["rooms"][0];
+  EXPECT_EQ(corridor["id"], 1);
+  EXPECT_EQ(corridor["kind"], "corridor");
+  EXPECT_EQ(corridor["area_m2"], 40.0);
+  EXPECT_EQ(corridor["entered"], true);
+  EXPECT_EQ(corridor["outline"].size(), 4u);
+  EXPECT_EQ(corridor["outline"][1], nlohmann::json::parse("[20.0, -2.0]"));
+  EXPECT_EQ(corridor["neighbors"], nlohmann::json({2}));
+  EXPECT_EQ(corridor["doors"], nlohmann::json({1, 2}));
+  EXPECT_EQ(json["rooms"][1]["holes"][0].size(), 3u);
+  EXPECT_EQ(json["rooms"][1]["doors"], nlohmann::json({1}));
+  ASSERT_EQ(json["doors"].size(), 2u);
+  EXPECT_EQ(json["doors"][0]["id"], 1);
+  EXPECT_EQ(json["doors"][0]["width_m"], 0.9);
+  EXPECT_EQ(json["doors"][0]["thickness_m"], 0.2);
+  EXPECT_EQ(json["doors"][0]["begin"], nlohmann::json::parse("[1.0, 0.1]"));
+  EXPECT_EQ(json["doors"][0]["rooms"], nlohmann::json({2, 1}));
+  EXPECT_EQ(json["doors"][0]["driven"], true);
+  EXPECT_EQ(json["doors"][1]["rooms"], nlohmann::json({nullptr, 1}));
+  // The graph is read as ever, and written without a plan as ever.
+  Graph again;
+  std::istringstream input(text.str());
+  ReadGraphJson(input, "map.json", registry_, &again);
+  ASSERT_EQ(again.num_features(), 1);
+  EXPECT_EQ(again.Features()[0]->parameters[2], 0.5);
+  std::ostringstream plain, without;
+  WriteGraphJson(graph_, plain);
+  WriteMapJson(graph_, nullptr, nullptr, without);
+  EXPECT_EQ(without.str(), plain.str());
+  // Looked for in vain.
+  const BuildingPlan none;
+  std::ostringstream empty;
+  WriteMapJson(graph_, nullptr, &none, empty);
+  EXPECT_EQ(nlohmann::json::parse(empty.str())["rooms"],
+            nlohmann::json::array());
 }
 
 TEST_F(FloorPlanTest, TableOfRooms) {

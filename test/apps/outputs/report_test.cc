@@ -130,6 +130,29 @@ class ReportTest : public ::testing::Test {
         page.substr(begin + start.size(), end - begin - start.size()));
   }
 
+  // A corridor and a room with a door between them; another leads nowhere.
+  static BuildingPlan TwoRooms() {
+    BuildingPlan plan;
+    plan.rooms.resize(2);
+    plan.rooms[0].kind = PlanRoom::Kind::kCorridor;
+    plan.rooms[0].outline.shell = {{0, -2}, {20, -2}, {20, 0}, {0, 0}};
+    plan.rooms[0].area = 40.0;
+    plan.rooms[0].is_entered = true;
+    plan.rooms[0].neighbors = {1};
+    plan.rooms[1].outline.shell = {{0, 0.2}, {5, 0.2}, {5, 4.2}, {0, 4.2}};
+    plan.rooms[1].area = 20.0;
+    plan.rooms[1].neighbors = {0};
+    plan.doors.resize(2);
+    plan.doors[0].begin = {1.0, 0.1};
+    plan.doors[0].end = {1.9, 0.1};
+    plan.doors[0].rooms = {1, 0};
+    plan.doors[0].is_driven = true;
+    plan.doors[1].begin = {18.0, 0.1};
+    plan.doors[1].end = {18.8, 0.1};
+    plan.doors[1].rooms = {-1, 0};
+    return plan;
+  }
+
   Registry registry_;
   Graph graph_;
 };
@@ -236,6 +259,23 @@ TEST_F(ReportTest, DataOfTheMap) {
   EXPECT_EQ(run["time_s"]["total"], 2.0);
   EXPECT_EQ(run["flags"][1]["value"], "dir/log.clf");
   EXPECT_EQ(run["phase_seconds"].size(), 3u);
+}
+
+TEST_F(ReportTest, DataOfTheRooms) {
+  MakeCorridor(3);
+  Report report = MakeReport();
+  EXPECT_TRUE(Script(Text(report), "data")["building"].is_null());
+  const BuildingPlan plan = TwoRooms();
+  report.building = &plan;
+  const auto building = Script(Text(report), "data")["building"];
+  ASSERT_EQ(building["rooms"].size(), 2u);
+  EXPECT_EQ(building["rooms"][0]["kind"], "corridor");
+  EXPECT_EQ(building["rooms"][0]["area"], 40.0);
+  EXPECT_EQ(building["rooms"][0]["rings"],
+            nlohmann::json::parse("[[0.0,-2.0,20.0,-2.0,20.0,0.0,0.0,0.0]]"));
+  ASSERT_EQ(building["doors"].size(), 2u);
+  EXPECT_EQ(building["doors"][0]["width"], 0.9);
+  EXPECT_EQ(building["doors"][1]["rooms"], nlohmann::json({-1, 0}));
 }
 
 // A wall that only a rectangle holds has the colour of the rectangle's side, as
@@ -467,6 +507,52 @@ TEST_F(ReportInBrowserTest, LoadsAndAnswersTheMouse) {
         std::string(mode) + "'; s.dispatchEvent(new Event('change')); })()");
   }
   browser_->Evaluate("new Promise(done => setTimeout(() => done(0), 50))");
+  EXPECT_THAT(browser_->complaints(), IsEmpty());
+}
+
+TEST_F(ReportInBrowserTest, Rooms) {
+  MakeCorridor(3);
+  Report report = MakeReport();
+  const BuildingPlan plan = TwoRooms();
+  report.building = &plan;
+  Open(report);
+  const auto text = [&](const std::string& id) {
+    return browser_->Evaluate("document.getElementById('" + id + "').innerText")
+        .get<std::string>();
+  };
+  EXPECT_THAT(text("rooms-note"),
+              HasSubstr("1 room, 1 corridor, 2 doors; 60.0 m²"));
+  EXPECT_EQ(browser_->Evaluate("[...document.querySelectorAll('#rooms tbody "
+                               "tr')].map(row => [...row.cells].map(cell => "
+                               "cell.textContent).join('|')).join(';')"),
+            "1|corridor|40.0|yes|2 through door 1 (0.90 m), no known room "
+            "through door 2 (0.80 m);2|room|20.0|no|1 through door 1 (0.90 "
+            "m)");
+  // Rooms are tinted where they are; one that is picked is in the middle.
+  browser_->Evaluate("document.querySelectorAll('#rooms tr.link')[1].click()");
+  EXPECT_NEAR(browser_->Evaluate("plumbline.view.x").get<double>(), 2.5, 1e-9);
+  EXPECT_NEAR(browser_->Evaluate("plumbline.view.y").get<double>(), 2.2, 1e-9);
+  const std::string tinted =
+      "new Promise(done => requestAnimationFrame(() => "
+      "requestAnimationFrame(() "
+      "=> { const c = document.getElementById('map'); const d = "
+      "c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = "
+      "0; for (let i = 0; i < d.length; i += 4) n += d[i] === 230 && d[i + 1] "
+      "=== 239 && d[i + 2] === 246; done(n); })))";
+  EXPECT_GT(browser_->Evaluate(tinted).get<int>(), 10000);
+  Open(report);
+  browser_->Evaluate("document.getElementById('show-rooms').click()");
+  EXPECT_EQ(browser_->Evaluate(tinted).get<int>(), 0);
+  // Looked for in vain, and not looked for.
+  const BuildingPlan none;
+  report.building = &none;
+  Open(report);
+  EXPECT_THAT(text("rooms-note"), HasSubstr("None"));
+  report.building = nullptr;
+  Open(report);
+  EXPECT_EQ(
+      browser_->Evaluate("document.getElementById('rooms-card').style.display"),
+      "none");
   EXPECT_THAT(browser_->complaints(), IsEmpty());
 }
 

@@ -8,7 +8,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
+#include <limits>
 #include <memory>
+#include <numeric>
 #include <set>
 #include <string>
 #include <utility>
@@ -55,10 +58,21 @@ constexpr double kOpenSigma = 2.0;
 constexpr double kLooseSigma = 3.0;
 constexpr double kLooseAngle = DegToRad(20.0);
 
+// A tie that is known worse than this is no better than a loose one, m and rad.
+constexpr double kLateSigma = 0.5;
+constexpr double kLateAngle = DegToRad(5.0);
+
 Eigen::Matrix3d Diagonal(double translation, double rotation) {
   return Eigen::Vector3d(translation * translation, translation * translation,
                          rotation * rotation)
       .asDiagonal();
+}
+
+ScanPoint PointOf(const Eigen::Vector4f& values) {
+  ScanPoint point{};
+  point.position = values.head<2>().cast<double>();
+  point.normal = values.tail<2>().cast<double>();
+  return point;
 }
 
 double SeenThrough(const ScanAgreement& a) {
@@ -304,16 +318,7 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
       (rotation * match.information * rotation.transpose() +
        result.since_key.covariance.inverse())
           .inverse();
-  const MatchDrift& drift = options_.drift;
-  const double way = result.since_key.mean.head<2>().norm();
-  const double turned = std::abs(result.since_key.mean[2]);
-  const double translation =
-      drift.translation_per_root_metre * drift.translation_per_root_metre * way;
-  const double heading =
-      drift.rotation_per_root_metre * drift.rotation_per_root_metre * way +
-      drift.rotation_per_root_radian * drift.rotation_per_root_radian * turned;
-  result.since_key.covariance.diagonal() +=
-      Eigen::Vector3d(translation, translation, heading);
+  result.since_key.covariance += DriftCovariance(result.since_key.mean);
   return outcome;
 }
 
@@ -474,12 +479,15 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
 }
 
 bool OdometryRefiner::FindTie(
-    const ScanMatcher& reference,
+    const std::vector<KeyScan>& keys, const ScanMatcher& reference,
     const std::function<std::vector<Visit>(const Pose2&)>& visits,
     const Pose2& center, double translation_window, std::size_t begin,
-    std::size_t end, Hypothesis* found) {
+    std::size_t end, double seen_through, bool is_global, Hypothesis* found) {
   const TrackingOptions& tracking = options_.tracking;
-  const std::vector<KeyScan>& keys = open_->keys;
+  const double min_support =
+      is_global ? tracking.min_global_support : tracking.min_tie_support;
+  const double min_inliers =
+      is_global ? tracking.min_global_inliers : tracking.min_tie_inliers;
   const KeyScan& middle = keys[(begin + end) / 2];
   // What the track has seen, in the frame of its middle.
   std::vector<Eigen::Vector2d> sparse;
@@ -505,16 +513,9 @@ bool OdometryRefiner::FindTie(
       }
     }
   }
-  if (trace_) {
-    char text[256];
-    std::snprintf(text, sizeof text, "MID %d A %d %.6f %.6f %.6f points %d",
-                  middle.scan, archive_.back().scan, archive_.back().pose[0],
-                  archive_.back().pose[1], archive_.back().pose[2],
-                  static_cast<int>(sparse.size()));
-    trace_(text);
-  }
   const std::vector<ScoredPose> peaks = reference.Peaks(
-      sparse, center, translation_window, kPi, kLeastScore, kPeakShare, kPeaks);
+      sparse, center, translation_window, kPi, kLeastScore, kPeakShare, kPeaks,
+      is_global ? kNearArchive : std::numeric_limits<double>::infinity());
   std::vector<Hypothesis> hypotheses;
   for (const ScoredPose& peak : peaks) {
     MatchPrior none;
@@ -548,10 +549,9 @@ bool OdometryRefiner::FindTie(
       hypothesis.quality = Quality(sum) * std::min(1.0, inliers);
       hypothesis.holds =
           peak.score >= tracking.min_tie_score &&
-          sum.hits >= tracking.min_tie_support * (sum.hits + sum.intruders) &&
-          inliers >= tracking.min_tie_inliers &&
-          SeenThrough(sum) <=
-              tracking.max_tie_seen_through + open_->seen_through &&
+          sum.hits >= min_support * (sum.hits + sum.intruders) &&
+          inliers >= min_inliers &&
+          SeenThrough(sum) <= tracking.max_tie_seen_through + seen_through &&
           KnownShare(sum) >= tracking.min_tie_known &&
           sum.hits >= tracking.min_tie_hits * static_cast<int>(end - begin);
       if (trace_) {
@@ -613,82 +613,43 @@ void OdometryRefiner::Tie(bool last) {
                  0.5 + 0.5 * open_->way + tracking.gap_speed * open_->seconds);
     const ScanMatcher& reference = open_->before.matcher;
     if (FindTie(
-            reference,
+            open_->keys, reference,
             [&reference](const Pose2&) {
               return std::vector<Visit>{{&reference, 0, 0}};
             },
-            open_->keys[middle].pose, window, 0, end, &found)) {
+            open_->keys[middle].pose, window, 0, end, open_->seen_through,
+            false, &found)) {
       first.tie = TrackTie::kMatched;
     }
   }
   if (first.tie == TrackTie::kNone && count >= tracking.first_global_keys &&
       (last || count >= open_->next_global)) {
     open_->next_global = 2 * count;
-    Eigen::Vector2d low = archive_.front().pose.head<2>();
-    Eigen::Vector2d high = low;
-    for (const ArchivedKey& key : archive_) {
-      low = low.cwiseMin(key.pose.head<2>());
-      high = high.cwiseMax(key.pose.head<2>());
-    }
-    ScanMatcher matcher(options_.matcher);
-    SetArchive(0, archive_.size(), &matcher);
-    std::deque<ScanMatcher> around;
-    const auto visits = [&](const Pose2& pose) {
-      std::vector<Visit> result;
-      around.clear();
-      std::size_t k = 0;
-      while (k < archive_.size()) {
-        const auto is_near = [&](std::size_t i) {
-          return (archive_[i].pose - pose).head<2>().norm() <= kNearArchive;
-        };
-        if (!is_near(k)) {
-          ++k;
-          continue;
-        }
-        const std::size_t begin = k;
-        while (k < archive_.size() && is_near(k) && k - begin < kLongestVisit) {
-          ++k;
-        }
-        if (k - begin < kShortestVisit) continue;
-        around.emplace_back(options_.matcher);
-        SetArchive(begin, k, &around.back());
-        result.push_back({&around.back(), begin, k});
-      }
-      return result;
-    };
+    std::vector<std::size_t> where(archive_.size());
+    std::iota(where.begin(), where.end(), std::size_t{0});
     const std::size_t end = open_->keys.size();
     const std::size_t begin = end > kGlobalKeys ? end - kGlobalKeys : 0;
     middle = (begin + end) / 2;
-    const Eigen::Vector2d center = 0.5 * (low + high);
-    const double window = 0.5 * (high - low).maxCoeff() + 1.0;
-    if (FindTie(matcher, visits, Pose2(center.x(), center.y(), 0.0), window,
-                begin, end, &found)) {
+    if (FindInArchive(open_->keys, where, begin, end, open_->seen_through,
+                      &found)) {
       first.tie = TrackTie::kMatched;
-      double smallest = 0.0;
-      for (std::size_t k = found.begin; k < found.end; ++k) {
-        const double distance =
-            (archive_[k].pose - found.pose).head<2>().norm();
-        if (first.since < 0 || distance < smallest) {
-          first.since = archive_[k].scan;
-          first.since_key.mean = archive_[k].pose;
-          smallest = distance;
-        }
-      }
+      const ArchivedKey& nearest = archive_[NearestOf(found, where)];
+      first.since = nearest.scan;
+      first.since_key.mean = nearest.pose;
+      part_ = nearest.part;
     }
   }
   if (first.tie == TrackTie::kMatched) {
     const Pose2 from =
         first.since < 0 ? open_->before.keys.back().pose : first.since_key.mean;
-    const Pose2 back = Between(open_->keys[middle].pose, start.pose);
-    first.pose = Compose(found.pose, back);
-    first.since_key.mean = Between(from, first.pose);
-    // What the returns leave open, and the drift up to the middle.
-    const double way = back.head<2>().norm();
-    const MatchDrift& drift = options_.drift;
-    first.since_key.covariance =
-        (found.information + Diagonal(kOpenSigma, kPi).inverse()).inverse() +
-        Diagonal(kTieSigma + drift.translation_per_root_metre * std::sqrt(way),
-                 kTieAngle + drift.rotation_per_root_metre * std::sqrt(way));
+    std::vector<Pose2> back;
+    for (std::size_t k = middle + 1; k-- > 0;) {
+      back.push_back(open_->keys[k].pose);
+    }
+    const UncertainPose2 tie{Between(from, found.pose),
+                             TieCovariance(found, from)};
+    first.since_key = Compose(tie, Along(back));
+    first.pose = Compose(from, first.since_key.mean);
   }
   if (first.tie == TrackTie::kNone) {
     if (!last) return;
@@ -701,6 +662,7 @@ void OdometryRefiner::Tie(bool last) {
     } else {
       first.tie = TrackTie::kLoose;
       first.since_key.covariance = Diagonal(kLooseSigma, kLooseAngle);
+      part_ = num_parts_++;
     }
   }
   if (trace_) {
@@ -734,7 +696,10 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
     part.found = first.tie != TrackTie::kLoose;
     part.why = open_->why + (part.found ? "; found again on what it saw earlier"
                                         : "; where it went on is a guess");
-    if (!part.found) guessed_ = static_cast<int>(loose_.size());
+    if (!part.found) {
+      guessed_ = static_cast<int>(loose_.size());
+      loose_of_.push_back(guessed_);
+    }
     loose_.push_back(std::move(part));
   }
   for (KeyScan& key : open_->keys) {
@@ -756,28 +721,112 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
   open_.reset();
 }
 
-void OdometryRefiner::SetArchive(std::size_t begin, std::size_t end,
+Eigen::Matrix3d OdometryRefiner::TieCovariance(const Hypothesis& found,
+                                               const Pose2& from) const {
+  const double c = std::cos(from[2]);
+  const double s = std::sin(from[2]);
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  rotation.topLeftCorner<2, 2>() << c, s, -s, c;
+  const Eigen::Matrix3d information =
+      rotation * found.information * rotation.transpose() +
+      Diagonal(kOpenSigma, kPi).inverse();
+  return information.inverse() + Diagonal(kTieSigma, kTieAngle);
+}
+
+UncertainPose2 OdometryRefiner::Along(const std::vector<Pose2>& poses) const {
+  UncertainPose2 sum;
+  sum.covariance.setZero();
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    const Pose2 step = Between(poses[k - 1], poses[k]);
+    sum = Compose(sum, {step, DriftCovariance(step)});
+  }
+  return sum;
+}
+
+Eigen::Matrix3d OdometryRefiner::DriftCovariance(const Pose2& motion) const {
+  const MatchDrift& drift = options_.drift;
+  const double way = motion.head<2>().norm();
+  const double turned = std::abs(motion[2]);
+  const double translation =
+      drift.translation_per_root_metre * drift.translation_per_root_metre * way;
+  const double heading =
+      drift.rotation_per_root_metre * drift.rotation_per_root_metre * way +
+      drift.rotation_per_root_radian * drift.rotation_per_root_radian * turned;
+  return Eigen::Vector3d(translation, translation, heading).asDiagonal();
+}
+
+void OdometryRefiner::SetArchive(const std::vector<std::size_t>& where,
+                                 std::size_t begin, std::size_t end,
                                  ScanMatcher* matcher) const {
   std::vector<ScanPoint> reference;
   std::vector<Viewpoint> viewpoints;
-  for (std::size_t k = begin; k < end; ++k) {
-    const ArchivedKey& key = archive_[k];
+  for (std::size_t i = begin; i < end; ++i) {
+    const ArchivedKey& key = archive_[where[i]];
     const PoseTransform transform(key.pose);
     viewpoints.push_back({transform.Point(key.laser), reference.size()});
     for (const Eigen::Vector4f& values : key.points) {
-      ScanPoint point{};
-      point.position = values.head<2>().cast<double>();
-      point.normal = values.tail<2>().cast<double>();
-      reference.push_back(Moved(point, transform));
+      reference.push_back(Moved(PointOf(values), transform));
     }
   }
   matcher->SetReference(std::move(reference), std::move(viewpoints));
 }
 
+bool OdometryRefiner::FindInArchive(const std::vector<KeyScan>& keys,
+                                    const std::vector<std::size_t>& where,
+                                    std::size_t begin, std::size_t end,
+                                    double seen_through, Hypothesis* found) {
+  Eigen::Vector2d low = archive_[where.front()].pose.head<2>();
+  Eigen::Vector2d high = low;
+  for (const std::size_t k : where) {
+    low = low.cwiseMin(archive_[k].pose.head<2>());
+    high = high.cwiseMax(archive_[k].pose.head<2>());
+  }
+  ScanMatcher matcher(options_.matcher);
+  SetArchive(where, 0, where.size(), &matcher);
+  std::deque<ScanMatcher> around;
+  const auto visits = [&](const Pose2& pose) {
+    std::vector<Visit> result;
+    around.clear();
+    std::size_t k = 0;
+    while (k < where.size()) {
+      const auto is_near = [&](std::size_t i) {
+        return (archive_[where[i]].pose - pose).head<2>().norm() <=
+               kNearArchive;
+      };
+      if (!is_near(k)) {
+        ++k;
+        continue;
+      }
+      const std::size_t first = k;
+      while (k < where.size() && is_near(k) && k - first < kLongestVisit) ++k;
+      if (k - first < kShortestVisit) continue;
+      around.emplace_back(options_.matcher);
+      SetArchive(where, first, k, &around.back());
+      result.push_back({&around.back(), first, k});
+    }
+    return result;
+  };
+  const Eigen::Vector2d center = 0.5 * (low + high);
+  const double window = 0.5 * (high - low).maxCoeff() + 1.0;
+  return FindTie(keys, matcher, visits, Pose2(center.x(), center.y(), 0.0),
+                 window, begin, end, seen_through, true, found);
+}
+
+std::size_t OdometryRefiner::NearestOf(
+    const Hypothesis& found, const std::vector<std::size_t>& where) const {
+  return *std::min_element(
+      where.begin() + static_cast<std::ptrdiff_t>(found.begin),
+      where.begin() + static_cast<std::ptrdiff_t>(found.end),
+      [&](std::size_t a, std::size_t b) {
+        return (archive_[a].pose - found.pose).head<2>().norm() <
+               (archive_[b].pose - found.pose).head<2>().norm();
+      });
+}
+
 void OdometryRefiner::Archive(const KeyScan& key) {
   ArchivedKey kept;
   kept.scan = key.scan;
-  kept.piece = static_cast<int>(loose_.size());
+  kept.part = part_;
   kept.pose = key.pose;
   kept.laser = key.laser;
   Eigen::Vector2d last = Eigen::Vector2d::Constant(1e9);
@@ -791,6 +840,141 @@ void OdometryRefiner::Archive(const KeyScan& key) {
   archive_.push_back(std::move(kept));
 }
 
+std::vector<std::vector<std::size_t>> OdometryRefiner::Parts() const {
+  std::vector<std::vector<std::size_t>> parts(
+      static_cast<std::size_t>(num_parts_));
+  for (std::size_t k = 0; k < archive_.size(); ++k) {
+    parts[static_cast<std::size_t>(archive_[k].part)].push_back(k);
+  }
+  return parts;
+}
+
+void OdometryRefiner::JoinParts() {
+  // The largest part takes in others, largest first, until none is found.
+  bool is_joined = num_parts_ > 1;
+  while (is_joined) {
+    is_joined = false;
+    std::vector<std::vector<std::size_t>> parts = Parts();
+    std::stable_sort(
+        parts.begin(), parts.end(),
+        [](const auto& a, const auto& b) { return a.size() > b.size(); });
+    for (std::size_t p = 1; p < parts.size() && !is_joined; ++p) {
+      is_joined = JoinPart(parts[0], parts[p]);
+    }
+  }
+  std::sort(late_ties_.begin(), late_ties_.end(),
+            [](const LateTie& a, const LateTie& b) { return a.scan < b.scan; });
+}
+
+bool OdometryRefiner::JoinPart(const std::vector<std::size_t>& rest,
+                               const std::vector<std::size_t>& part) {
+  const auto least =
+      static_cast<std::size_t>(options_.tracking.first_global_keys);
+  if (part.size() < least || rest.size() < kShortestVisit) return false;
+  std::vector<KeyScan> keys;
+  for (const std::size_t k : part) {
+    const ArchivedKey& kept = archive_[k];
+    keys.push_back({kept.scan, kept.pose, {}, kept.laser});
+    for (const Eigen::Vector4f& values : kept.points) {
+      keys.back().points.push_back(PointOf(values));
+    }
+  }
+  const std::size_t size = std::min(kGlobalKeys, part.size());
+  const std::size_t room = part.size() - size;
+  const std::size_t windows =
+      std::min(static_cast<std::size_t>(options_.tracking.max_late_windows),
+               1 + 2 * room / size);
+  // What a window says stands when another one says the same, or there is none.
+  struct Vote {
+    std::size_t middle;
+    Hypothesis found;
+  };
+  std::vector<Vote> votes;
+  for (std::size_t w = 0; w < windows; ++w) {
+    const std::size_t begin = windows > 1 ? w * room / (windows - 1) : 0;
+    // A jump within a window is none of the track's: parts are whole.
+    Vote vote{begin + size / 2, {}};
+    if (!FindInArchive(keys, rest, begin, begin + size, 0.0, &vote.found)) {
+      continue;
+    }
+    if (trace_) trace_("LATE window found");
+    bool is_confirmed = windows == 1;
+    for (const Vote& other : votes) {
+      const Pose2 expected =
+          Compose(other.found.pose,
+                  Between(keys[other.middle].pose, keys[vote.middle].pose));
+      const Pose2 apart = Between(expected, vote.found.pose);
+      is_confirmed = is_confirmed || (apart.head<2>().norm() < kVisitDistance &&
+                                      std::abs(apart[2]) < kVisitRotation);
+    }
+    votes.push_back(vote);
+    if (is_confirmed && AddLateTie(rest, part, NearestOf(vote.found, rest),
+                                   part[vote.middle], vote.found)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool OdometryRefiner::AddLateTie(const std::vector<std::size_t>& rest,
+                                 const std::vector<std::size_t>& part,
+                                 std::size_t at_rest, std::size_t at_part,
+                                 const Hypothesis& found) {
+  // The match says where the part's key scan is among the rest. The one of the
+  // two that begins later hangs on what was seen before it began.
+  const Pose2 match = Between(archive_[at_rest].pose, found.pose);
+  const bool is_later = part.front() > rest.front();
+  const std::vector<std::size_t>& later = is_later ? part : rest;
+  const std::vector<std::size_t>& earlier = is_later ? rest : part;
+  const std::size_t at_later = is_later ? at_part : at_rest;
+  const std::size_t at_earlier = is_later ? at_rest : at_part;
+  const auto last_before = std::prev(
+      std::lower_bound(earlier.begin(), earlier.end(), later.front()));
+  const std::size_t since = std::min(*last_before, at_earlier);
+  const auto along = [&](const std::vector<std::size_t>& keys, std::size_t from,
+                         std::size_t to) {
+    std::vector<Pose2> poses;
+    for (const std::size_t k : keys) {
+      if (std::min(from, to) <= k && k <= std::max(from, to)) {
+        poses.push_back(archive_[k].pose);
+      }
+    }
+    if (to < from) std::reverse(poses.begin(), poses.end());
+    return Along(poses);
+  };
+  UncertainPose2 tie{match, TieCovariance(found, archive_[at_rest].pose)};
+  if (!is_later) tie = Inverse(tie);
+  LateTie late;
+  late.scan = archive_[later.front()].scan;
+  late.since = archive_[since].scan;
+  late.since_key = Compose(Compose(along(earlier, since, at_earlier), tie),
+                           along(later, at_later, later.front()));
+  const Eigen::Matrix3d& covariance = late.since_key.covariance;
+  if (std::max(covariance(0, 0), covariance(1, 1)) > kLateSigma * kLateSigma ||
+      covariance(2, 2) > kLateAngle * kLateAngle) {
+    return false;
+  }
+  late_ties_.push_back(late);
+  if (trace_) {
+    trace_("JOINED scan " + std::to_string(late.scan) + " since " +
+           std::to_string(late.since));
+  }
+  // Parts are numbered in the order in which they began.
+  const int number = archive_[later.front()].part;
+  LooseTrack& loose = loose_[loose_of_[static_cast<std::size_t>(number) - 1]];
+  loose.found = true;
+  loose.end = late.scan;
+  loose.why = loose.why.substr(0, loose.why.find(';')) +
+              "; found again on what was seen later";
+  const Pose2 shift = Compose(found.pose, Inverse(archive_[at_part].pose));
+  const int into = archive_[earlier.front()].part;
+  for (const std::size_t k : part) {
+    archive_[k].pose = Compose(shift, archive_[k].pose);
+  }
+  for (const std::size_t k : later) archive_[k].part = into;
+  return true;
+}
+
 bool OdometryRefiner::TakeSettled(SettledScan* settled) {
   if (settled_.empty()) return false;
   *settled = std::move(settled_.front());
@@ -802,13 +986,14 @@ void OdometryRefiner::Finish() {
   if (open_ != nullptr) Tie(true);
   if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
   guessed_ = -1;
+  JoinParts();
 }
 
 template <typename StateArchive>
 void OdometryRefiner::ExchangeState(StateArchive& archive) {
   ExchangeAll(archive, track_, points_, started_, count_, last_odometry_,
-              last_time_, usual_step_, archive_, wide_searches_, refusals_,
-              losses_, loose_, guessed_);
+              last_time_, usual_step_, archive_, part_, num_parts_, loose_of_,
+              wide_searches_, refusals_, losses_, loose_, guessed_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

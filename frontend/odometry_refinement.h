@@ -92,6 +92,10 @@ struct TrackingOptions {
   double max_tie_seen_through = 0.15;
   double min_tie_known = 0.4;
   int min_tie_hits = 15;
+  /// What a tie needs that was looked for in all that was ever seen, where many
+  /// places look alike and the right one need not be among them.
+  double min_global_support = 0.96;
+  double min_global_inliers = 0.65;
   /// A rival pose must be worse by this factor.
   double rival_share = 0.75;
   /// Speed at which the robot may have gone in a gap, m/s, and how far the
@@ -102,6 +106,9 @@ struct TrackingOptions {
   /// which the tie is given up.
   int first_global_keys = 10;
   int max_open_keys = 150;
+  /// Pieces of a part that hangs loose in the end that are looked for in what
+  /// the rest of the track saw.
+  int max_late_windows = 12;
 };
 
 /// How scans are matched with what was seen last, and how far odometry is
@@ -200,6 +207,16 @@ struct LooseTrack {
   bool found = false;
 };
 
+/// What was found when all scans were in: where a part of the track that was
+/// settled as loose hangs on what was before it.
+struct LateTie {
+  /// First scan of the part; its RefinedScan::tie was kLoose.
+  int scan = 0;
+  /// What RefinedScan::since and since_key of it are now.
+  int since = 0;
+  UncertainPose2 since_key;
+};
+
 /// Refines odometry by matching each scan with the last key scans
 /// (core/method.md, section 7, step 0).
 ///
@@ -209,7 +226,8 @@ struct LooseTrack {
 /// with what was seen last, over the full circle, and then with all that was
 /// ever seen, and holds when one pose explains them clearly better than every
 /// other. Until then the track's scans are not settled. When it cannot be told
-/// the track is settled as loose.
+/// the track is settled as loose, and looked for once more in the end, when all
+/// that was ever seen is there.
 class OdometryRefiner {
  public:
   /// Starts with nothing seen.
@@ -223,8 +241,12 @@ class OdometryRefiner {
   /// when there is none.
   bool TakeSettled(SettledScan* settled);
 
-  /// Settles what is open: no scan follows.
+  /// Settles what is open, and looks for loose parts in all that was seen: no
+  /// scan follows.
   void Finish();
+
+  /// Parts that Finish found, in the order of scans.
+  const std::vector<LateTie>& late_ties() const { return late_ties_; }
 
   /// Whether no tie is open and all that is settled was taken out.
   bool IsSettled() const { return open_ == nullptr && settled_.empty(); }
@@ -346,13 +368,40 @@ class OdometryRefiner {
   // The pose of the middle of the open track's key scans [begin, end) that
   // explains them best, if it is clear. `visits` gives what was seen around a
   // pose, each time that the robot was there.
-  bool FindTie(const ScanMatcher& reference,
+  // `is_global`: it was looked for in all that was seen.
+  bool FindTie(const std::vector<KeyScan>& keys, const ScanMatcher& reference,
                const std::function<std::vector<Visit>(const Pose2&)>& visits,
                const Pose2& center, double translation_window,
-               std::size_t begin, std::size_t end, Hypothesis* found);
-  // Sets what was seen from the archive's key scans [begin, end).
-  void SetArchive(std::size_t begin, std::size_t end,
-                  ScanMatcher* matcher) const;
+               std::size_t begin, std::size_t end, double seen_through,
+               bool is_global, Hypothesis* found);
+  // FindTie in what was seen from these key scans of the archive, ascending.
+  // The visits of `found` are positions in `where`.
+  bool FindInArchive(const std::vector<KeyScan>& keys,
+                     const std::vector<std::size_t>& where, std::size_t begin,
+                     std::size_t end, double seen_through, Hypothesis* found);
+  // Of the visit's key scans the nearest one to what was found there.
+  std::size_t NearestOf(const Hypothesis& found,
+                        const std::vector<std::size_t>& where) const;
+  // Sets what was seen from these key scans of the archive, [begin, end).
+  void SetArchive(const std::vector<std::size_t>& where, std::size_t begin,
+                  std::size_t end, ScanMatcher* matcher) const;
+  // Covariance of a match, in the axes of `from`.
+  Eigen::Matrix3d TieCovariance(const Hypothesis& found,
+                                const Pose2& from) const;
+  // The last of the poses of a track seen from the first.
+  UncertainPose2 Along(const std::vector<Pose2>& poses) const;
+  Eigen::Matrix3d DriftCovariance(const Pose2& motion) const;
+  // Looks for the parts that hang loose in each other.
+  void JoinParts();
+  // Key scans of the archive by part.
+  std::vector<std::vector<std::size_t>> Parts() const;
+  // Where the second part lies in the first.
+  bool JoinPart(const std::vector<std::size_t>& rest,
+                const std::vector<std::size_t>& part);
+  // False when the way to the match is too long to say where the part begins.
+  bool AddLateTie(const std::vector<std::size_t>& rest,
+                  const std::vector<std::size_t>& part, std::size_t at_rest,
+                  std::size_t at_part, const Hypothesis& found);
   void Settle(const Pose2& shift, const RefinedScan& first);
   void Archive(const KeyScan& key);
 
@@ -373,7 +422,8 @@ class OdometryRefiner {
   // What was seen from key scans that are settled, thinned out.
   struct ArchivedKey {
     int scan;
-    int piece;
+    // Key scans whose relative poses are known are one part.
+    int part;
     Pose2 pose;
     Eigen::Vector2d laser;
     // Position and normal, robot's frame.
@@ -381,11 +431,16 @@ class OdometryRefiner {
 
     template <typename Archive>
     friend void Exchange(Archive& archive, ArchivedKey& key) {
-      auto& [scan, piece, pose, laser, points] = key;
-      ExchangeAll(archive, scan, piece, pose, laser, points);
+      auto& [scan, part, pose, laser, points] = key;
+      ExchangeAll(archive, scan, part, pose, laser, points);
     }
   };
   std::vector<ArchivedKey> archive_;
+  int part_ = 0;
+  int num_parts_ = 1;
+  // By part but the first: its entry in loose_.
+  std::vector<int> loose_of_;
+  std::vector<LateTie> late_ties_;
   int wide_searches_ = 0;
   int refusals_ = 0;
   int losses_ = 0;

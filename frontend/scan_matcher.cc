@@ -530,16 +530,16 @@ void ScanMatcher::BuildLevels() const {
 std::vector<ScoredPose> ScanMatcher::Peaks(
     const std::vector<Eigen::Vector2d>& points, const Pose2& center,
     double translation_window, double rotation_window, double minimum_score,
-    double share, int max_peaks) const {
+    double share, int max_peaks, double reach) const {
   std::vector<ScoredPose> peaks;
   if (reference_.empty() || points.empty()) return peaks;
   if (levels_.empty()) BuildLevels();
-  double reach = 1.0;
+  double farthest = 1.0;
   for (const Eigen::Vector2d& point : points) {
-    reach = std::max(reach, point.norm());
+    farthest = std::max(farthest, point.norm());
   }
   const double step =
-      std::clamp(kRotationError / reach, kLeastRotation, kMostRotation);
+      std::clamp(kRotationError / farthest, kLeastRotation, kMostRotation);
   const int rotations = static_cast<int>(std::ceil(rotation_window / step));
   const double resolution = options_.grid_resolution;
   const int window =
@@ -604,9 +604,22 @@ std::vector<ScoredPose> ScanMatcher::Peaks(
     if (value >= least && value > 0) open.push({value, level, rotation, x, y});
   };
   const int stride = 1 << (kLevels - 1);
-  for (int k = 0; k < static_cast<int>(cells.size()); ++k) {
-    for (int y = -window; y <= window; y += stride) {
-      for (int x = -window; x <= window; x += stride) {
+  // From the middle of a node its corners are so far.
+  const double half_diagonal = 0.5 * std::sqrt(2.0) * stride * resolution;
+  const auto is_near = [&](int x, int y) {
+    if (!std::isfinite(reach)) return true;
+    const Eigen::Vector2d middle(center[0] + (x + 0.5 * stride) * resolution,
+                                 center[1] + (y + 0.5 * stride) * resolution);
+    return std::any_of(viewpoints_.begin(), viewpoints_.end(),
+                       [&](const Viewpoint& viewpoint) {
+                         return (viewpoint.position - middle).norm() <=
+                                reach + half_diagonal;
+                       });
+  };
+  for (int y = -window; y <= window; y += stride) {
+    for (int x = -window; x <= window; x += stride) {
+      if (!is_near(x, y)) continue;
+      for (int k = 0; k < static_cast<int>(cells.size()); ++k) {
         push(kLevels - 1, k, x, y);
       }
     }

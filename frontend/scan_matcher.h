@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace plumbline {
@@ -119,11 +120,13 @@ class ScanMatcher {
   /// that score at least `minimum_score` and `share` of the best, and
   /// `max_peaks` at most. The score is the mean over the points: 1 on a
   /// surface, 0 where the reference has not looked, negative where it has
-  /// looked through. Branch and bound: exact on its lattice.
-  std::vector<ScoredPose> Peaks(const std::vector<Eigen::Vector2d>& points,
-                                const Pose2& center, double translation_window,
-                                double rotation_window, double minimum_score,
-                                double share, int max_peaks) const;
+  /// looked through. Positions farther than `reach`, m, from all viewpoints
+  /// are left out. Branch and bound: exact on its lattice.
+  std::vector<ScoredPose> Peaks(
+      const std::vector<Eigen::Vector2d>& points, const Pose2& center,
+      double translation_window, double rotation_window, double minimum_score,
+      double share, int max_peaks,
+      double reach = std::numeric_limits<double>::infinity()) const;
 
   /// Least distance of two peaks, m, and rad.
   static constexpr double kPeakDistance = 0.6;

@@ -171,14 +171,46 @@ void LogSolver::TakeSettled(const std::vector<Scan>& scans,
     const auto index = static_cast<std::size_t>(settled.index);
     refined_[index] = settled.refined;
     num_settled_ = index + 1;
-    if (!settled.refined.is_key) continue;
-    builder_->AddScan(MakeKeyScan(settled.index, scans[index], settled.refined,
-                                  settled.points));
-    if (options_.em_every > 0 && scans_since_em_ >= options_.em_every) {
-      scans_since_em_ = 0;
-      const ScopedTimer timer(em_seconds);
-      RunEmNearRobot();
+    TakeKeyScan(scans, settled, em_seconds);
+  }
+}
+
+void LogSolver::TakeKeyScan(const std::vector<Scan>& scans,
+                            const SettledScan& settled, double* em_seconds) {
+  if (!settled.refined.is_key) return;
+  const auto index = static_cast<std::size_t>(settled.index);
+  builder_->AddScan(MakeKeyScan(settled.index, scans[index], settled.refined,
+                                settled.points));
+  if (options_.em_every > 0 && scans_since_em_ >= options_.em_every) {
+    scans_since_em_ = 0;
+    const ScopedTimer timer(em_seconds);
+    RunEmNearRobot();
+  }
+}
+
+void LogSolver::TakeAnew(const std::vector<Scan>& scans, double* em_seconds) {
+  for (const LateTie& late : refiner_.late_ties()) {
+    RefinedScan& refined = refined_[static_cast<std::size_t>(late.scan)];
+    refined.tie = TrackTie::kMatched;
+    refined.since = late.since;
+    refined.since_key = late.since_key;
+  }
+  DropEm();
+  builder_.reset();
+  graph_ = std::make_unique<Graph>();
+  builder_ = profile_.make_builder(options_, graph_.get(), registry_);
+  Renew(StructureDetectors());
+  scans_since_em_ = 0;
+  features_at_last_global_ = 0;
+  SettledScan settled;
+  for (std::size_t i = 0; i < refined_.size(); ++i) {
+    ++scans_since_em_;
+    settled.index = static_cast<int>(i);
+    settled.refined = refined_[i];
+    if (settled.refined.is_key) {
+      ExtractScanPoints(scans[i], options_.odometry.points, &settled.points);
     }
+    TakeKeyScan(scans, settled, em_seconds);
   }
 }
 
@@ -353,6 +385,9 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
     double em_seconds = 0.0;
     refiner_.Finish();
     TakeSettled(scans, &em_seconds);
+    if (!refiner_.late_ties().empty() && !result.interrupted) {
+      TakeAnew(scans, &em_seconds);
+    }
     frontend_seconds_ += watch.Seconds() - em_seconds;
   }
   builder_->WriteRobot();

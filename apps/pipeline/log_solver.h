@@ -241,6 +241,11 @@ class LogSolver {
   void TakeScans(const std::vector<Scan>& scans, const RunControl& control);
   // Those whose place is settled go on into the map.
   void TakeSettled(const std::vector<Scan>& scans, double* em_seconds);
+  void TakeKeyScan(const std::vector<Scan>& scans, const SettledScan& settled,
+                   double* em_seconds);
+  // Makes the map once more: parts of the track that hung loose were found
+  // when all scans were in.
+  void TakeAnew(const std::vector<Scan>& scans, double* em_seconds);
   void RunEmNearRobot();
 
   // The stages once all scans are in, in order.

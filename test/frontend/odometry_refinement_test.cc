@@ -561,6 +561,80 @@ TEST(OdometryRefinerTest, CarriedIntoTheUnknown) {
   EXPECT_GT(refined[15].since_key.covariance(0, 0), 1.0);
 }
 
+// Carried to where it has not been, from where it drives back through what it
+// saw at first: when all scans are in its way there is known.
+TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
+  // A hall of 20 m by 6 m with pillars, none like another, and a corridor of
+  // 22 m that begins where the hall ends.
+  std::vector<Wall> walls = {
+      {{-20.0, 3.0}, {-20.0, -3.0}}, {{-20.0, -3.0}, {0.0, -3.0}},
+      {{0.0, -3.0}, {0.0, -1.2}},    {{0.0, -1.2}, {22.0, -1.2}},
+      {{22.0, -1.2}, {22.0, 1.2}},   {{22.0, 1.2}, {0.0, 1.2}},
+      {{0.0, 1.2}, {0.0, 3.0}},      {{0.0, 3.0}, {-20.0, 3.0}}};
+  Noise layout(3);
+  for (double x = -18.5; x < -1.0;
+       x += 1.8 + 0.6 * std::abs(layout.Normal(1.0))) {
+    const double y = layout.Normal(1.0) > 0.0 ? 1.7 : -1.7;
+    const Pose2 place(x, y + 0.2 * layout.Normal(1.0),
+                      0.5 * layout.Normal(1.0));
+    const double width = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
+    const double depth = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
+    for (const Wall& side : testing::Moved(Room(width, depth), place)) {
+      walls.push_back(side);
+    }
+  }
+  Laser laser = FullCircle();
+  laser.beams = 240;
+  laser.angle_step = DegToRad(1.5);
+  laser.maximum_range = 5.0;
+  laser.sigma = 0.01;
+  Noise noise(4);
+  OdometryRefinementOptions options = Options();
+  options.tracking.max_open_keys = 30;
+  OdometryRefiner refiner(options);
+  constexpr int kCarried = 70;
+  std::vector<Pose2> truths;
+  std::vector<RefinedScan> refined;
+  Pose2 odometry(-17.0, 0.0, 0.0);
+  for (int i = 0; i < 290; ++i) {
+    const Pose2 truth = i < kCarried
+                            ? Pose2(-17.0 + 0.15 * i, 0.0, 0.0)
+                            : Pose2(19.0 - 0.15 * (i - kCarried), 0.1, kPi);
+    if (i > 0 && i != kCarried) {
+      odometry = Compose(odometry, Between(truths.back(), truth));
+    }
+    truths.push_back(truth);
+    Scan scan = MakeScan(walls, truth, laser, &noise);
+    scan.timestamp = 100.0 + 0.2 * i + (i < kCarried ? 0.0 : 40.0);
+    scan.odometry = odometry;
+    refiner.Process(scan);
+    refined = TakeAll(&refiner, std::move(refined));
+  }
+  refiner.Finish();
+  refined = TakeAll(&refiner, std::move(refined));
+  EXPECT_EQ(refined[kCarried].tie, TrackTie::kLoose);
+  ASSERT_EQ(refiner.late_ties().size(), 1u);
+  const LateTie& late = refiner.late_ties()[0];
+  EXPECT_EQ(late.scan, kCarried);
+  ASSERT_LT(late.since, kCarried);
+  const Pose2 expected = Between(truths[late.since], truths[kCarried]);
+  const Eigen::Vector3d error = Between(expected, late.since_key.mean);
+  EXPECT_LT(error.head<2>().norm(), 0.5);
+  EXPECT_LT(std::abs(error[2]), DegToRad(2.0));
+  // It says how well it knows.
+  const Eigen::Matrix3d turned = [&] {
+    const double c = std::cos(expected[2]), s = std::sin(expected[2]);
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    rotation.topLeftCorner<2, 2>() << c, -s, s, c;
+    return rotation;
+  }();
+  const Eigen::Vector3d off = turned * error;
+  EXPECT_LT(off.dot(late.since_key.covariance.inverse() * off), 25.0);
+  ASSERT_EQ(refiner.loose().size(), 1u);
+  EXPECT_TRUE(refiner.loose()[0].found);
+  EXPECT_EQ(refiner.loose()[0].end, kCarried);
+}
+
 // A pause in the log is no reason to be lost.
 TEST(OdometryRefinerTest, AGapWithoutMotion) {
   Laser laser;

@@ -35,7 +35,7 @@ struct JointAdjustmentOptions {
   /// Chi-square at which a scan relation counts half (Cauchy).
   double loss_scale = 2.0;
   /// Bounds of the factors by which EstimateVariances changes variances.
-  double min_variance_factor = 0.05;
+  double min_variance_factor = 0.08;
   double max_variance_factor = 4.0;
   /// Rounds of taking votes and weights anew, each followed by a solve.
   int rounds = 3;

@@ -478,7 +478,7 @@ class CarmenReader {
     const int left = tokens->Count();
     if (left == tail) return true;
     int count = 0;
-    if (!tokens->NextInt(&count) || count < 0 || left != tail + 1 + count)
+    if (!tokens->NextInt(&count) || count < 0 || count != left - tail - 1)
       return false;
     for (int i = 0; i < count; ++i) tokens->Next();
     return true;

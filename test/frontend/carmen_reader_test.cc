@@ -326,6 +326,7 @@ TEST(CarmenReaderTest, OtherGarbledMessages) {
                        "PARAM lonely\n"
                        "ROBOTLASER1 0 -1.0 2.0\n"
                        "ROBOTLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 7 1 2\n"
+                       "ROBOTLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 2147483647 1 2\n"
                        "ROBOTLASER1 0 nan 2.0 0 8.0 0.01 0 3 1 2 3 "
                        "1 1 0 1 1 0 0.1 0.2 0.3 0.4 0.5 12.25 host 3\n"
                        "FANCY 1 2 3\n"
@@ -336,7 +337,7 @@ TEST(CarmenReaderTest, OtherGarbledMessages) {
   EXPECT_EQ(log.scans.size(), 1u);
   EXPECT_EQ(Skipped(log, "ODOM"), 2);
   EXPECT_EQ(Skipped(log, "PARAM"), 2);
-  EXPECT_EQ(Skipped(log, "garbled or truncated ROBOTLASER1"), 2);
+  EXPECT_EQ(Skipped(log, "garbled or truncated ROBOTLASER1"), 3);
   EXPECT_EQ(Skipped(log, "absurd angles"), 1);
   EXPECT_EQ(Skipped(log, "not used: FANCY"), 1);
   EXPECT_EQ(Skipped(log, "no message name"), 1);

@@ -37,6 +37,13 @@ constexpr double kContradictionWeight = 2.0;
 constexpr int kLeastReturns = 40;
 // Known shares are not divided by less.
 constexpr double kLeastKnown = 0.4;
+// Stretches of wall that contradict are looked for among returns no farther
+// from the laser than this, m: what is off by the angle of a match stays well
+// below what is looked through. Returns of one stretch lie no farther apart
+// than this, m, and two scans see the same one when its middle lies so near, m.
+constexpr double kStretchRange = 8.0;
+constexpr double kStretchGap = 0.3;
+constexpr double kSameStretch = 0.7;
 // Position and direction of a window, m and rad, in the fit of the track.
 constexpr double kWindowDistance = 0.1;
 constexpr double kWindowTurn = DegToRad(1.0);
@@ -89,14 +96,13 @@ std::vector<Window> MakeWindows(const std::vector<KeyView>& track,
   return windows;
 }
 
-void SetMap(const std::vector<KeyView>& map,
-            const std::vector<std::size_t>& views, ScanMatcher* matcher) {
+void SetMap(const std::vector<KeyView>& map, ScanMatcher* matcher) {
   std::vector<ScanPoint> points;
   std::vector<Viewpoint> viewpoints;
-  for (const std::size_t k : views) {
-    const PoseTransform transform(map[k].pose);
-    viewpoints.push_back({transform.Point(map[k].laser), points.size()});
-    for (const ScanPoint& point : map[k].points) {
+  for (const KeyView& view : map) {
+    const PoseTransform transform(view.pose);
+    viewpoints.push_back({transform.Point(view.laser), points.size()});
+    for (const ScanPoint& point : view.points) {
       points.push_back(Moved(point, transform));
     }
   }
@@ -121,28 +127,37 @@ struct Judgement {
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
 };
 
+// The views around a place, those of many that are spread evenly.
+std::vector<std::size_t> ViewsNear(const std::vector<KeyView>& map,
+                                   const Pose2& place,
+                                   const TrackPlacementOptions& options) {
+  std::vector<std::size_t> near;
+  for (std::size_t k = 0; k < map.size(); ++k) {
+    if ((map[k].pose - place).head<2>().norm() <= options.radius) {
+      near.push_back(k);
+    }
+  }
+  const auto most = static_cast<std::size_t>(options.max_views);
+  if (near.size() <= most) return near;
+  std::vector<std::size_t> spread;
+  for (std::size_t i = 0; i < most; ++i) {
+    spread.push_back(near[i * near.size() / most]);
+  }
+  return spread;
+}
+
 Judgement Judge(const std::vector<KeyView>& map,
                 const std::vector<KeyView>& track, const Window& window,
                 const Pose2& guess, const TrackPlacementOptions& options) {
   Judgement judgement;
   judgement.pose = guess;
-  std::vector<std::size_t> near;
-  for (std::size_t k = 0; k < map.size(); ++k) {
-    if ((map[k].pose - guess).head<2>().norm() <= options.radius) {
-      near.push_back(k);
-    }
+  std::vector<KeyView> near;
+  for (const std::size_t k : ViewsNear(map, guess, options)) {
+    near.push_back(map[k]);
   }
   if (near.empty()) return judgement;
-  const auto most = static_cast<std::size_t>(options.max_views);
-  if (near.size() > most) {
-    std::vector<std::size_t> spread;
-    for (std::size_t i = 0; i < most; ++i) {
-      spread.push_back(near[i * near.size() / most]);
-    }
-    near = std::move(spread);
-  }
   ScanMatcher matcher(options.matcher);
-  SetMap(map, near, &matcher);
+  SetMap(near, &matcher);
   if (matcher.empty()) return judgement;
   const auto compare = [&](const Pose2& pose) {
     ScanAgreement sum;
@@ -192,6 +207,113 @@ Judgement Judge(const std::vector<KeyView>& map,
     judgement.verdict = Verdict::kContradicts;
   }
   return judgement;
+}
+
+// A straight run of returns of one scan that stand where others have looked
+// through.
+struct Stretch {
+  std::size_t view = 0;
+  // Map's frame.
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  double length = 0.0;
+};
+
+// Appends the stretches that a view sees and that the matcher's reference looks
+// through. `pose`: of the view in the reference's frame, `reference`: of that
+// in the map's.
+void AppendStretches(const ScanMatcher& matcher, const KeyView& view,
+                     std::size_t index, const Pose2& pose,
+                     const Pose2& reference, std::vector<Stretch>* stretches) {
+  std::vector<bool> intrudes;
+  matcher.Compare(view.points, pose, view.laser, &intrudes);
+  const PoseTransform transform(Compose(reference, pose));
+  // Legs and the like have no normal.
+  const auto is_part = [&](std::size_t i) {
+    return intrudes[i] && view.points[i].normal.squaredNorm() > 0.0;
+  };
+  for (std::size_t begin = 0; begin < view.points.size();) {
+    std::size_t end = begin;
+    while (
+        end < view.points.size() && is_part(end) &&
+        (end == begin ||
+         (view.points[end].position - view.points[end - 1].position).norm() <=
+             kStretchGap)) {
+      ++end;
+    }
+    if (end == begin) {
+      ++begin;
+      continue;
+    }
+    const Eigen::Vector2d& first = view.points[begin].position;
+    const Eigen::Vector2d& last = view.points[end - 1].position;
+    stretches->push_back(
+        {index, transform.Point(0.5 * (first + last)), (last - first).norm()});
+    begin = end;
+  }
+}
+
+// Without the returns that lie too far away to be compared as stretches.
+KeyView NearPart(KeyView view) {
+  view.points.erase(std::remove_if(view.points.begin(), view.points.end(),
+                                   [](const ScanPoint& point) {
+                                     return point.range > kStretchRange;
+                                   }),
+                    view.points.end());
+  return view;
+}
+
+// Length of the longest stretch of wall that two scans of one of both see and
+// that the other looks through, m.
+double LongestStretch(const std::vector<Stretch>& stretches) {
+  double longest = 0.0;
+  for (const Stretch& a : stretches) {
+    for (const Stretch& b : stretches) {
+      if (a.view == b.view || b.length < longest || a.length < b.length ||
+          (a.middle - b.middle).norm() > kSameStretch) {
+        continue;
+      }
+      longest = b.length;
+    }
+  }
+  return longest;
+}
+
+// The same for what the windows that agree with a map say of it and the map
+// says of them.
+double ContradictingStretch(const std::vector<KeyView>& map,
+                            const std::vector<KeyView>& track,
+                            const std::vector<Window>& windows,
+                            const std::vector<Judgement>& judgements,
+                            const TrackPlacementOptions& options) {
+  // Those that the track has and those that the map has.
+  std::vector<Stretch> of_track;
+  std::vector<Stretch> of_map;
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    if (judgements[w].verdict != Verdict::kAgrees) continue;
+    const Pose2& pose = judgements[w].pose;
+    std::vector<KeyView> there;
+    std::vector<std::size_t> indices = ViewsNear(map, pose, options);
+    for (const std::size_t k : indices) there.push_back(NearPart(map[k]));
+    std::vector<KeyView> here;
+    for (std::size_t k = windows[w].begin; k < windows[w].end; ++k) {
+      here.push_back(NearPart(track[k]));
+      here.back().pose = windows[w].relative[k - windows[w].begin];
+    }
+    ScanMatcher matcher(options.matcher);
+    SetMap(there, &matcher);
+    if (matcher.empty()) continue;
+    for (std::size_t k = 0; k < here.size(); ++k) {
+      AppendStretches(matcher, here[k], windows[w].begin + k,
+                      Compose(pose, here[k].pose), Pose2::Zero(), &of_track);
+    }
+    SetMap(here, &matcher);
+    if (matcher.empty()) continue;
+    for (std::size_t k = 0; k < there.size(); ++k) {
+      AppendStretches(matcher, there[k], indices[k],
+                      Between(pose, there[k].pose), pose, &of_map);
+    }
+  }
+  return std::max(LongestStretch(of_track), LongestStretch(of_map));
 }
 
 // Pose of the track's frame in the map's that suits windows which agree best:
@@ -315,15 +437,13 @@ class Search {
         windows_(
             MakeWindows(track, static_cast<std::size_t>(options.window_keys))),
         whole_(options.matcher) {
-    std::vector<std::size_t> all(map.size());
     Eigen::Vector2d low = map.front().pose.head<2>();
     Eigen::Vector2d high = low;
-    for (std::size_t k = 0; k < map.size(); ++k) {
-      all[k] = k;
-      low = low.cwiseMin(map[k].pose.head<2>());
-      high = high.cwiseMax(map[k].pose.head<2>());
+    for (const KeyView& view : map) {
+      low = low.cwiseMin(view.pose.head<2>());
+      high = high.cwiseMax(view.pose.head<2>());
     }
-    SetMap(map, all, &whole_);
+    SetMap(map, &whole_);
     center_ << 0.5 * (low + high), 0.0;
     reach_ = 0.5 * (high - low).maxCoeff() + 1.0;
   }
@@ -480,6 +600,13 @@ class Search {
     if (solver.eigenvalues()[0] <
         options_.min_information_share * solver.eigenvalues()[1]) {
       return "it could be moved along the walls that it shares with the map";
+    }
+    const double stretch =
+        ContradictingStretch(map_, track_, windows_, best.judgements, options_);
+    if (stretch > options_.max_contradicting_stretch) {
+      return "where " + parts(best.agreeing) +
+             " of it would fit, one of both has " + ShortText(stretch) +
+             " m of wall where the other has none";
     }
     return "";
   }

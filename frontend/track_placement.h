@@ -78,6 +78,12 @@ struct TrackPlacementOptions {
   /// track bends, but not as a whole.
   double max_misfit = 0.1;
   double max_misfit_per_metre = 0.003;
+  /// Longest piece of wall, m, that two scans of one of both see and that those
+  /// of the other look through, without the 0.3 m at either end that count for
+  /// nothing: doors are opened and closed between two logs and furniture is
+  /// moved, but walls of over 1.7 m are not. Corridors of two buildings may
+  /// agree wherever both were seen, but for the mouth of a wing.
+  double max_contradicting_stretch = 1.1;
   /// With a start that somebody gave: windows that have to agree, and how far
   /// from it the track may start, m and rad.
   int min_agreeing_at_start = 1;

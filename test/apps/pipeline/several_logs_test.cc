@@ -58,6 +58,18 @@ class SeveralLogsTest : public ::testing::Test {
     return log;
   }
 
+  // The same drive through the mirror image of the building.
+  static Log Mirrored(Log log) {
+    const auto mirror = [](Pose2* pose) { pose->tail<2>() *= -1.0; };
+    for (Scan& scan : log.scans) {
+      std::reverse(scan.ranges.begin(), scan.ranges.end());
+      scan.start_angle = -scan.Bearing(scan.ranges.size() - 1);
+      mirror(&scan.odometry);
+      mirror(&scan.laser_offset);
+    }
+    return log;
+  }
+
   // Largest error of the relative poses of scans that lie `stride` apart in a
   // map, with those of other logs, m.
   double LargestError(const MapOfLogs& map) const {
@@ -134,6 +146,17 @@ TEST_F(SeveralLogsTest, DifferentBuildingsAreKeptApart) {
   LogSolver alone(registry_, {});
   EXPECT_EQ(result.maps[0].result.trajectory,
             alone.Run(Piece(office, 0, 500)).trajectory);
+}
+
+// Its corridors agree with the building's, but not the mouth of a wing.
+TEST_F(SeveralLogsTest, AMirrorImageIsKeptApart) {
+  const Log office = Office();
+  Log other = Mirrored(Piece(office, 0, 500));
+  const SeveralLogsResult result = SolveSeveralLogs(
+      registry_, {Piece(office, 0, 500), std::move(other)}, {});
+  EXPECT_EQ(result.maps.size(), 2u);
+  EXPECT_FALSE(result.logs[1].placement.found);
+  EXPECT_FALSE(result.logs[1].placement.why_not.empty());
 }
 
 TEST_F(SeveralLogsTest, AWrongStartKeepsALogApart) {

@@ -148,7 +148,8 @@ std::vector<PlanRoom> RoomsOf(const Arrangement& arrangement,
   for (const auto& [id, polygons] : parts) {
     const BorderLengths& border = borders[id];
     if (border.Of(Mark::kWall) + border.Of(Mark::kDoor) <
-        options.min_closed * border.length()) {
+            options.min_closed * border.length() ||
+        border.Of(Mark::kOpen) > options.max_open * border.length()) {
       continue;
     }
     // Parts that touch in a corner only are left to the largest.

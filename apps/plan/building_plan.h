@@ -29,6 +29,9 @@ struct BuildingPlanOptions {
   double min_free = 0.4;
   /// Least share of a room's border that is wall or door.
   double min_closed = 0.4;
+  /// Most of it through which the laser looked where there is neither: what
+  /// stands opposite each other in the open encloses nothing.
+  double max_open = 0.5;
 };
 
 /// A closed space.

@@ -206,5 +206,15 @@ TEST(BuildingPlanTest, NoWallsNoRooms) {
   EXPECT_TRUE(PlanOf(open).rooms.empty());
 }
 
+// A wall in the open and a car beside it have no room between them.
+TEST(BuildingPlanTest, AWallAndACarAreNoRoom) {
+  Drawing open(30.0, 20.0);
+  open.Free(1, 1, 29, 19).Fill(3, 4, 20, 4.3, Space::kOccupied);
+  open.Fill(9, 9, 13.2, 9.1, Space::kOccupied);
+  open.Fill(9, 9, 9.1, 10.8, Space::kOccupied);
+  open.Fill(13.1, 9, 13.2, 10.8, Space::kOccupied);
+  EXPECT_TRUE(PlanOf(open).rooms.empty());
+}
+
 }  // namespace
 }  // namespace plumbline

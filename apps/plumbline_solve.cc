@@ -112,15 +112,56 @@ void TellChanges(const OutputFolder::Changes& changes, const Summary& summary) {
          changes.replaced_whole_run ? " in place of a whole one" : "");
 }
 
+// Times of a whole run and of its steps: each step ends where the next begins.
+class RunClock {
+ public:
+  // A step; one of the same name goes on.
+  void Begin(const std::string& step) {
+    const double now = watch_.Seconds();
+    Add(now - step_begin_, &steps_);
+    step_ = step;
+    step_begin_ = now;
+  }
+
+  // The total and the steps until now.
+  void Read(Summary* summary) const {
+    summary->total_seconds = watch_.Seconds();
+    summary->step_seconds = steps_;
+    Add(summary->total_seconds - step_begin_, &summary->step_seconds);
+  }
+
+ private:
+  using Steps = std::vector<std::pair<std::string, double>>;
+
+  // Takes in the step that is under way.
+  void Add(double seconds, Steps* steps) const {
+    const auto same =
+        std::find_if(steps->begin(), steps->end(),
+                     [this](const auto& step) { return step.first == step_; });
+    if (same == steps->end()) {
+      steps->emplace_back(step_, seconds);
+    } else {
+      same->second += seconds;
+    }
+  }
+
+  Stopwatch watch_;
+  Steps steps_;
+  std::string step_ = "start";
+  // s on the watch.
+  double step_begin_ = 0.0;
+};
+
 // Writes all files and puts them in place together, the summary last: it knows
 // what the others took.
-void WriteOutputs(SolveOutcome* outcome, const Stopwatch& of_run,
+void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
                   OutputFolder* folder) {
+  clock->Begin("writing");
   const Stopwatch watch;
   outcome->summary.partial = InterruptRequested();
   CountGraph(*outcome->graph, &outcome->summary);
   // What the report says; the summary, written last, has the whole.
-  outcome->summary.total_seconds = of_run.Seconds();
+  clock->Read(&outcome->summary);
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
   outcome->flags = OwnFlags();
   outcome->delta_threshold = FLAGS_delta_threshold;
@@ -143,13 +184,16 @@ void WriteOutputs(SolveOutcome* outcome, const Stopwatch& of_run,
     outcome->summary.files = std::move(written.files);
     outcome->summary.digests = written.digests;
     outcome->summary.write_seconds = watch.Seconds();
-    outcome->summary.total_seconds = of_run.Seconds();
+    clock->Read(&outcome->summary);
     outcome->summary.peak_memory_bytes = PeakMemoryBytes();
     WriteSummary(outcome->summary,
                  (folder->staging() / OutputFolder::kSummary).string());
     TellChanges(folder->Commit(written.digests), outcome->summary);
   } catch (const Error& error) {
     throw folder->InPlace(error);
+  }
+  for (const auto& [step, seconds] : outcome->summary.step_seconds) {
+    Detail("%8.3f s  %s", seconds, step.c_str());
   }
   Detail("written to %s in %.1f s", FLAGS_output_dir.c_str(), watch.Seconds());
 }
@@ -307,6 +351,9 @@ void TellOfLog(const std::string& name, const Log& log, Summary* summary) {
   summary->notes = log.notes;
 }
 
+// Names what MatchScansAlone takes the time of.
+constexpr char kMatchingStep[] = "scan matching for want of odometry";
+
 // Scan matching alone carries a log without odometry.
 void MatchScansAlone(const std::string& name,
                      const LogSolverOptions& solver_options, Log* log,
@@ -429,8 +476,12 @@ CheckpointFile::Identity IdentityOfRun(const Log& log) {
 // Bars and lines on the way through one log or several.
 class SolvingProgress {
  public:
+  // `clock` is told of the steps; it has to outlive this.
+  explicit SolvingProgress(RunClock* clock) : clock_(*clock) {}
+
   // A log begins.
   void BeginLog(const std::string& title, std::size_t num_scans) {
+    clock_.Begin("scans");
     // One bar at a time.
     finishing_.reset();
     taking_scans_.reset();
@@ -449,6 +500,7 @@ class SolvingProgress {
       return InterruptRequested();
     };
     control.step = [this](const char* step) {
+      clock_.Begin(step);
       Detail("%s, after %.1f s", step, watch_.Seconds());
     };
     return control;
@@ -465,6 +517,7 @@ class SolvingProgress {
     finishing_ = std::make_unique<Progress>("adjusting", "steps", 0);
   }
 
+  RunClock& clock_;
   Stopwatch watch_;
   std::unique_ptr<Progress> taking_scans_;
   // What comes after the last scan: its steps are not known beforehand.
@@ -474,7 +527,8 @@ class SolvingProgress {
 
 // Solves a log, from where a run that did not end had got to if there is one,
 // and leaves checkpoints on the way.
-LogSolverResult RunWithCheckpoints(const Log& log, CheckpointFile* checkpoint,
+LogSolverResult RunWithCheckpoints(const Log& log, RunClock* clock,
+                                   CheckpointFile* checkpoint,
                                    LogSolver* solver) {
   bool may_write = FLAGS_checkpoint_every > 0.0;
   std::optional<std::string> state;
@@ -483,7 +537,7 @@ LogSolverResult RunWithCheckpoints(const Log& log, CheckpointFile* checkpoint,
     Remark("%s: goes on where a run that did not end had got to",
            FLAGS_output_dir.c_str());
   }
-  SolvingProgress progress;
+  SolvingProgress progress(clock);
   progress.BeginLog("solving", log.scans.size());
   RunControl control = progress.Control();
   if (may_write) {
@@ -582,8 +636,8 @@ Summary BeginSummary() {
   return summary;
 }
 
-int SolveLog(const LogInput& input, const Registry& registry,
-             const Stopwatch& of_run, OutputFolder* folder) {
+int SolveLog(const LogInput& input, const Registry& registry, RunClock* clock,
+             OutputFolder* folder) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
   summary = BeginSummary();
@@ -591,12 +645,14 @@ int SolveLog(const LogInput& input, const Registry& registry,
   CheckHierarchy(options, registry);
   RemarkOnFlags(input.name, "log", "graphs", GraphFlags());
 
+  clock->Begin("reading");
   const Stopwatch reading;
   Log log = ReadInput(input);
   summary.parse_seconds = reading.Seconds();
   TellOfLog(input.name, log, &summary);
   Detail("read %zu scans in %.1f s", log.scans.size(), summary.parse_seconds);
   if (!log.has_odometry) {
+    clock->Begin(kMatchingStep);
     MatchScansAlone(input.name, options, &log, &summary);
   }
 
@@ -604,9 +660,11 @@ int SolveLog(const LogInput& input, const Registry& registry,
       std::filesystem::path(FLAGS_output_dir) / CheckpointFile::kName,
       [&log] { return IdentityOfRun(log); }, FLAGS_checkpoint_every);
   LogSolver solver(registry, options);
-  const LogSolverResult result = RunWithCheckpoints(log, &checkpoint, &solver);
+  const LogSolverResult result =
+      RunWithCheckpoints(log, clock, &checkpoint, &solver);
+  clock->Begin("figures");
   TakeMap(input.name, log.scans, solver, registry, options, result, &outcome);
-  WriteOutputs(&outcome, of_run, folder);
+  WriteOutputs(&outcome, clock, folder);
   if (!summary.partial) checkpoint.Remove();
   return kExitSuccess;
 }
@@ -702,15 +760,20 @@ std::vector<Summary::LogInput> DescribeLogs(
 
 // Reads all logs; each has odometry in the end.
 std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
-                          const LogSolverOptions& options, Summary* summary) {
+                          const LogSolverOptions& options, RunClock* clock,
+                          Summary* summary) {
   std::vector<Log> logs;
   for (const std::unique_ptr<OpenInput>& input : inputs) {
     const std::string& name = input->log.name;
+    clock->Begin("reading");
     Log log = ReadInput(input->log);
     Summary of_log;
     TellOfLog(name, log, &of_log);
     if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
-    if (!log.has_odometry) MatchScansAlone(name, options, &log, &of_log);
+    if (!log.has_odometry) {
+      clock->Begin(kMatchingStep);
+      MatchScansAlone(name, options, &log, &of_log);
+    }
     AddNotes(TitleOf(name), of_log, summary);
     logs.push_back(std::move(log));
   }
@@ -719,10 +782,11 @@ std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
 
 SeveralLogsResult RunSeveralLogs(const Registry& registry,
                                  std::vector<Log> logs,
-                                 const SeveralLogsOptions& options) {
+                                 const SeveralLogsOptions& options,
+                                 RunClock* clock) {
   std::vector<std::size_t> num_scans;
   for (const Log& log : logs) num_scans.push_back(log.scans.size());
-  SolvingProgress progress;
+  SolvingProgress progress(clock);
   SeveralLogsControl control;
   control.begin_log = [&](std::size_t i) {
     progress.BeginLog("log " + std::to_string(i + 1) + " of " +
@@ -735,8 +799,7 @@ SeveralLogsResult RunSeveralLogs(const Registry& registry,
 
 int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
               const std::vector<std::optional<Pose2>>& starts,
-              const Registry& registry, const Stopwatch& of_run,
-              OutputFolder* folder) {
+              const Registry& registry, RunClock* clock, OutputFolder* folder) {
   SeveralLogsOptions options;
   options.solver = LogSolverOptionsFromFlags(registry);
   options.starts = starts;
@@ -751,11 +814,11 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
   }
   Summary common = BeginSummary();
   const Stopwatch reading;
-  std::vector<Log> logs = ReadLogs(inputs, options.solver, &common);
+  std::vector<Log> logs = ReadLogs(inputs, options.solver, clock, &common);
   common.parse_seconds = reading.Seconds();
 
   const SeveralLogsResult solved =
-      RunSeveralLogs(registry, std::move(logs), options);
+      RunSeveralLogs(registry, std::move(logs), options, clock);
   if (solved.interrupted) {
     std::fprintf(stderr,
                  "interrupted: the logs are not put together, nothing is "
@@ -774,15 +837,16 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
       title += (title.empty() ? "" : ", ") + TitleOf(inputs[i]->log.name);
       outcome.logs.push_back({i + 1, solved.logs[i].begin, solved.logs[i].end});
     }
+    clock->Begin("figures");
     TakeMap(title, map.scans, *map.solver, registry, options.solver, map.result,
             &outcome);
     if (m == 0) {
-      WriteOutputs(&outcome, of_run, folder);
+      WriteOutputs(&outcome, clock, folder);
       continue;
     }
     OutputFolder apart(std::filesystem::path(FLAGS_output_dir) / FolderOfMap(m),
                        NamesOfAllOutputs(registry), InputFiles());
-    WriteOutputs(&outcome, of_run, &apart);
+    WriteOutputs(&outcome, clock, &apart);
   }
   return kExitSuccess;
 }
@@ -841,14 +905,15 @@ void SummarizeSolves(const GraphSolverResult& result,
   figures->setup_seconds = result.solves.setup_seconds;
 }
 
-int SolveGraph(InputStream* input, const Registry& registry,
-               const Stopwatch& of_run, OutputFolder* folder) {
+int SolveGraph(InputStream* input, const Registry& registry, RunClock* clock,
+               OutputFolder* folder) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
   summary = BeginSummary();
   const GraphSolverOptions options = GraphSolverOptionsFromFlags(registry);
   RemarkOnFlags(input->name(), "graph", "logs", LogFlags());
 
+  clock->Begin("reading");
   const Stopwatch reading;
   Graph graph;
   const std::optional<G2oFile> g2o = ReadGraph(input, registry, &graph);
@@ -863,6 +928,7 @@ int SolveGraph(InputStream* input, const Registry& registry,
     CheckGauge(graph, ParseMarginalsSelection(FLAGS_marginals, registry));
   }
   Summary::Solver figures;
+  clock->Begin("first guess");
   PlaceStart(*input, *g2o, &graph, &figures);
 
   ForFlag("hierarchy", [&] { MakeGraphHierarchy(options, graph, registry); });
@@ -874,6 +940,7 @@ int SolveGraph(InputStream* input, const Registry& registry,
   }
   GraphSolverResult result;
   {
+    clock->Begin("solving");
     Progress progress("solving", "steps", 0);
     std::int64_t steps = 0;
     result = solver.Run(
@@ -883,6 +950,7 @@ int SolveGraph(InputStream* input, const Registry& registry,
         },
         TellPhase);
   }
+  clock->Begin("figures");
   Summarize(result.initial_cost, result.final_cost, result.em, &summary);
   SummarizeSolves(result, &figures);
   summary.solver = figures;
@@ -903,12 +971,12 @@ int SolveGraph(InputStream* input, const Registry& registry,
     return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
   };
   outcome.title = TitleOf(input->name());
-  WriteOutputs(&outcome, of_run, folder);
+  WriteOutputs(&outcome, clock, folder);
   return kExitSuccess;
 }
 
 int Run() {
-  const Stopwatch of_run;
+  RunClock clock;
   Registry& registry = Registry::Global();
   RegisterBuiltins(&registry);
   RegisterBuiltinLogReaders(&registry);
@@ -967,12 +1035,12 @@ int Run() {
            FLAGS_output_dir.c_str(), Joined(folder.cleaned()).c_str());
   }
   if (inputs.size() > 1) {
-    return SolveLogs(inputs, starts, registry, of_run, &folder);
+    return SolveLogs(inputs, starts, registry, &clock, &folder);
   }
   const OpenInput& input = *inputs.front();
   return input.is_graph
-             ? SolveGraph(&*inputs.front()->stream, registry, of_run, &folder)
-             : SolveLog(input.log, registry, of_run, &folder);
+             ? SolveGraph(&*inputs.front()->stream, registry, &clock, &folder)
+             : SolveLog(input.log, registry, &clock, &folder);
 }
 
 }  // namespace

@@ -107,12 +107,17 @@ Json CostToJson(const Summary& summary) {
 }
 
 Json TimesToJson(const Summary& summary) {
+  Json steps = Json::object();
+  for (const auto& [name, seconds] : summary.step_seconds) {
+    steps[name] = seconds;
+  }
   return {{"total", summary.total_seconds},
           {"parse", summary.parse_seconds},
           {"frontend", summary.frontend_seconds},
           {"detect", summary.detect_seconds},
           {"solve", summary.solve_seconds},
-          {"write", summary.write_seconds}};
+          {"write", summary.write_seconds},
+          {"steps", std::move(steps)}};
 }
 
 Json SolverToJson(const Summary& summary) {

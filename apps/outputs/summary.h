@@ -11,6 +11,7 @@
 #include <optional>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -98,6 +99,9 @@ struct Summary {
   double detect_seconds = 0.0;
   double solve_seconds = 0.0;
   double write_seconds = 0.0;
+  /// Steps of the run in the order in which they first began, and what each
+  /// took: together total_seconds.
+  std::vector<std::pair<std::string, double>> step_seconds;
 
   /// PeakMemoryBytes().
   std::int64_t peak_memory_bytes = 0;
@@ -181,13 +185,13 @@ std::string CountsAsJson(const Summary& summary);
 /// counts {scans, features {type {level}}, constraints {type {measurement,
 /// structure, broken}}}, cost {initial, measurement, structure, total}, em
 /// {iterations, converged, termination}, time_s {total, parse, frontend,
-/// detect, solve, write}, peak_memory_bytes, orthogonality_deg (null when there
-/// is no wall), closures {proposed, live, broken}, version, files, sha256
-/// {file}, partial (the run was interrupted; for a log `scans` then says how
-/// many were solved, and `scans_in_log` how many there are); for a graph also
-/// solver {objective (cost.total), iterations, solves, converged, evaluation_s,
-/// linear_solver_s, setup_s, start {poses, landmarks, kept, seconds}}; for a
-/// log also frontend {skipped [{reason, count, first_lines}],
+/// detect, solve, write, steps {name}}, peak_memory_bytes, orthogonality_deg
+/// (null when there is no wall), closures {proposed, live, broken}, version,
+/// files, sha256 {file}, partial (the run was interrupted; for a log `scans`
+/// then says how many were solved, and `scans_in_log` how many there are); for
+/// a graph also solver {objective (cost.total), iterations, solves, converged,
+/// evaluation_s, linear_solver_s, setup_s, start {poses, landmarks, kept,
+/// seconds}}; for a log also frontend {skipped [{reason, count, first_lines}],
 /// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
 /// (their quotient), format, scans, odometry (names; of logs that tell), notes
 /// [text]}, tracking {pieces, loose [{begin, end, why}]}, and where there were

@@ -694,6 +694,7 @@ void LogSolver::FindStructureAgain(Context* context) {
       result.second_map_refused) {
     return;
   }
+  context->Begin("structure of the map from adjusted poses");
   const ScopedTimer timer(&result.adjustment_seconds);
   HierarchySpec hierarchy = HierarchyOfOptions();
   if (options_.global_association) AddSameWall(&hierarchy);

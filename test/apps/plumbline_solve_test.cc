@@ -283,6 +283,22 @@ class SolveTest : public ::testing::Test {
     }
   }
 
+  // The steps of a run are named, these among them, and are all of its time.
+  static void CheckSteps(const nlohmann::json& summary,
+                         const std::vector<std::string>& names) {
+    const auto& steps = summary["time_s"]["steps"];
+    for (const std::string& name : names) {
+      EXPECT_TRUE(steps.contains(name)) << name;
+    }
+    double sum = 0.0;
+    for (const auto& step : steps) {
+      EXPECT_GE(step.get<double>(), 0.0);
+      sum += step.get<double>();
+    }
+    const double total = summary["time_s"]["total"];
+    EXPECT_NEAR(sum, total, 1e-9 * total);
+  }
+
   // Every file is there, nothing else is, and all read back.
   void CheckFiles(const std::string& out,
                   const std::set<std::string>& expected) {
@@ -330,6 +346,7 @@ class SolveTest : public ::testing::Test {
       ASSERT_TRUE(summary["time_s"][key].is_number()) << key;
       EXPECT_GE(summary["time_s"][key].get<double>(), 0.0) << key;
     }
+    CheckSteps(summary, {"start", "reading", "figures", "writing"});
     EXPECT_GT(summary["peak_memory_bytes"].get<double>(), 1e6);
     std::size_t features = 0;
     for (const auto& type : summary["counts"]["features"]) {
@@ -581,6 +598,7 @@ TEST_F(SolveTest, FilesOfAnEarlierRun) {
   ASSERT_EQ(
       Solve(log, "out", "--verbose --outputs=map.json,graph.g2o", &output), 0)
       << output;
+  EXPECT_THAT(output, HasSubstr(" s  writing\n"));
   EXPECT_EQ(Files("out"), (Names{"elsewhere", "graph.g2o", "map.json",
                                  "map.svg", "notes.txt", "summary.json"}));
   EXPECT_EQ(Files("out/elsewhere"), Names{"map.png"});
@@ -772,6 +790,7 @@ TEST_F(SolveTest, SeveralLogs) {
   EXPECT_GE(summary["logs"][1]["agreeing"], 3);
   EXPECT_TRUE(summary["logs"][1]["why_apart"].is_null());
   EXPECT_EQ(summary["counts"]["scans"], 500);
+  CheckSteps(summary, {"reading", "scans", "placing of logs", "writing"});
 
   // A start where it is not: a map of its own.
   ASSERT_EQ(Solve(second + "," + first, "both",

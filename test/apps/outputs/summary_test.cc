@@ -173,6 +173,7 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   summary.em_iterations = 3;
   summary.em_termination = EmTermination::kConvergence;
   summary.total_seconds = 6.0;
+  summary.step_seconds = {{"reading", 1.5}, {"writing", 4.5}};
   summary.parse_seconds = std::nan("");
   summary.peak_memory_bytes = 123;
   summary.skipped = {{"too short", 2, {7, 9}}};
@@ -207,7 +208,8 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
                                R"("termination":"convergence"})");
   EXPECT_EQ(json["time_s"].dump(),
             R"({"total":6.0,"parse":null,"frontend":0.0,"detect":0.0,)"
-            R"("solve":0.0,"write":0.0})");
+            R"("solve":0.0,"write":0.0,)"
+            R"("steps":{"reading":1.5,"writing":4.5}})");
   EXPECT_EQ(json["peak_memory_bytes"], 123);
   EXPECT_TRUE(json["orthogonality_deg"].is_null());
   EXPECT_EQ(json["version"], kVersion);

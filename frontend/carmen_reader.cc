@@ -1,6 +1,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/foreign_format.h>
 
 #include <algorithm>
 #include <array>
@@ -234,6 +235,13 @@ class CarmenReader {
   Log Read() {
     if (LooksLikeG2o(input_->Peek(std::size_t{1} << 16))) {
       throw Error(input_->name(), 0, "is a g2o graph", "a CARMEN log");
+    }
+    const std::string foreign =
+        ForeignFormat(input_->Peek(std::size_t{1} << 16));
+    if (!foreign.empty()) {
+      throw Error(input_->name(), 0, "is " + foreign,
+                  "a robot's log (CARMEN, or a ROS 1 or ROS 2 bag) or a graph "
+                  "(g2o)");
     }
     std::string_view line;
     while (input_->ReadLine(&line)) {

@@ -3,6 +3,7 @@
 #include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/cli/command_line.h>
 #include <plumbline/apps/cli/help.h>
+#include <plumbline/apps/cli/nearest_word.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/number_text.h>
 #include <plumbline/core/utf8.h>
@@ -27,6 +28,8 @@ DECLARE_bool(helpshort);
 DECLARE_bool(helpfull);
 DECLARE_bool(version);
 
+DEFINE_bool(check_flags, false,
+            "Only checks the flags: for programs that start this one");
 DEFINE_string(help_format, "text",
               "What --help prints: text, man (a manual page) or bash (a "
               "completion script)");
@@ -80,6 +83,11 @@ std::string Describe(const Condition& condition) {
     text += choice;
   }
   return text;
+}
+
+std::string Guess(const std::string& value, const Condition& condition) {
+  const std::string nearest = NearestWord(value, condition.choices);
+  return nearest.empty() ? "" : " (" + nearest + "?)";
 }
 
 bool Holds(const Condition& condition, const std::string& value) {
@@ -159,11 +167,11 @@ std::vector<std::string> CheckFlagValues() {
     gflags::CommandLineFlagInfo flag;
     if (!gflags::GetCommandLineFlagInfo(entry.first.c_str(), &flag)) continue;
     if (Holds(entry.second, flag.current_value)) continue;
-    problems.push_back("--" + flag.name + "=" + flag.current_value + ": " +
-                       (entry.second.choices.empty()
-                            ? "out of range: expected "
-                            : "unknown value: expected one of ") +
-                       Describe(entry.second));
+    problems.push_back(
+        "--" + flag.name + "=" + flag.current_value + ": " +
+        (entry.second.choices.empty() ? "out of range: expected "
+                                      : "unknown value: expected one of ") +
+        Describe(entry.second) + Guess(flag.current_value, entry.second));
   }
   return problems;
 }
@@ -235,6 +243,7 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
     }
   }
   if (!problems.empty()) ExitWithUsageError(info, problems);
+  if (FLAGS_check_flags) std::exit(kExitSuccess);
 
   if (!google::IsGoogleLoggingInitialized()) {
     // glog keeps the pointer.

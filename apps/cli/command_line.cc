@@ -1,5 +1,6 @@
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/command_line.h>
+#include <plumbline/apps/cli/nearest_word.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/text_file.h>
 #include <plumbline/core/utf8.h>
@@ -68,12 +69,32 @@ bool IsKnown(const std::string& name) {
   return FindFlag(name, &info) || IsNegation(name);
 }
 
+// What the name of a flag that is not known may have been meant for, for
+// people: " (--input?)", or nothing.
+std::string Guess(const std::string& name) {
+  std::vector<gflags::CommandLineFlagInfo> flags;
+  gflags::GetAllFlags(&flags);
+  std::vector<std::string> names;
+  for (const gflags::CommandLineFlagInfo& flag : flags) {
+    names.push_back(flag.name);
+    if (flag.type == "bool") names.push_back("no" + flag.name);
+  }
+  std::sort(names.begin(), names.end());
+  const std::string nearest = NearestWord(name, names);
+  return nearest.empty() ? "" : " (--" + nearest + "?)";
+}
+
 // --flagfile takes files; gflags knows it as a flag like any other.
 bool NamesFlagFiles(const FlagWords& flag) { return flag.name == "flagfile"; }
 
 class CommandLineReader {
  public:
   CommandLine Read(const std::vector<std::string>& arguments) {
+    // gflags' own way to let unknown flags be.
+    const bool allows_unknown = std::any_of(
+        arguments.begin(), arguments.end(), [](const std::string& argument) {
+          return IsFlag(argument) && SplitFlag(argument).name == "undefok";
+        });
     for (std::size_t i = 0; i < arguments.size(); ++i) {
       const std::string& argument = arguments[i];
       if (argument == "--") {
@@ -86,6 +107,15 @@ class CommandLineReader {
         continue;
       }
       FlagWords flag = SplitFlag(argument);
+      if (argument == "-h") {
+        result_.arguments.push_back("--help");
+        continue;
+      }
+      if (!IsKnown(flag.name) && !allows_unknown) {
+        Problem(Shown("--" + flag.name) + ": there is no such flag" +
+                Guess(flag.name));
+        continue;
+      }
       gflags::CommandLineFlagInfo info;
       const bool takes_next = !flag.has_value && i + 1 < arguments.size() &&
                               FindFlag(flag.name, &info) && info.type != "bool";
@@ -180,7 +210,7 @@ class CommandLineReader {
     const FlagWords flag = SplitFlag(line);
     if (!IsKnown(flag.name)) {
       Problem(place + ": there is no flag " + Shown("--" + flag.name) +
-              ": expected " + kExpectedLine);
+              Guess(flag.name) + ": expected " + kExpectedLine);
       return;
     }
     if (NamesFlagFiles(flag)) {

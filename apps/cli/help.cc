@@ -114,6 +114,7 @@ std::vector<Group> Groups(const AppInfo& info,
   for (const FlagDescription& flag : flags) left[flag.name] = flag;
   // Listed with gflags' own.
   left.erase("help_format");
+  left.erase("check_flags");
   std::vector<Group> groups;
   for (const FlagGroup& group : info.groups) {
     Group found;
@@ -144,12 +145,15 @@ constexpr CommonFlag kCommonFlags[] = {
     {"--flagfile=FILE", "Reads flags from a file, one --name=value a line"},
     {"--fromenv=NAMES",
      "Takes the flags listed from environment variables FLAGS_name"},
-    {"--help, --version",
+    {"-h, --help, --version",
      "Print this, and the version. --helpfull shows the flags of the "
      "libraries, too"},
     {"--help_format=TEXT",
      "What --help prints: text, man (a manual page) or bash (a completion "
-     "script) (default text)"}};
+     "script) (default text)"},
+    {"--[no]check_flags",
+     "Only checks the flags, and ends with status 0 or 1: for programs that "
+     "start this one"}};
 
 struct StatusLine {
   const char* status;

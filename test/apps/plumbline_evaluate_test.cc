@@ -212,6 +212,15 @@ TEST_F(EvaluateTest, Usage) {
   EXPECT_THAT(output, HasSubstr("--plan needs --truth"));
   EXPECT_EQ(Run(" --no_such_flag=1", &output), 1);
   EXPECT_THAT(output, HasSubstr("no_such_flag"));
+  EXPECT_EQ(Run(" --trajektory=a", &output), 1);
+  EXPECT_THAT(output, HasSubstr("'--trajektory': there is no such flag "
+                                "(--trajectory?)"));
+  EXPECT_EQ(Run(" --alignment=se33", &output), 1);
+  EXPECT_THAT(output, HasSubstr("(se3?)"));
+  EXPECT_EQ(Run(" --relations=r --check_flags", &output), 0);
+  EXPECT_EQ(output, "");
+  EXPECT_EQ(Run(" -h", &output), 0);
+  EXPECT_THAT(output, HasSubstr("Example:"));
   EXPECT_EQ(Run(" --help", &output), 0);
   EXPECT_THAT(output, HasSubstr("Example:"));
   EXPECT_THAT(output, HasSubstr("--relation_errors"));

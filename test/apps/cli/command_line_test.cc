@@ -82,8 +82,9 @@ TEST_F(CommandLineTest, BehindTwoDashesNothingIsRead) {
 
 TEST_F(CommandLineTest, LinesThatAreNotUnderstood) {
   EXPECT_THAT(Problems("--test_switch\n--tets_number=1\n"),
-              ElementsAre(AllOf(HasSubstr(
-                  "my.flags:2: there is no flag '--tets_number': expected"))));
+              ElementsAre(AllOf(
+                  HasSubstr("my.flags:2: there is no flag '--tets_number' "
+                            "(--test_number?): expected"))));
   EXPECT_THAT(Problems("test_number=1\n"),
               ElementsAre(HasSubstr("my.flags:1: 'test_number=1' is no flag")));
   EXPECT_THAT(

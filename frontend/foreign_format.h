@@ -1,0 +1,17 @@
+#ifndef PLUMBLINE_FRONTEND_FOREIGN_FORMAT_H_
+#define PLUMBLINE_FRONTEND_FOREIGN_FORMAT_H_
+
+#include <string>
+#include <string_view>
+
+namespace plumbline {
+
+/// What a file that is no log is, by its first bytes: "a PCD point cloud", "a
+/// PDF document", "a trajectory (TUM)". Empty when it is nothing that is known
+/// for certain, so that it may still be a log. 512 bytes and the first line
+/// that is no comment are enough.
+std::string ForeignFormat(std::string_view prefix);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_FOREIGN_FORMAT_H_

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/nearest_word.h>
 #include <plumbline/apps/cli/progress.h>
 #include <plumbline/apps/sweep/sweep.h>
 #include <plumbline/apps/sweep/sweep_grid.h>
@@ -14,6 +15,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/core/utf8.h>
+#include <plumbline/outputs/summary.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -26,6 +28,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -213,6 +216,76 @@ class FolderLock {
   int descriptor_;
 };
 
+// The figure to choose the best setting by; empty without one.
+const std::string& Objective() {
+  return FLAGS_minimize.empty() ? FLAGS_maximize : FLAGS_minimize;
+}
+
+// Throws unless a run that is done has the figure to choose by; true when there
+// was one to ask.
+bool CheckObjective(const std::vector<SweepRun>& runs,
+                    const std::string& folder) {
+  for (const SweepRun& run : runs) {
+    const std::optional<RunRecord> record = ReadRecord(RunFolder(folder, run));
+    if (!record || record->status != RunStatus::kDone) continue;
+    std::vector<std::string> names;
+    for (const Figure& figure : record->figures) {
+      if (figure.first == Objective()) return true;
+      names.push_back(figure.first);
+    }
+    const std::string nearest = NearestWord(Objective(), names);
+    std::string known;
+    for (const std::string& name : names) {
+      known += (known.empty() ? "" : ", ") + name;
+    }
+    throw Error(FLAGS_minimize.empty() ? "--maximize" : "--minimize", 0,
+                "no run has a figure '" + Objective() + "'" +
+                    (nearest.empty() ? "" : " (" + nearest + "?)"),
+                "one of " + known);
+  }
+  return false;
+}
+
+// What the columns of runs of plumbline_solve begin with.
+std::vector<std::string> PartsOfSummaries() {
+  Summary summary;
+  summary.scans = 1;
+  summary.partial = true;
+  summary.solver.emplace();
+  std::ostringstream text;
+  WriteSummary(summary, text);
+  std::vector<std::string> parts = {"evaluation"};
+  const nlohmann::json json = nlohmann::json::parse(text.str());
+  for (const auto& [part, value] : json.items()) parts.push_back(part);
+  return parts;
+}
+
+// What can be known of the figure before there is a run.
+void CheckObjectiveBeforehand(const SweepDefinition& definition) {
+  const std::string& name = Objective();
+  if (name.empty()) return;
+  const char* const flag = FLAGS_minimize.empty() ? "--maximize" : "--minimize";
+  if (name.compare(0, 11, "evaluation.") == 0 && definition.evaluate.empty()) {
+    throw Error(flag, 0,
+                "'" + name + "' comes of an evaluation, and there is none",
+                "--evaluate, or another figure");
+  }
+  if (fs::path(definition.command[0]).filename() != "plumbline_solve") return;
+  const std::vector<std::string> parts = PartsOfSummaries();
+  const std::string part = name.substr(0, name.find('.'));
+  if (std::count(parts.begin(), parts.end(), part) > 0) return;
+  std::string known;
+  for (const std::string& one : parts) {
+    known += (known.empty() ? "" : ", ") + one;
+  }
+  const std::string nearest = NearestWord(part, parts);
+  throw Error(
+      flag, 0,
+      "no run will have a figure '" + name + "'" +
+          (nearest.empty() ? "" : " (" + nearest + "?)"),
+      "a number of summary.json, by its path: it begins with one of " + known);
+}
+
 // Does what is not done yet.
 void DoRuns(const SweepDefinition& definition, const std::string& folder) {
   std::vector<SweepRun> pending;
@@ -230,14 +303,26 @@ void DoRuns(const SweepDefinition& definition, const std::string& folder) {
          runs.size() - pending.size());
   if (pending.empty()) return;
 
+  // A figure that no run has is found out at the first run, not at the last.
+  bool is_checked = Objective().empty() || CheckObjective(runs, folder);
+  std::optional<Error> missing;
   Progress progress("sweep", "runs", static_cast<std::int64_t>(pending.size()));
   LaunchOptions options;
   options.jobs = FLAGS_jobs;
   options.program = OwnPath();
   options.hosts = FLAGS_hosts;
   options.options = SplitWords(FLAGS_launcher_options);
-  options.progress = [&](int done) { progress.Update(done); };
-  options.stop = [] { return InterruptRequested(); };
+  options.progress = [&](int done) {
+    progress.Update(done);
+    if (is_checked || done == 0) return;
+    try {
+      is_checked = CheckObjective(pending, folder);
+    } catch (const Error& error) {
+      is_checked = true;
+      missing = error;
+    }
+  };
+  options.stop = [&] { return InterruptRequested() || missing; };
   if (FLAGS_launcher == "local") {
     LaunchLocally(definition, pending, folder, options);
   } else if (FLAGS_launcher == "parallel") {
@@ -245,6 +330,7 @@ void DoRuns(const SweepDefinition& definition, const std::string& folder) {
   } else {
     LaunchWithSlurm(pending, folder, options);
   }
+  if (missing) throw *missing;
   if (InterruptRequested()) return;
   for (const SweepRun& run : pending) {
     if (!ReadRecord(RunFolder(folder, run))) RecordLoss(RunFolder(folder, run));
@@ -265,6 +351,25 @@ void TellRuns(const SweepResult& result) {
               counts[0], counts[1], counts[2]);
   if (missing > 0) std::printf(", %d not done yet", missing);
   std::printf("\n");
+}
+
+// Says on stderr why runs are not done; true when there are any.
+bool TellFailures(const SweepResult& result) {
+  constexpr int kMost = 10;
+  int failures = 0;
+  for (std::size_t i = 0; i < result.runs.size(); ++i) {
+    const std::optional<RunRecord>& record = result.records[i];
+    if (!record || record->status == RunStatus::kDone) continue;
+    if (++failures > kMost) continue;
+    std::fprintf(
+        stderr, "%s: %s: %s\n", result.runs[i].name.c_str(),
+        record->status == RunStatus::kTimedOut ? "timed out" : "failed",
+        record->reason.c_str());
+  }
+  if (failures > kMost) {
+    std::fprintf(stderr, "and %d more, in sweep.csv\n", failures - kMost);
+  }
+  return failures > 0;
 }
 
 std::string EstimateText(const Estimate& estimate, std::size_t trials) {
@@ -402,6 +507,8 @@ int Run(const std::vector<std::string>& command) {
     throw Error("--output_dir", 0, "cannot make '" + folder + "'",
                 "a folder that can be written to");
   }
+  CheckObjectiveBeforehand(definition);
+  CheckFlagsOfRuns(definition);
   const FolderLock lock(folder);
   WriteDefinition(definition, folder);
   DoRuns(definition, folder);
@@ -417,7 +524,8 @@ int Run(const std::vector<std::string>& command) {
   if (!FLAGS_minimize.empty() || !FLAGS_maximize.empty()) {
     TellBest(result, folder);
   }
-  return kExitSuccess;
+  return TellFailures(result) && !InterruptRequested() ? kExitInput
+                                                       : kExitSuccess;
 }
 
 }  // namespace

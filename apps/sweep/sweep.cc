@@ -5,7 +5,9 @@
 #include <plumbline/core/number_text.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/core/text_file.h>
+#include <plumbline/core/utf8.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
@@ -170,6 +172,28 @@ void WriteRecord(const RunRecord& record, const std::string& run_folder) {
              {"seconds", record.seconds},
              {"figures", std::move(figures)}},
             run_folder + "/run.json");
+}
+
+// The last line that says something, for people; empty when there is none.
+std::string LastLine(const std::string& path) {
+  constexpr std::streamoff kTail = 4096;
+  constexpr std::size_t kLongest = 300;
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const std::streamoff size = file.tellg();
+  file.seekg(std::max<std::streamoff>(0, size - kTail));
+  std::string last;
+  for (std::string line; std::getline(file, line);) {
+    // A progress bar writes over its own line.
+    const std::size_t end = line.find_last_not_of(" \t\r");
+    if (end == std::string::npos) continue;
+    line.resize(end + 1);
+    const std::size_t begin = line.find_last_of('\r') + 1;
+    if (begin < line.size()) last = line.substr(begin);
+  }
+  // What the sweep itself wrote: the command printed nothing.
+  if (last.compare(0, 2, "$ ") == 0) return "";
+  last = PrintableUtf8(last);
+  return last.size() > kLongest ? last.substr(0, kLongest) + "..." : last;
 }
 
 // Reads the run's figures; what is wrong with them otherwise.
@@ -405,6 +429,47 @@ std::string RunFolder(const std::string& folder, const SweepRun& run) {
   return folder + "/runs/" + run.name;
 }
 
+void CheckFlagsOfRuns(const SweepDefinition& definition) {
+  const auto check = [&](std::vector<std::string> command,
+                         const std::string& place) {
+    if (fs::path(command[0]).filename().string().compare(0, 10, "plumbline_") !=
+        0) {
+      return;
+    }
+    command.push_back("--check_flags");
+    // A file of its own: several sweeps may do it at a time.
+    const std::string log =
+        (fs::temp_directory_path() /
+         ("plumbline_sweep_" + std::to_string(getpid()) + ".txt"))
+            .string();
+    ChildOptions child;
+    child.command = command;
+    child.working_directory = definition.working_directory;
+    child.environment = definition.environment;
+    child.log = log;
+    const ChildResult result = RunChild(child);
+    std::string said;
+    ReadText(log, &said);
+    std::error_code ignored;
+    fs::remove(log, ignored);
+    if (result.succeeded) return;
+    const std::string first = said.substr(0, said.find('\n'));
+    throw Error(place, 0,
+                "the command would refuse it: " +
+                    (first.empty() ? result.failure : PrintableUtf8(first)),
+                "");
+  };
+  SweepDefinition one_by_one = definition;
+  one_by_one.one_at_a_time = true;
+  one_by_one.trials = 1;
+  for (const SweepRun& run : MakeRuns(one_by_one)) {
+    check(RunCommand(definition, run, "."),
+          run.values.empty() ? definition.command[0]
+                             : SettingText(definition, run.values));
+  }
+  if (!definition.evaluate.empty()) check(definition.evaluate, "--evaluate");
+}
+
 std::optional<RunRecord> ReadRecord(const std::string& run_folder) {
   std::string text;
   if (!ReadText(run_folder + "/run.json", &text)) return std::nullopt;
@@ -488,6 +553,8 @@ std::optional<RunRecord> ExecuteRun(const SweepDefinition& definition,
       record.reason += " s";
     } else if (!result.succeeded) {
       record.reason = prefix + result.failure;
+      const std::string last = LastLine(child.log);
+      if (!last.empty()) record.reason += ": " + last;
     }
     return true;
   };

@@ -102,7 +102,8 @@ using Figure = std::pair<std::string, double>;
 /// run without it was not done.
 struct RunRecord {
   RunStatus status = RunStatus::kFailed;
-  /// Why it is not done: "exit status 3", "signal 11 (Segmentation fault)".
+  /// Why it is not done: "exit status 3", "signal 11 (Segmentation fault)", and
+  /// the last line that it printed.
   std::string reason;
   /// Time that it took, s.
   double seconds = 0.0;
@@ -119,6 +120,12 @@ std::optional<RunRecord> ReadRecord(const std::string& run_folder);
 
 /// Writes the record of a run whose process is gone without one: failed.
 void RecordLoss(const std::string& run_folder);
+
+/// Throws Error, naming the flag or value, when a setting has a flag that the
+/// command, or the evaluation, refuses: each value of each axis is tried once,
+/// with the first ones of the others. Programs whose name begins with
+/// "plumbline_" are asked (--check_flags); of others nothing is known.
+void CheckFlagsOfRuns(const SweepDefinition& definition);
 
 /// Every number of a JSON document, in its order, by its path: {"a": {"b": [1,
 /// true]}} gives a.b.0 = 1 and a.b.1 = 1 (false is 0). With `count_lists` a

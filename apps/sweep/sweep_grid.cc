@@ -112,6 +112,11 @@ void AddValues(const std::string& text, std::vector<std::string>* values) {
     AddRange(text, begin, step, end, values);
     return;
   }
+  if (parts.size() == 2 && ParseFinite(parts[0], &begin) &&
+      ParseFinite(parts[1], &end)) {
+    Refuse("the range '" + text + "' has no step",
+           "a:step:b, or \"" + text + "\" in quotes for the word");
+  }
   values->push_back(text);
 }
 

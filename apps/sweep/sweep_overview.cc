@@ -173,7 +173,8 @@ HeatMap MakeHeatMap(const Overview& overview, std::size_t row_axis,
   return map;
 }
 
-std::string Plots(const Overview& overview) {
+// The plots, all in one picture or, for a page, each in its own.
+std::string Plots(const Overview& overview, bool one_picture) {
   if (overview.is_table()) {
     std::vector<HeatMap> maps;
     for (const std::string& figure : overview.options.figures) {
@@ -188,7 +189,10 @@ std::string Plots(const Overview& overview) {
       plots.push_back(MakeLinePlot(overview, axis, figure));
     }
   }
-  return PlotSvg(plots, kPlotColumns);
+  if (one_picture) return PlotSvg(plots, kPlotColumns);
+  std::string pictures = "<div class=\"plots\">\n";
+  for (const LinePlot& plot : plots) pictures += PlotSvg({plot});
+  return pictures + "</div>\n";
 }
 
 std::string NumberText(double value) {
@@ -209,7 +213,7 @@ std::string EstimateText(const Estimate& estimate, int trials) {
 
 void WriteSettings(const Overview& overview, std::ostringstream* output) {
   const SweepDefinition& definition = overview.result.definition;
-  *output << "<table>\n<tr>";
+  *output << "<div class=\"wide\"><table>\n<tr>";
   for (const SweepAxis& axis : definition.axes) {
     *output << "<th>" << EscapeXml(axis.flag) << "</th>";
   }
@@ -239,7 +243,70 @@ void WriteSettings(const Overview& overview, std::ostringstream* output) {
     }
     *output << "</td></tr>\n";
   }
-  *output << "</table>\n";
+  *output << "</table></div>\n";
+}
+
+// Every run with every number that is not the same in all of them.
+void WriteRuns(const SweepResult& result, std::ostringstream* output) {
+  constexpr std::size_t kMostCells = 200000;
+  std::vector<std::string> columns;
+  std::vector<std::vector<std::string>> cells;
+  std::size_t same = 0;
+  for (const std::string& name : FigureNames(result)) {
+    if (name == "seed" || name.compare(0, 6, "flags.") == 0) continue;
+    std::vector<std::string> column;
+    std::set<std::string> different;
+    for (const std::optional<RunRecord>& record : result.records) {
+      std::string text;
+      if (record) {
+        for (const auto& [figure, value] : record->figures) {
+          if (figure == name && std::isfinite(value)) text = TableNumber(value);
+        }
+        if (record->status == RunStatus::kDone) different.insert(text);
+      }
+      column.push_back(std::move(text));
+    }
+    if (different.size() < 2 && result.runs.size() > 1) {
+      ++same;
+      continue;
+    }
+    columns.push_back(name);
+    cells.push_back(std::move(column));
+    if (columns.size() * result.runs.size() > kMostCells) {
+      *output << "<p>The table of all runs is too large for a page.</p>\n";
+      return;
+    }
+  }
+  *output << "<div class=\"wide\"><table>\n<tr>";
+  for (const SweepAxis& axis : result.definition.axes) {
+    *output << "<th>" << EscapeXml(axis.flag) << "</th>";
+  }
+  *output << "<th>seed</th><th>status</th>";
+  for (const std::string& column : columns) {
+    *output << "<th>" << EscapeXml(column) << "</th>";
+  }
+  *output << "</tr>\n";
+  for (std::size_t i = 0; i < result.runs.size(); ++i) {
+    const SweepRun& run = result.runs[i];
+    *output << "<tr>";
+    for (const std::string& value : run.values) {
+      *output << "<td>" << EscapeXml(value) << "</td>";
+    }
+    *output << "<td><a href=\"runs/" << EscapeXml(run.name) << "/\">"
+            << run.seed << "</a></td><td>"
+            << (result.records[i] ? RunStatusName(result.records[i]->status)
+                                  : "not done yet")
+            << "</td>";
+    for (const std::vector<std::string>& column : cells) {
+      *output << "<td>" << column[i] << "</td>";
+    }
+    *output << "</tr>\n";
+  }
+  *output << "</table></div>\n";
+  if (same > 0) {
+    *output << "<p>" << same
+            << " further numbers are the same in all runs.</p>\n";
+  }
 }
 
 // Runs that have no figures, and why.
@@ -249,7 +316,7 @@ void WriteFailures(const SweepResult& result, std::ostringstream* output) {
     const std::optional<RunRecord>& record = result.records[i];
     if (record && record->status == RunStatus::kDone) continue;
     const std::string name = EscapeXml(result.runs[i].name);
-    rows << "<tr><td>" << name << "</td><td>"
+    rows << "<tr><td class=\"words\">" << name << "</td><td class=\"words\">"
          << (record ? EscapeXml(record->reason) : "not done yet")
          << "</td><td>";
     if (record) rows << "<a href=\"runs/" << name << "/log.txt\">log</a>";
@@ -297,7 +364,7 @@ std::vector<std::string> ChooseFigures(const SweepResult& result,
 
 std::string OverviewSvg(const SweepResult& result,
                         const OverviewOptions& options) {
-  return Plots(Overview(result, options));
+  return Plots(Overview(result, options), true);
 }
 
 std::string OverviewHtml(const SweepResult& result,
@@ -312,11 +379,15 @@ std::string OverviewHtml(const SweepResult& result,
 <meta name="viewport" content="width=device-width">
 <title>Sweep</title>
 <style>
-body { font-family: sans-serif; margin: 2em auto; max-width: 75em; padding: 0 1em; }
-pre { background: #f4f4f4; overflow-x: auto; padding: 0.7em; }
-table { border-collapse: collapse; font-size: 90%; display: block; overflow-x: auto; }
+body { font-family: sans-serif; margin: 1.5em; }
+pre { background: #f4f4f4; padding: 0.7em; white-space: pre-wrap; overflow-wrap: anywhere; }
+table { border-collapse: collapse; font-size: 90%; }
+.wide { overflow-x: auto; }
+.plots { display: flex; flex-wrap: wrap; gap: 0.5em; }
+@media (max-width: 600px) { body { margin: 0.7em; } }
 th, td { border: 1px solid #cccccc; padding: 0.25em 0.6em; text-align: right; }
-th { background: #f4f4f4; }
+th { background: #f4f4f4; position: sticky; top: 0; }
+td.words { text-align: left; }
 tr.best td { background: #fff0dd; font-weight: bold; }
 svg { max-width: 100%; height: auto; }
 </style>
@@ -328,7 +399,16 @@ svg { max-width: 100%; height: auto; }
   for (const std::string& word : definition.command) {
     line += (line.empty() ? "" : " ") + QuoteForShell(word);
   }
-  page << EscapeXml(line) << "</pre>\n<ul>\n";
+  page << EscapeXml(line) << "</pre>\n";
+  if (!definition.evaluate.empty()) {
+    line.clear();
+    for (const std::string& word : definition.evaluate) {
+      line += (line.empty() ? "" : " ") + QuoteForShell(word);
+    }
+    page << "<p>and after each run, in its folder {}:</p>\n<pre>"
+         << EscapeXml(line) << "</pre>\n";
+  }
+  page << "<ul>\n";
   for (const SweepAxis& axis : definition.axes) {
     std::string values;
     for (const std::string& value : axis.values) {
@@ -379,7 +459,7 @@ svg { max-width: 100%; height: auto; }
                   definition, overview.settings[overview.reference].values))
            << "</pre>\n";
     }
-    page << Plots(overview);
+    page << Plots(overview, false);
     if (overview.num_axes() > 2 && !definition.one_at_a_time) {
       std::vector<HeatMap> maps;
       for (std::size_t row = 0; row < overview.num_axes(); ++row) {
@@ -395,6 +475,8 @@ svg { max-width: 100%; height: auto; }
   page << "<h2>Settings</h2>\n";
   WriteSettings(overview, &page);
   WriteFailures(result, &page);
+  page << "<h2>All runs</h2>\n";
+  WriteRuns(result, &page);
   page << "<p>plumbline_sweep " << kVersion
        << "; every number of every run is in <a "
           "href=\"sweep.csv\">sweep.csv</a>.</p>\n</body>\n</html>\n";

@@ -172,8 +172,10 @@ TEST_F(SweepBinaryTest, FailuresAndTimeOutsAreRows) {
   ASSERT_EQ(Run("--grid='x=1,2,slow' --time_limit=1 --jobs=3 --minimize=y" +
                     out + " -- " + program_ + " --fail=2",
                 &output),
-            0)
+            2)
       << output;
+  EXPECT_THAT(output, HasSubstr("x=2,seed=1: failed: signal 6 (Aborted)\n"));
+  EXPECT_THAT(output, HasSubstr("x=slow,seed=1: timed out: longer than 1 s\n"));
   EXPECT_EQ(Read("out/sweep.csv"),
             "run,x,seed,status,reason,y\n"
             "\"x=1,seed=1\",1,1,done,,1.1\n"
@@ -181,10 +183,48 @@ TEST_F(SweepBinaryTest, FailuresAndTimeOutsAreRows) {
             "\"x=slow,seed=1\",slow,1,timed_out,longer than 1 s,\n");
   EXPECT_THAT(output, HasSubstr("3; 1 done, 1 failed, 1 timed out"));
   EXPECT_EQ(Notes().size(), 3u);
-  ASSERT_EQ(Run(out.substr(1), &output), 0);
+  ASSERT_EQ(Run(out.substr(1), &output), 2);
   EXPECT_EQ(Notes().size(), 3u);
-  ASSERT_EQ(Run("--retry_failed" + out, &output), 0);
+  ASSERT_EQ(Run("--retry_failed" + out, &output), 2);
   EXPECT_EQ(Notes().size(), 5u);
+}
+
+TEST_F(SweepBinaryTest, WhatCannotComeOutIsRefusedAtOnce) {
+  std::string output;
+  const std::string out = " --output_dir=" + folder_ + "/out";
+  // A value that the command would refuse, among good ones.
+  EXPECT_EQ(Run("--grid=delta_threshold=0.1,0.2,50" + out +
+                    " -- plumbline_solve --input=none",
+                &output),
+            2);
+  EXPECT_THAT(output,
+              HasSubstr("the command would refuse it: --delta_threshold=50: "
+                        "out of range"));
+  EXPECT_EQ(Run("--grid=delta_treshold=0.1" + out +
+                    " -- plumbline_solve --input=none",
+                &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("(--delta_threshold?)"));
+  EXPECT_EQ(Run("--grid=x=1 --minimize=evaluation.y" + out + " -- " + program_,
+                &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("there is none: expected --evaluate"));
+  EXPECT_EQ(Run("--grid=delta_threshold=0.1 --minimize=costs.total" + out +
+                    " -- plumbline_solve",
+                &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("no run will have a figure 'costs.total' "
+                                "(cost?)"));
+  EXPECT_EQ(Run("--grid=x=0.05:0.3" + out + " -- " + program_, &output), 2);
+  EXPECT_THAT(output, HasSubstr("the range '0.05:0.3' has no step"));
+  EXPECT_EQ(Notes().size(), 0u);
+  // What only a run can tell is told by the first.
+  EXPECT_EQ(
+      Run("--grid=x=1:1:9 --jobs=1 --minimize=z" + out + " -- " + program_,
+          &output),
+      2);
+  EXPECT_THAT(output, HasSubstr("--minimize: no run has a figure 'z'"));
+  EXPECT_LE(Notes().size(), 2u);
 }
 
 TEST_F(SweepBinaryTest, KilledInTheMiddleAndResumedGivesTheSameTable) {
@@ -197,8 +237,10 @@ TEST_F(SweepBinaryTest, KilledInTheMiddleAndResumedGivesTheSameTable) {
     return all;
   };
   int status = 0;
+  // Three runs fail: 2.
   ASSERT_EQ(waitpid(Start(flags("whole")), &status, 0) > 0, true);
-  ASSERT_EQ(status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  ASSERT_EQ(WEXITSTATUS(status), 2);
   fs::remove(folder_ + "/notes");
 
   const pid_t victim = Start(flags("killed"));
@@ -209,7 +251,8 @@ TEST_F(SweepBinaryTest, KilledInTheMiddleAndResumedGivesTheSameTable) {
   EXPECT_FALSE(fs::exists(folder_ + "/killed/sweep.csv"));
   EXPECT_LT(Records("killed"), 18);
   ASSERT_GT(waitpid(Start(flags("killed")), &status, 0), 0);
-  ASSERT_EQ(status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  ASSERT_EQ(WEXITSTATUS(status), 2);
   EXPECT_EQ(Read("killed/sweep.csv"), Read("whole/sweep.csv"));
   EXPECT_THAT(Read("killed/sweep.csv"), HasSubstr("x=6,seed=3"));
   // Only the two that were at work, and one that had its record to write, may

@@ -60,12 +60,14 @@ TEST(SweepGridTest, ValuesOfAllKindsCanBeMixed) {
   EXPECT_THAT(Values("\"0,45,90,135\",\"0,90\",\"a;b\",\"\""),
               ElementsAre("0,45,90,135", "0,90", "a;b", ""));
   // Words with colons are words.
-  EXPECT_THAT(Values("a:b:c,1:2,C:\\x"), ElementsAre("a:b:c", "1:2", "C:\\x"));
+  EXPECT_THAT(Values("a:b:c,\"1:2\",C:\\x"),
+              ElementsAre("a:b:c", "1:2", "C:\\x"));
   EXPECT_THAT(Values("line_ransac/orientation_mixture,x=1"),
               ElementsAre("line_ransac/orientation_mixture", "x=1"));
 }
 
 TEST(SweepGridTest, RefusesWhatIsNoGrid) {
+  EXPECT_THAT(Refusal("x=0.05:0.3"), HasSubstr("'0.05:0.3' has no step"));
   EXPECT_THAT(Refusal("link_radius"), HasSubstr("cannot read 'link_radius'"));
   EXPECT_THAT(Refusal("=1"), HasSubstr("cannot read '=1'"));
   EXPECT_THAT(Refusal("--x=1"), HasSubstr("without dashes in front"));

@@ -149,10 +149,10 @@ echo "{\"y\": $x.$seed}" > "$out/summary.json"
     std::string output;
     ASSERT_EQ(RunInShell(sweep + "there --jobs=4 " + flags + " -- ./program.sh",
                          &output),
-              0)
+              2)
         << output;
     EXPECT_THAT(output, HasSubstr("runs: 12; 6 done, 3 failed, 3 timed out"));
-    ASSERT_EQ(RunInShell(sweep + "here --jobs=6 -- ./program.sh", &output), 0)
+    ASSERT_EQ(RunInShell(sweep + "here --jobs=6 -- ./program.sh", &output), 2)
         << output;
     EXPECT_EQ(Read("there/sweep.csv"), Read("here/sweep.csv"));
     EXPECT_THAT(Read("there/sweep.csv"),
@@ -341,7 +341,7 @@ TEST_F(SweepLauncherTest, SlurmOnOneNode) {
                                "--output_dir=" +
                                folder_ + "/" + out,
                            &output),
-                0)
+                2)
           << output;
       EXPECT_THAT(Read(out + "/sweep.csv"), HasSubstr("longer than 1 s"));
     }

@@ -121,14 +121,15 @@ TEST(SweepOverviewTest, MoreFlagsGiveALineEachAndMapsOfPairs) {
   const SweepResult result = MakeResult(axes, 1);
   EXPECT_EQ(Count(OverviewSvg(result, options), "<polyline"), 3);
   const std::string page = OverviewHtml(result, options);
-  EXPECT_EQ(Count(page, "<svg"), 2);
+  EXPECT_EQ(Count(page, "<svg"), 3 + 1);
   EXPECT_EQ(Count(page, "stroke=\"#D55E00\""), 3);
 
   // One at a time only the plots of lines have all their numbers.
   const SweepResult star = MakeResult(axes, 1, true);
   EXPECT_EQ(Count(OverviewSvg(star, options), "<polyline"), 3);
-  EXPECT_EQ(Count(OverviewHtml(star, options), "<svg"), 1);
-  EXPECT_EQ(Count(OverviewHtml(star, options), "<tr"), 1 + 5);
+  EXPECT_EQ(Count(OverviewHtml(star, options), "<svg"), 3);
+  // Settings, and runs.
+  EXPECT_EQ(Count(OverviewHtml(star, options), "<tr"), 2 * (1 + 5));
 }
 
 TEST(SweepOverviewTest, ThePageSaysWhatWentWrong) {
@@ -160,7 +161,7 @@ TEST(SweepOverviewTest, ThePageOpensInABrowser) {
       MakeResult({{"a", {"1", "2"}}, {"b", {"1", "2"}}, {"c", {"1", "2"}}}, 3),
       options);
   browser.Open("file://" + folder + "/sweep.html");
-  EXPECT_EQ(browser.Evaluate("document.querySelectorAll('svg').length"), 2);
+  EXPECT_EQ(browser.Evaluate("document.querySelectorAll('svg').length"), 7);
   EXPECT_EQ(browser.Evaluate("document.querySelectorAll('tr.best').length"), 1);
   EXPECT_EQ(browser.Evaluate(
                 "document.body.scrollWidth <= document.body.clientWidth"),

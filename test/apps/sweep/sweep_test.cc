@@ -280,6 +280,11 @@ TEST_F(SweepTest, WhatGoesWrongIsSaid) {
   const std::string good = "echo '{\"x\": 1}' > $out/summary.json\n";
   EXPECT_EQ(reason(good + "exit 3"), "exit status 3");
   EXPECT_EQ(reason(good + "kill -SEGV $$"), "signal 11 (Segmentation fault)");
+  // With the last words of the run.
+  EXPECT_EQ(reason("echo first\necho 'a.clf:3: no number' >&2\necho\nexit 2"),
+            "exit status 2: a.clf:3: no number");
+  EXPECT_EQ(reason("printf 'reading 3%%\\rreading 9%%\\rstuck'\nexit 2"),
+            "exit status 2: stuck");
   EXPECT_EQ(reason("true"), "no summary.json");
   EXPECT_THAT(reason("echo '{' > $out/summary.json"),
               StartsWith("summary.json: cannot be read"));

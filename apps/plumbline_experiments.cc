@@ -79,7 +79,8 @@ Json ToJson(const ExperimentResult& result) {
         {"value", claim.measured.value},
         {"low", claim.measured.low},
         {"high", claim.measured.high},
-        {"holds", claim.holds}};
+        {"holds", claim.holds},
+        {"open", claim.is_open}};
   }
   Json means = Json::object();
   for (const SummaryRow& row : Summarize(result)) {
@@ -144,10 +145,10 @@ int Run() {
       std::cout << "  skipped: " << result.skipped << '\n';
     }
     for (const Claim& claim : result.claims) {
-      std::cout << (claim.holds ? "  holds  " : "  FAILS  ") << claim.text
-                << ": " << claim.measured.value << " [" << claim.measured.low
-                << ", " << claim.measured.high << "], required "
-                << claim.required << '\n';
+      std::cout << "  " << Verdict(claim) << "  " << claim.text << ": "
+                << claim.measured.value << " [" << claim.measured.low << ", "
+                << claim.measured.high << "], required " << claim.required
+                << '\n';
     }
     std::cout.flush();
     if (InterruptRequested()) break;

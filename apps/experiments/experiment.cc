@@ -65,6 +65,10 @@ void WriteTrials(const ExperimentResult& result, std::ostream& output) {
   }
 }
 
+const char* Verdict(const Claim& claim) {
+  return claim.holds ? "holds" : claim.is_open ? "open " : "FAILS";
+}
+
 void WriteExperimentSummary(const ExperimentResult& result,
                             std::ostream& output) {
   output << result.id << ": " << result.title << "\n\nPaper: " << result.paper
@@ -75,7 +79,7 @@ void WriteExperimentSummary(const ExperimentResult& result,
   }
   if (result.interrupted) output << "Cut short: not all trials are whole.\n\n";
   for (const Claim& claim : result.claims) {
-    output << (claim.holds ? "  holds   " : "  FAILS   ") << claim.text << ": "
+    output << "  " << Verdict(claim) << "   " << claim.text << ": "
            << FormatEstimate(claim.measured) << ", required " << claim.required
            << '\n';
   }

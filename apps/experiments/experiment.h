@@ -59,7 +59,13 @@ struct Claim {
   std::string required;
   Estimate measured;
   bool holds = false;
+  /// It neither holds nor fails: the bound lies within the interval of what was
+  /// measured. Then `holds` is false.
+  bool is_open = false;
 };
+
+/// "holds", "open" or "FAILS".
+const char* Verdict(const Claim& claim);
 
 /// All that an experiment gives.
 struct ExperimentResult {

@@ -18,11 +18,6 @@ constexpr int kNeighbors = 3;
 constexpr double kPlacedPosition = 0.05;
 constexpr double kPlacedHeading = DegToRad(1.0);
 
-// How far the map may have moved since the robot was there, m and rad: all that
-// says where along a corridor that was.
-constexpr double kMovedPosition = 1.0;
-constexpr double kMovedHeading = DegToRad(10.0);
-
 std::vector<FeatureId> SeenFeatures(const KeyScanRecord& record) {
   std::vector<FeatureId> ids;
   for (const FeatureMatch& match : record.matches) ids.push_back(match.feature);
@@ -72,11 +67,7 @@ void GraphBuilder::Place(const KeyScan& scan) {
     }
   }
   from_ = from;
-  RelocalizationOptions relocalization;
-  relocalization.start_position_sigma = kMovedPosition;
-  relocalization.start_angle_sigma = kMovedHeading;
-  const Pose2 pose =
-      RelocalizeKeyScans(*graph_, near, relocalization)[from - begin];
+  const Pose2 pose = RelocalizeKeyScans(*graph_, near, {})[from - begin];
   robot_.set_pose(pose);
   if (seen.empty()) return;
   const Eigen::Matrix3d covariance =

@@ -21,10 +21,11 @@ struct RelocalizationOptions {
   /// Scale of the Cauchy loss on an observation, in sigmas.
   double loss_scale = 2.0;
   /// Uncertainty of the first key scan's recorded pose, m and rad; zero: it is
-  /// not used. A few key scans in a corridor do not tell how far along it they
-  /// are.
-  double start_position_sigma = 0.0;
-  double start_angle_sigma = 0.0;
+  /// not used. Corridors without ends do not tell how far along them the robot
+  /// is: their walls are parallel to some hundredths of a degree only, and
+  /// where they are as far apart as they look may be half a kilometre away.
+  double start_position_sigma = 0.5;
+  double start_angle_sigma = DegToRad(10.0);
   int max_iterations = 30;
   int num_threads = 1;
 };

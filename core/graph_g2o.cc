@@ -276,6 +276,11 @@ struct FeatureLine {
   Feature attributes;
 };
 
+struct UnknownLine {
+  int line = 0;
+  std::string tag;
+};
+
 struct FixLine {
   int line;
   std::int64_t file_id;
@@ -337,6 +342,13 @@ class Reader {
     }
     if (input.bad()) throw Error(name_, line_, "cannot read on", "");
     if (features_.empty() && unknown_ids_.empty()) NameVertices();
+    if (features_.empty() && !first_unknown_.tag.empty()) {
+      Fail(first_unknown_.line,
+           "no vertex or edge of the file has a known tag; the first is " +
+               first_unknown_.tag,
+           "a graph of the plane (VERTEX_SE2, EDGE_SE2 and others); graphs "
+           "in three dimensions are not solved");
+    }
     Transaction transaction;
     AddFeatures(&transaction);
     std::vector<const Edge*> added = AddConstraints(&transaction);
@@ -453,6 +465,7 @@ class Reader {
       above_ = Above::kEdge;
       return;
     }
+    if (first_unknown_.tag.empty()) first_unknown_ = {line_, tag};
     ++file_.unknown_tags[tag];
     std::int64_t id = 0;
     if (MayBeVertex(tag) && fields_.size() > 1 &&
@@ -808,6 +821,7 @@ class Reader {
   std::unordered_map<std::int64_t, std::size_t> index_;
   // Ids of vertices with unknown tags.
   std::unordered_set<std::int64_t> unknown_ids_;
+  UnknownLine first_unknown_;
   std::vector<FixLine> fix_lines_;
   std::vector<ExtraFields> extra_fields_;
   std::vector<FeatureLine> feature_lines_;

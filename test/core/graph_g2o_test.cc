@@ -319,6 +319,25 @@ TEST_F(GraphG2oTest, UnknownLinesAreKept) {
   EXPECT_EQ(Write(graph, &file), text);
 }
 
+// Edges alone, vertices alone, both: in three dimensions nothing is known.
+TEST_F(GraphG2oTest, GraphsWithoutAKnownElementAreRefused) {
+  const std::string vertices =
+      "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n";
+  const std::string edges =
+      "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 "
+      "0 1\n";
+  EXPECT_EQ(Refusal("# a cube\n" + edges),
+            "map.g2o:2: no vertex or edge of the file has a known tag; the "
+            "first is EDGE_SE3:QUAT: expected a graph of the plane "
+            "(VERTEX_SE2, EDGE_SE2 and others); graphs in three dimensions are "
+            "not solved");
+  EXPECT_THAT(Refusal(vertices), testing::HasSubstr("VERTEX_SE3:QUAT"));
+  EXPECT_THAT(Refusal(vertices + edges), testing::HasSubstr("map.g2o:1: "));
+  EXPECT_THAT(Refusal("VERTEX3 1 0 0 0 0 0 0\nEDGE3 1 2 1 0 0 0 0 0\n"),
+              testing::HasSubstr("VERTEX3"));
+  EXPECT_EQ(Refusal("VERTEX_SE2 7 0 0 0\n" + vertices), "nothing was refused");
+}
+
 TEST_F(GraphG2oTest, EmptyInput) {
   EXPECT_EQ(RoundTrip(""), "");
   EXPECT_EQ(RoundTrip("\n  \n"), "\n  \n");

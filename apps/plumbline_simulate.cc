@@ -67,8 +67,8 @@ DEFINE_string(output, "",
               "Log (gzip when the name ends in .gz) or g2o file to write.");
 DEFINE_string(format, "carmen",
               "Of the log: carmen, ros1 (a bag of ROS 1), ros2_db3 (a folder "
-              "with metadata.yaml and .db3) or mcap. All say the same.");
-PLUMBLINE_FLAG_CHOICES(format, "carmen", "ros1", "ros2_db3", "mcap");
+              "with metadata.yaml and .db3), mcap or csv. All say the same.");
+PLUMBLINE_FLAG_CHOICES(format, "carmen", "ros1", "ros2_db3", "mcap", "csv");
 DEFINE_string(bag_compression, "none",
               "Of chunks: none, bz2 or lz4 (ros1), none, lz4 or zstd (mcap).");
 PLUMBLINE_FLAG_CHOICES(bag_compression, "none", "bz2", "lz4", "zstd");
@@ -263,6 +263,8 @@ void WriteLog(const Simulation& simulation, const LaserModel& laser) {
     std::ostringstream text;
     if (FLAGS_format == "carmen") {
       WriteCarmenLog(simulation, laser, {Provenance()}, text);
+    } else if (FLAGS_format == "csv") {
+      WriteCsvLog(simulation, laser, {Provenance()}, text);
     } else {
       BagWriterOptions options;
       options.compression = FLAGS_bag_compression;

@@ -4,6 +4,7 @@
 #include <plumbline/frontend/bags/rosbag2.h>
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/csv_reader.h>
 #include <plumbline/frontend/log_reader.h>
 
 #include <memory>
@@ -45,6 +46,13 @@ void RegisterBuiltinLogReaders(Registry* registry) {
       registry->Register(std::move(type));
     }
   };
+  LogReaderType csv;
+  csv.name = "csv";
+  csv.description =
+      "CSV of scans: time, start_angle, angle_step, r0, r1, ...; x, y, theta";
+  csv.recognizes = LooksLikeCsvLog;
+  csv.read = ReadCsvLog;
+  add(std::move(csv));
   add(BagReaderType("mcap",
                     "MCAP: messages of ROS 2 or ROS 1, chunks plain, "
                     "lz4 or zstd",

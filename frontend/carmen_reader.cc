@@ -134,6 +134,16 @@ void OldFormatAngles(int beams, double resolution, double* start,
   *start = -0.5 * *step * intervals;
 }
 
+// The laser's place is a difference of poses that have six digits after the
+// point at most: rounded to the last of them, and an angle to the round one
+// that it may stand for, it is what was written, so that a drive is the same in
+// all formats.
+double RoundPosition(double value) { return std::round(value * 1e6) / 1e6; }
+double RoundMountAngle(double angle) {
+  const double round = DegToRad(std::round(RadToDeg(angle) * 10.0) / 10.0);
+  return std::abs(round - angle) < 2e-6 ? round : std::round(angle * 1e6) / 1e6;
+}
+
 double Median(std::vector<double> values) {
   const std::size_t middle = values.size() / 2;
   std::nth_element(values.begin(), values.begin() + middle, values.end());
@@ -645,7 +655,8 @@ class CarmenReader {
       const bool fixed =
           10 * apart.size() <= offsets.size() && median.head<2>().norm() < 5.0;
       if (fixed) {
-        offset = Pose2(median[0], median[1], NormalizeAngle(median[2]));
+        offset = Pose2(RoundPosition(median[0]), RoundPosition(median[1]),
+                       RoundMountAngle(NormalizeAngle(median[2])));
       } else {
         SkipReport report;
         report.reason =

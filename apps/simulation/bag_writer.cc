@@ -717,7 +717,7 @@ std::vector<BagRecord> SimulatedMessages(const Simulation& simulation,
     scan.range_min = 0.005;
     scan.range_max = laser.maximum_range;
     for (const double range : state.ranges) {
-      scan.ranges.push_back(range < laser.maximum_range
+      scan.ranges.push_back(IsReturn(range, laser)
                                 ? static_cast<float>(Rounded(range, 2))
                                 : std::numeric_limits<float>::infinity());
     }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <limits>
 #include <utility>
 
@@ -495,6 +496,38 @@ void WriteCarmenLog(const Simulation& simulation, const LaserModel& laser,
     output << ' '
            << PoseText(Compose(state.odometry, Pose2(laser.offset, 0.0, 0.0)))
            << ' ' << PoseText(state.odometry) << ' ' << stamp << '\n';
+  }
+}
+
+bool IsReturn(double range, const LaserModel& laser) {
+  constexpr double kCarmenMargin = 0.05;  // m
+  return static_cast<float>(std::strtod(Fixed(range, 2).c_str(), nullptr)) <
+         laser.maximum_range - kCarmenMargin;
+}
+
+void WriteCsvLog(const Simulation& simulation, const LaserModel& laser,
+                 const std::vector<std::string>& comments,
+                 std::ostream& output) {
+  for (const std::string& comment : comments) output << "# " << comment << '\n';
+  output << "time,x,y,theta,laser_x,max_range,start_angle,angle_step";
+  for (int i = 0; i < laser.beams; ++i) output << ",r" << i;
+  output << '\n';
+  const int intervals = laser.beams % 2 == 0 ? laser.beams : laser.beams - 1;
+  char angles[80];
+  std::snprintf(angles, sizeof(angles), "%.17g,%.17g", -0.5 * kPi,
+                kPi / intervals);
+  const std::string fixed = Fixed(laser.offset, 6) + ',' +
+                            Fixed(laser.maximum_range, 2) + ',' + angles;
+  for (const SimulatedState& state : simulation.states) {
+    if (state.ranges.empty()) continue;
+    output << Fixed(state.time, 6) << ',' << Fixed(state.odometry[0], 6) << ','
+           << Fixed(state.odometry[1], 6) << ',' << Fixed(state.odometry[2], 6)
+           << ',' << fixed;
+    for (const double range : state.ranges) {
+      output << ',';
+      if (IsReturn(range, laser)) output << Fixed(range, 2);
+    }
+    output << '\n';
   }
 }
 

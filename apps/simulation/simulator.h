@@ -137,6 +137,17 @@ void WriteCarmenLog(const Simulation& simulation, const LaserModel& laser,
                     const std::vector<std::string>& comments,
                     std::ostream& output);
 
+/// Whether a range, as WriteCarmenLog rounds it, is a return for who reads
+/// CARMEN logs: there readings a little below the maximum range are none, and
+/// what other formats say is no different.
+bool IsReturn(double range, const LaserModel& laser);
+
+/// Writes the scans as CSV (frontend/csv_reader.h) with the same digits; what
+/// is no return is an empty cell.
+void WriteCsvLog(const Simulation& simulation, const LaserModel& laser,
+                 const std::vector<std::string>& comments,
+                 std::ostream& output);
+
 /// Writes the truth as JSON (m, rad, s; format "plumbline-truth", version 1):
 ///
 ///     orientations_deg: directions of walls, (-90, 90]

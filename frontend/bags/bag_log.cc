@@ -129,6 +129,12 @@ double RoundAngle(double angle) {
   return static_cast<float>(round) == static_cast<float>(angle) ? round : angle;
 }
 
+// And of all ranges the one with few digits.
+double RoundRange(double range) {
+  const double round = std::round(range * 1e4) / 1e4;
+  return static_cast<float>(round) == static_cast<float>(range) ? round : range;
+}
+
 template <typename T>
 T MedianOf(std::vector<T> values) {
   const auto middle =
@@ -731,9 +737,12 @@ class BagReader {
     const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
     mount.is_upside_down = rotation(2, 2) < 0.0;
     mount.is_tilted = std::abs(rotation(2, 2)) < kLevel;
-    mount.pose = Pose2(pose.translation.x(), pose.translation.y(),
-                       std::atan2(rotation(1, 0), rotation(0, 0))) +
-                 Pose2::Zero();  // no -0
+    const auto round = [](double value) {
+      return std::round(value * 1e9) / 1e9 + 0.0;  // no -0
+    };
+    // Composed of several transforms it is a little off, as a quaternion is.
+    mount.pose = Pose2(round(pose.translation.x()), round(pose.translation.y()),
+                       round(std::atan2(rotation(1, 0), rotation(0, 0))));
     return mount;
   }
 
@@ -844,7 +853,7 @@ class BagReader {
     scan.maximum_range =
         options_.laser_max_range ? *options_.laser_max_range
         : message.range_max > 0.0 && message.range_max <= kAbsurdMaximumRange
-            ? message.range_max
+            ? RoundRange(message.range_max)
             : kDefaultMaximumRange;
     const double least =
         message.range_min > 0.0 && message.range_min < scan.maximum_range

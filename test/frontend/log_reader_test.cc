@@ -83,7 +83,7 @@ TEST(LogReaderTest, ReadsALogOfAnyKnownFormat) {
   EXPECT_THAT(refusal(std::string(PLUMBLINE_SOURCE_DIR) + "/LICENSE"),
               ::testing::EndsWith(
                   "LICENSE: is no log of a known format: expected a log for "
-                  "one of the readers carmen, mcap, "
+                  "one of the readers carmen, csv, mcap, "
                   "ros1_bag, ros2_bag"));
   EXPECT_THAT(refusal("no/such.log"), ::testing::HasSubstr("no/such.log"));
 }

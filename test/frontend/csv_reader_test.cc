@@ -1,0 +1,179 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/builtins.h>
+#include <plumbline/frontend/csv_reader.h>
+
+#include <string>
+#include <vector>
+
+#include "refusal.h"
+
+namespace plumbline {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+Log Read(const std::string& text, const LaserOptions& options = {}) {
+  InputStream input("scans.csv", text);
+  return ReadCsvLog(&input, options);
+}
+
+std::string WhyNot(const std::string& text, const LaserOptions& options = {}) {
+  return Refusal([&] { Read(text, options); });
+}
+
+const char kHeader[] = "time,start_angle,angle_step,r0,r1,r2\n";
+
+TEST(CsvReaderTest, ReadsColumnsInAnyOrder) {
+  const Log log = Read(
+      "# of a robot\n"
+      "r1, r0 ,laser_theta,theta,y,x,time,angle_step,start_angle,max_range,"
+      "laser_x,laser_y,battery\r\n"
+      "2.5,1.5,0.1,0.5,-1,3,12.25,0.5,-0.25,10,0.2,-0.1,full\r\n"
+      "\n"
+      "# pause\n"
+      "2,1,0.1,0.5,-1,3.5,12.5,0.5,-0.25,10,0.2,-0.1,empty\n");
+  EXPECT_EQ(log.format, "CSV of scans");
+  EXPECT_TRUE(log.has_odometry);
+  EXPECT_EQ(log.odometry_source, "x, y, theta");
+  EXPECT_THAT(log.skipped, IsEmpty());
+  EXPECT_THAT(log.notes, ElementsAre(HasSubstr("not used: battery")));
+  ASSERT_EQ(log.scans.size(), 2u);
+  const Scan& scan = log.scans[0];
+  EXPECT_EQ(scan.timestamp, 12.25);
+  EXPECT_EQ(scan.timestamp_text, "12.25");
+  EXPECT_EQ(scan.odometry, Pose2(3.0, -1.0, 0.5));
+  EXPECT_EQ(scan.laser_offset, Pose2(0.2, -0.1, 0.1));
+  EXPECT_EQ(scan.start_angle, -0.25);
+  EXPECT_EQ(scan.angle_step, 0.5);
+  EXPECT_EQ(scan.maximum_range, 10.0);
+  EXPECT_THAT(scan.ranges, ElementsAre(1.5f, 2.5f));
+  EXPECT_EQ(scan.line, 3);
+  EXPECT_EQ(log.scans[1].line, 6);
+}
+
+TEST(CsvReaderTest, DoesWithoutOdometryAndPlace) {
+  const Log log = Read(std::string(kHeader) + "1,-1,1,2,3,4\n2,-1,1,2,3,4\n");
+  EXPECT_FALSE(log.has_odometry);
+  EXPECT_EQ(log.odometry_source, "");
+  EXPECT_EQ(log.scans[1].laser_offset, Pose2(0.0, 0.0, 0.0));
+  EXPECT_EQ(log.scans[1].maximum_range, 80.0);
+}
+
+TEST(CsvReaderTest, OptionsReplaceColumns) {
+  LaserOptions options;
+  options.laser_start_angle = -0.5;
+  options.laser_step = 0.25;
+  options.laser_max_range = 3.5;
+  const Log log = Read("time,r0,r1\n1,3,4\n", options);
+  EXPECT_EQ(log.scans[0].start_angle, -0.5);
+  EXPECT_EQ(log.scans[0].angle_step, 0.25);
+  EXPECT_THAT(log.scans[0].ranges, ElementsAre(3.0f, 0.0f));
+}
+
+TEST(CsvReaderTest, WhatIsNoReturn) {
+  const Log log = Read(
+      "time,start_angle,angle_step,max_range,r0,r1,r2,r3,r4,r5,r6,r7\n"
+      "1,-1,0.1,10,,nan,inf,0,-1,10,none,9.9\n");
+  EXPECT_THAT(log.scans[0].ranges,
+              ElementsAre(0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 9.9f));
+}
+
+TEST(CsvReaderTest, TurnsClockwiseScans) {
+  const Log log = Read("time,start_angle,angle_step,r0,r1,r2\n1,1,-1,2,3,4\n");
+  EXPECT_EQ(log.scans[0].start_angle, -1.0);
+  EXPECT_EQ(log.scans[0].angle_step, 1.0);
+  EXPECT_THAT(log.scans[0].ranges, ElementsAre(4.0f, 3.0f, 2.0f));
+}
+
+TEST(CsvReaderTest, TimeThatJumpsBackIsCounted) {
+  const Log log = Read(std::string(kHeader) + "5,-1,1,2,3,4\n3.5,-1,1,2,3,4\n");
+  EXPECT_EQ(log.time_reversals, 1);
+  EXPECT_EQ(log.largest_time_reversal, 1.5);
+}
+
+TEST(CsvReaderTest, HeadersThatCannotBe) {
+  EXPECT_THAT(WhyNot("start_angle,angle_step,r0\n1,2,3\n"),
+              HasSubstr("scans.csv:1: no column 'time'"));
+  EXPECT_THAT(WhyNot("time,start_angle,angle_step\n1,2,3\n"),
+              HasSubstr("no column 'r0'"));
+  EXPECT_THAT(WhyNot("time,start_angle,angle_step,r0,r2\n"),
+              HasSubstr("no column 'r1'"));
+  EXPECT_THAT(WhyNot("time,start_angle,angle_step,r0,r0\n"),
+              HasSubstr("two columns 'r0'"));
+  EXPECT_THAT(WhyNot("time,time,start_angle,angle_step,r0\n"),
+              HasSubstr("two columns 'time'"));
+  EXPECT_THAT(WhyNot("time,angle_step,r0\n"), HasSubstr("--laser_start_angle"));
+  EXPECT_THAT(WhyNot("time,start_angle,r0\n"), HasSubstr("--laser_step"));
+  EXPECT_THAT(WhyNot("time,start_angle,angle_step,x,y,r0\n"),
+              HasSubstr("x, y or theta"));
+  EXPECT_THAT(WhyNot(kHeader), HasSubstr("no line is a scan"));
+  EXPECT_THAT(WhyNot("# nothing\n"), HasSubstr("no line names columns"));
+  EXPECT_THAT(WhyNot(""), HasSubstr("no line names columns"));
+  // No number of a column can be that large.
+  EXPECT_THAT(WhyNot("time,start_angle,angle_step,r99999999999999999999\n"),
+              HasSubstr("no column 'r0'"));
+}
+
+TEST(CsvReaderTest, PassesOverLinesThatCannotBe) {
+  const Log log = Read(
+      "time,start_angle,angle_step,x,y,theta,max_range,r0,r1\n"
+      "1,-1,1,0,0,0,10,2,3\n"
+      "2,-1,1,0,0,0,10,2\n"
+      "3,-1,1,0,0,0,10,2,3,4\n"
+      "x,-1,1,0,0,0,10,2,3\n"
+      "nan,-1,1,0,0,0,10,2,3\n"
+      "6,-1,0,0,0,0,10,2,3\n"
+      "7,-1,9,0,0,0,10,2,3\n"
+      "8,-1e9,1,0,0,0,10,2,3\n"
+      "9,-1,1,inf,0,0,10,2,3\n"
+      "10,-1,1,1e300,0,0,10,2,3\n"
+      "11,-1,1,0,0,0,0,2,3\n"
+      "12,-1,1,0,0,1e400,10,2,3\n"
+      "13,-1,1,1,0,0,10,2,3");
+  ASSERT_EQ(log.scans.size(), 2u);
+  EXPECT_EQ(log.scans[1].timestamp, 13.0);
+  EXPECT_EQ(log.messages.at("scan"), 2);
+  std::int64_t skipped = 0;
+  for (const SkipReport& skip : log.skipped) skipped += skip.count;
+  EXPECT_EQ(skipped, 11);
+  EXPECT_THAT(log.skipped[0].reason, HasSubstr("number of cells"));
+  EXPECT_THAT(log.skipped[0].first_lines, ElementsAre(3, 4));
+}
+
+TEST(CsvReaderTest, ARefusalSaysWhatWasWrongWithTheLines) {
+  EXPECT_THAT(WhyNot(std::string(kHeader) + "1,2\n"),
+              HasSubstr("number of cells"));
+}
+
+TEST(CsvReaderTest, IsRecognizedByItsColumns) {
+  EXPECT_TRUE(LooksLikeCsvLog("# c\n\n x , time,r0\r\n"));
+  EXPECT_TRUE(LooksLikeCsvLog("time,r0"));
+  EXPECT_FALSE(LooksLikeCsvLog("time,x,y\nr0"));
+  EXPECT_FALSE(LooksLikeCsvLog("FLASER 2 1 2\n"));
+  EXPECT_FALSE(LooksLikeCsvLog(""));
+  Registry registry;
+  RegisterBuiltinLogReaders(&registry);
+  const LogReaderType* reader = RecognizeLog(registry, kHeader);
+  ASSERT_NE(reader, nullptr);
+  EXPECT_EQ(reader->name, "csv");
+}
+
+// Cut anywhere: a log of what is whole, or a refusal.
+TEST(CsvReaderTest, CutAnywhere) {
+  const std::string text =
+      std::string(kHeader) + "1,-1,1,2,3,4\n2,-1,1,2,3,4\n";
+  for (std::size_t size = 0; size <= text.size(); ++size) {
+    const std::string part = text.substr(0, size);
+    // The last cell of a line may be empty.
+    EXPECT_EQ(WhyNot(part) == "accepted",
+              size >= std::string(kHeader).size() + 11)
+        << size;
+  }
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -18,6 +18,7 @@
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/log_reader.h>
 #include <plumbline/frontend/scan_odometry.h>
+#include <plumbline/outputs/building_frame.h>
 #include <plumbline/outputs/checkpoint_file.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/output_folder.h>
@@ -603,6 +604,20 @@ std::vector<TimedPose> TimedTrajectory(const std::vector<Scan>& scans,
   return trajectory;
 }
 
+// Moves the trajectory and the graph as --align says; returns by what.
+Pose2 AlignOutputs(const std::vector<Pose2>& path, SolveOutcome* outcome) {
+  if (FLAGS_align != "building") return Pose2::Zero();
+  const Pose2 by = BuildingFrame(*outcome->graph, path);
+  outcome->moved_graph =
+      ForFlag("align", [&] { return Moved(by, *outcome->graph); });
+  outcome->graph = outcome->moved_graph.get();
+  for (TimedPose& timed : outcome->trajectory) {
+    timed.pose = Compose(by, timed.pose);
+  }
+  outcome->summary.alignment = by;
+  return by;
+}
+
 // What there is to say and to write of a log's map. All but `name` have to stay
 // until the outputs are written.
 void TakeMap(const std::string& name, const std::vector<Scan>& scans,
@@ -615,11 +630,14 @@ void TakeMap(const std::string& name, const std::vector<Scan>& scans,
   outcome->trajectory = TimedTrajectory(scans, result.trajectory);
   outcome->graph = &solver.graph();
   outcome->registry = &registry;
+  const Pose2 moved_by = AlignOutputs(result.trajectory, outcome);
   if (!InterruptRequested()) TakeMarginals(nullptr, outcome);
   outcome->scans = &scans;
-  outcome->without_structure = [&scans, &registry, &options, &result] {
-    return ReplayWithoutStructure(scans, registry, options, result,
-                                  [] { return InterruptRequested(); });
+  outcome->without_structure = [&scans, &registry, &options, &result,
+                                moved_by] {
+    return Moved(moved_by,
+                 ReplayWithoutStructure(scans, registry, options, result,
+                                        [] { return InterruptRequested(); }));
   };
   outcome->trace = solver.trace();
   outcome->occupancy = OccupancyOptionsFromFlags();

@@ -70,6 +70,12 @@ DEFINE_double(ellipse_sigmas, 0.0,
               "Standard deviations of the ellipses drawn into map.svg and "
               "map.png around the positions of --marginals; 0: none");
 PLUMBLINE_FLAG_RANGE(ellipse_sigmas, 0.0, 1000.0);
+DEFINE_string(align, "none",
+              "Frame of all outputs: none (the robot starts at the origin); "
+              "building (turned and shifted so that the walls run along x and "
+              "y and lie in the first quadrant; summary.json has the "
+              "transform)");
+PLUMBLINE_FLAG_CHOICES(align, "none", "building");
 DEFINE_double(grid_resolution, 0.05, "Side of a cell of occupancy.pgm, m");
 PLUMBLINE_FLAG_RANGE(grid_resolution, 0.001, 10.0);
 
@@ -341,7 +347,7 @@ void RefuseForPoints(const std::string& flag, const std::string& value,
 std::vector<FlagGroup> SolveFlagGroups() {
   return {
       {"Input and output",
-       {"input", "output_dir", "log_reader", "start_pose", "outputs",
+       {"input", "output_dir", "log_reader", "start_pose", "outputs", "align",
         "grid_resolution"}},
       {"Graphs", GraphFlags()},
       {"Uncertainty", {"marginals", "marginals_hold_gauge", "ellipse_sigmas"}},
@@ -373,11 +379,22 @@ std::vector<std::string> GraphFlags() {
 }
 
 std::vector<std::string> LogFlags() {
-  return {"grid_resolution", "checkpoint_every",    "em_every",
-          "features",        "odometry_refinement", "link_radius",
-          "start_pose",      "association_depth",   "global_association",
-          "refine",          "usable_range",        "laser_start_angle",
-          "laser_step",      "laser_max_range",     "scan_topic",
+  return {"align",
+          "grid_resolution",
+          "checkpoint_every",
+          "em_every",
+          "features",
+          "odometry_refinement",
+          "link_radius",
+          "start_pose",
+          "association_depth",
+          "global_association",
+          "refine",
+          "usable_range",
+          "laser_start_angle",
+          "laser_step",
+          "laser_max_range",
+          "scan_topic",
           "odometry_topic"};
 }
 

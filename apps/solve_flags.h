@@ -20,6 +20,7 @@ DECLARE_string(output_dir);
 DECLARE_string(log_reader);
 DECLARE_string(start_pose);
 DECLARE_string(outputs);
+DECLARE_string(align);
 DECLARE_double(checkpoint_every);
 DECLARE_bool(structure);
 DECLARE_double(delta_threshold);

@@ -33,6 +33,8 @@ struct LogPart {
 struct SolveOutcome : SolvedRun {
   OccupancyOptions occupancy;
   double delta_threshold = 0.0;
+  /// The graph that `graph` points to when it was moved for the outputs.
+  std::shared_ptr<const Graph> moved_graph;
   /// Of a run on several logs: those in this map, each of which gets a
   /// trajectory_<number>.tum; empty otherwise.
   std::vector<LogPart> logs;

@@ -305,6 +305,13 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
   if (summary.scans > 0) {
     json["frontend"] = FrontendToJson(summary);
     json["tracking"] = TrackingToJson(summary.tracking);
+    if (summary.alignment) {
+      const Pose2& by = *summary.alignment;
+      json["alignment"] = {{"kind", "building"},
+                           {"x", by[0]},
+                           {"y", by[1]},
+                           {"theta_deg", RadToDeg(by[2])}};
+    }
     for (const Summary::LogInput& log : summary.logs) {
       json["logs"].push_back(LogToJson(log));
     }

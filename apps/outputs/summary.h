@@ -4,6 +4,7 @@
 #include <plumbline/core/em.h>
 #include <plumbline/core/flag_value.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/scan.h>
 
 #include <cstdint>
@@ -143,6 +144,11 @@ struct Summary {
   };
   Tracking tracking;
 
+  /// Of a log only: how all outputs were moved, m and rad. What lay at p in the
+  /// frame of the solver lies at TransformPoint(*alignment, p); none when
+  /// nothing was moved.
+  std::optional<Pose2> alignment;
+
   /// One of several logs that were solved together.
   struct LogInput {
     /// The file, and its trajectory among the outputs.
@@ -194,8 +200,9 @@ std::string CountsAsJson(const Summary& summary);
 /// seconds}}; for a log also frontend {skipped [{reason, count, first_lines}],
 /// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
 /// (their quotient), format, scans, odometry (names; of logs that tell), notes
-/// [text]}, tracking {pieces, loose [{begin, end, why}]}, and where there were
-/// several logs [{input, trajectory, scans, map, parts, agreeing,
+/// [text]}, tracking {pieces, loose [{begin, end, why}]}, where the outputs
+/// were moved alignment {kind, x, y, theta_deg} (m and degrees), and where
+/// there were several logs [{input, trajectory, scans, map, parts, agreeing,
 /// contradicting, why_apart (or null)}]. Numbers that are not finite become
 /// null.
 void WriteSummary(const Summary& summary, std::ostream& output);

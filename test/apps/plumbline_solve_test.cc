@@ -442,6 +442,112 @@ TEST_F(SolveTest, Office) {
 }
 
 // Whatever the number of threads.
+// All files in the frame of the building, and nothing else about them changed.
+TEST_F(SolveTest, AlignedToTheBuilding) {
+  std::string output;
+  const std::string outputs =
+      "--outputs=trajectory.tum,map.json,occupancy.pgm,floorplan.geojson,"
+      "rooms.csv,report.html ";
+  ASSERT_EQ(Solve(office_, "plain", outputs, &output), 0) << output;
+  ASSERT_EQ(Solve(office_, "aligned", outputs + "--align=building", &output), 0)
+      << output;
+  EXPECT_FALSE(SummaryOf("plain").contains("alignment"));
+  const auto summary = SummaryOf("aligned");
+  const auto& alignment = summary["alignment"];
+  EXPECT_EQ(alignment["kind"], "building");
+  const Pose2 by(alignment["x"], alignment["y"],
+                 DegToRad(alignment["theta_deg"].get<double>()));
+  EXPECT_LE(std::abs(by[2]), DegToRad(45.0) + 1e-9);
+  EXPECT_EQ(summary["cost"], SummaryOf("plain")["cost"]);
+
+  const auto poses = [&](const std::string& out) {
+    return ReadTum((folder_ / out / "trajectory.tum").string());
+  };
+  const std::vector<TimedPose> plain = poses("plain");
+  const std::vector<TimedPose> aligned = poses("aligned");
+  ASSERT_EQ(plain.size(), aligned.size());
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    const Pose2 expected = Compose(by, plain[i].pose);
+    EXPECT_LT((aligned[i].pose - expected).head<2>().norm(), 2e-6);
+    EXPECT_NEAR(NormalizeAngle(aligned[i].pose[2] - expected[2]), 0.0, 2e-6);
+  }
+
+  const auto read = [&](const std::string& out, Graph* graph) {
+    std::istringstream text(Out(out, "map.json"));
+    ReadGraphJson(text, "map.json", registry_, graph);
+  };
+  Graph before, after;
+  read("plain", &before);
+  read("aligned", &after);
+  ASSERT_EQ(before.num_features(), after.num_features());
+  double squared = 0.0;
+  double length = 0.0;
+  for (const Feature* feature : after.Features()) {
+    if (feature->type->name != "segment") continue;
+    const Feature& other = before.GetFeature(feature->id);
+    const Pose2 expected =
+        Compose(by, Eigen::Vector3d(other.parameters[0], other.parameters[1],
+                                    other.parameters[2]));
+    EXPECT_NEAR(feature->parameters[0], expected[0], 1e-6);
+    EXPECT_NEAR(feature->parameters[1], expected[1], 1e-6);
+    const double extent = feature->extent_end - feature->extent_begin;
+    const double off = std::abs(WrapAngle(feature->parameters[2], 0.5 * kPi));
+    length += extent;
+    squared += off < DegToRad(1.0) ? extent : 0.0;
+  }
+  // But for a wing at 30 degrees, the building is at right angles.
+  EXPECT_GT(squared, 0.7 * length);
+
+  // The plan lies where the map does, and has as many rooms.
+  const auto plan = [&](const std::string& out) {
+    return nlohmann::json::parse(Out(out, "floorplan.geojson"));
+  };
+  std::map<std::string, int> kinds, plain_kinds;
+  for (const auto& feature : plan("plain")["features"]) {
+    ++plain_kinds[feature["properties"].value("kind", "")];
+  }
+  double low = 1e9;
+  for (const auto& feature : plan("aligned")["features"]) {
+    const std::string kind = feature["properties"].value("kind", "");
+    ++kinds[kind];
+    if (kind != "face") continue;
+    for (const auto& position : feature["geometry"]["coordinates"]) {
+      low =
+          std::min({low, position[0].get<double>(), position[1].get<double>()});
+    }
+  }
+  EXPECT_GE(low, -0.01);
+  EXPECT_EQ(kinds["room"], plain_kinds["room"]);
+  EXPECT_EQ(kinds["face"], plain_kinds["face"]);
+
+  const auto errors = [&](const std::string& out) {
+    const std::string evaluate =
+        std::string(PLUMBLINE_BIN_DIR) + "/plumbline_evaluate";
+    const std::string folder = (folder_ / out).string();
+    const std::string datasets =
+        std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/";
+    std::string printed;
+    EXPECT_EQ(RunInShell(evaluate + " --trajectory='" + folder +
+                             "/trajectory.tum' --truth=" + datasets +
+                             "office.truth.json --map='" + folder +
+                             "/map.json' --output='" + folder + "/errors.json'",
+                         &printed),
+              0)
+        << printed;
+    return nlohmann::json::parse(Out(out, "errors.json"));
+  };
+  if (std::ifstream(std::string(PLUMBLINE_BIN_DIR) + "/plumbline_evaluate")) {
+    const auto a = errors("plain").flatten();
+    const auto b = errors("aligned").flatten();
+    for (const auto& [key, value] : a.items()) {
+      // How the trajectory was moved onto the truth is another matter.
+      if (!value.is_number() || key.find("/alignment/") != key.npos) continue;
+      ASSERT_TRUE(b.contains(key)) << key;
+      EXPECT_NEAR(b[key].get<double>(), value.get<double>(), 1e-5) << key;
+    }
+  }
+}
+
 TEST_F(SolveTest, SameBytesEveryTime) {
   const std::string log = Write("office.log", Join(OfficeLines(300)));
   std::string output;

@@ -1,0 +1,118 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/outputs/building_frame.h>
+#include <plumbline/outputs/floor_plan.h>
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double kQuarterTurn = 0.5 * kPi;
+
+// Of the walls that share it, or of the longest one; none without walls.
+std::optional<double> MainDirection(const FloorPlan& plan) {
+  if (!plan.directions.empty()) return plan.directions.front();
+  double longest = 0.0;
+  std::optional<double> direction;
+  for (const FloorPlanWall& wall : plan.walls) {
+    const Vector2d along = wall.end - wall.begin;
+    if (along.norm() <= longest) continue;
+    longest = along.norm();
+    direction = std::atan2(along[1], along[0]);
+  }
+  return direction;
+}
+
+}  // namespace
+
+Pose2 BuildingFrame(const Graph& graph, const std::vector<Pose2>& path) {
+  const FloorPlan plan = MakeFloorPlan(graph, path);
+  const std::optional<double> direction = MainDirection(plan);
+  if (!direction || plan.walls.empty()) return Pose2::Zero();
+  Pose2 frame = Pose2::Zero();
+  frame[2] = -WrapAngle(*direction, kQuarterTurn);
+  const PoseTransform turn(frame);
+  Vector2d low = turn.Point(plan.walls.front().begin);
+  const auto take = [&](const Vector2d& point) {
+    low = low.cwiseMin(turn.Point(point));
+  };
+  for (const FloorPlanWall& wall : plan.walls) {
+    take(wall.begin);
+    take(wall.end);
+  }
+  for (const Pose2& pose : plan.path) take(pose.head<2>());
+  frame.head<2>() = -low;
+  return frame;
+}
+
+Feature Moved(const Pose2& by, Feature feature) {
+  const FeatureType& type = *feature.type;
+  const auto turn = [&](int i) {
+    double& angle = feature.parameters[static_cast<std::size_t>(i)];
+    angle = NormalizeAngle(angle + by[2]);
+  };
+  const auto move = [&](double* x) {
+    const Vector2d point = TransformPoint(by, {x[0], x[1]});
+    x[0] = point[0];
+    x[1] = point[1];
+  };
+  if (type.anchor_size == 2) move(feature.anchor.data());
+  if (type.HasPosition()) {
+    move(feature.data());
+    if (type.traits.leading == Leading::kFrame) turn(2);
+    return feature;
+  }
+  for (int i = 0; i < type.size; ++i) {
+    if (type.parameters[static_cast<std::size_t>(i)].is_angle) {
+      turn(i);
+    } else if (type.anchor_size != 2) {
+      throw Error("feature " + std::to_string(feature.id), 0,
+                  "a " + type.name +
+                      " cannot be moved: what its parameters refer to is not "
+                      "known",
+                  "types that begin with a position, refer to an anchor, or "
+                  "are angles");
+    }
+  }
+  return feature;
+}
+
+std::unique_ptr<Graph> Moved(const Pose2& by, const Graph& graph) {
+  std::vector<Feature> features;
+  features.reserve(graph.num_features());
+  for (const Feature* feature : graph.Features()) {
+    features.push_back(Moved(by, *feature));
+  }
+  std::vector<Constraint> constraints;
+  constraints.reserve(graph.num_constraints());
+  for (const Constraint* constraint : graph.Constraints()) {
+    if (constraint->features.size() == 1 &&
+        constraint->state == ConstraintState::kLive) {
+      throw Error("constraint " + std::to_string(constraint->id), 0,
+                  "a " + constraint->type->name +
+                      " ties a feature to the map frame, which cannot move",
+                  "relations between features only");
+    }
+    constraints.push_back(*constraint);
+  }
+  auto moved = std::make_unique<Graph>();
+  moved->Restore(std::move(features), std::move(constraints),
+                 graph.feature_id_end(), graph.constraint_id_end());
+  return moved;
+}
+
+MapWithoutStructure Moved(const Pose2& by, MapWithoutStructure map) {
+  for (auto& [id, feature] : map.features) {
+    feature = Moved(by, std::move(feature));
+  }
+  for (Pose2& pose : map.path) pose = Compose(by, pose);
+  return map;
+}
+
+}  // namespace plumbline

@@ -85,6 +85,22 @@ double KnownShare(const ScanAgreement& a) {
   return static_cast<double>(known) / std::max(1, known + a.unknown);
 }
 
+// Chi-square of what a match leaves the prior by.
+double SquaredInnovation(const MatchResult& match, const MatchPrior& prior) {
+  Eigen::Vector3d left = match.pose - prior.pose;
+  left[2] = NormalizeAngle(left[2]);
+  return left.dot(prior.information * left);
+}
+
+// From the parent frame's axes to the pose's.
+Eigen::Matrix3d RotationInto(const Pose2& pose) {
+  const double c = std::cos(pose[2]);
+  const double s = std::sin(pose[2]);
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  rotation.topLeftCorner<2, 2>() << c, s, -s, c;
+  return rotation;
+}
+
 // How much of a scan the reference explains, at most 1.
 double Quality(const ScanAgreement& a) {
   return (a.hits * (1.0 - SeenThrough(a)) - 2.0 * a.intruders) /
@@ -137,8 +153,10 @@ void OdometryRefiner::RebuildReference(Track* track) {
 
 MatchResult OdometryRefiner::MatchPoints(const std::vector<ScanPoint>& points,
                                          const MatchPrior& prior,
-                                         double distance, double turn) {
+                                         const Pose2& motion) {
   const ScanMatcher& matcher = track_.matcher;
+  const double distance = motion.head<2>().norm();
+  const double turn = std::abs(motion[2]);
   MatchResult match = matcher.Refine(points, prior.pose, prior);
   if (match.inlier_ratio < options_.good_inlier_ratio ||
       turn > options_.search_turn) {
@@ -172,132 +190,152 @@ std::vector<ScanPoint> OdometryRefiner::WithoutClutter(const Scan& scan) const {
   return standing;
 }
 
+MatchPrior OdometryRefiner::PriorOf(const Pose2& pose,
+                                    const Pose2& motion) const {
+  MatchPrior prior;
+  prior.pose = pose;
+  // What was not matched since adds up.
+  const Pose2 unmatched = track_.refused == 0
+                              ? motion
+                              : Pose2(motion.head<2>().norm() + track_.way, 0.0,
+                                      std::abs(motion[2]) + track_.turn);
+  prior.information = OdometryCovariance(unmatched, options_.noise).inverse();
+  return prior;
+}
+
+void OdometryRefiner::MatchWithoutClutter(const Scan& scan,
+                                          const MatchPrior& prior,
+                                          const Pose2& motion,
+                                          MatchResult* match) {
+  std::vector<ScanPoint> standing = WithoutClutter(scan);
+  if (standing.empty()) return;
+  const MatchResult other = MatchPoints(standing, prior, motion);
+  const Pose2 apart = Between(match->pose, other.pose);
+  if (other.inlier_ratio >= options_.minimum_inlier_ratio &&
+      other.inliers >= options_.minimum_points &&
+      (apart.head<2>().norm() > options_.clutter_distance ||
+       std::abs(apart[2]) > options_.clutter_rotation)) {
+    *match = other;
+    points_ = std::move(standing);
+    track_.moving = options_.clutter_memory;
+    if (trace_) trace_("without clutter");
+  }
+}
+
+void OdometryRefiner::MatchWithoutIntruders(const std::vector<bool>& intruders,
+                                            const MatchPrior& prior,
+                                            const Eigen::Vector2d& laser,
+                                            MatchResult* match,
+                                            ScanAgreement* here) const {
+  std::vector<ScanPoint> standing;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!intruders[i]) standing.push_back(points_[i]);
+  }
+  const MatchResult other = track_.matcher.Refine(standing, prior.pose, prior);
+  const ScanAgreement agreement =
+      track_.matcher.Compare(points_, other.pose, laser);
+  if (Quality(agreement) >= Quality(*here)) {
+    *match = other;
+    *here = agreement;
+  }
+}
+
+bool OdometryRefiner::Contradicts(const ScanAgreement& agreement,
+                                  double seen_through) const {
+  const TrackingOptions& tracking = options_.tracking;
+  const double most = track_.after_gap ? tracking.max_intruders_after_gap
+                                       : tracking.max_intruders;
+  const double through = track_.after_gap ? tracking.max_seen_through_after_gap
+                                          : tracking.max_seen_through;
+  return (agreement.intruders >= kLeastIntruders &&
+          agreement.intruders >
+              most * (agreement.hits + agreement.intruders)) ||
+         (agreement.seen_through >= kLeastSeenThrough &&
+          SeenThrough(agreement) > through + seen_through);
+}
+
+bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
+                                 double innovation, MatchResult* match,
+                                 Outcome* outcome) const {
+  const TrackingOptions& tracking = options_.tracking;
+  const bool agrees = innovation <= tracking.max_innovation;
+  const Eigen::Vector2d laser = scan.laser_offset.head<2>();
+  std::vector<bool> intruders;
+  const ScanAgreement there =
+      track_.matcher.Compare(points_, prior.pose, laser, &intruders);
+  ScanAgreement here = track_.matcher.Compare(points_, match->pose, laser);
+  // What moves is not what stands: without what has come into the way the scan
+  // may speak for odometry.
+  if (there.intruders >= kLeastIntruders && !track_.after_gap) {
+    MatchWithoutIntruders(intruders, prior, laser, match, &here);
+  }
+  // What contradicted the scan before already is no news.
+  const double before = track_.after_gap
+                            ? SeenThrough(track_.matcher.Compare(
+                                  track_.last_points, track_.last_pose, laser))
+                            : 0.0;
+  const double ratio =
+      match->inlier_ratio / std::max(kLeastKnown, KnownShare(here));
+  // After a gap a match must be better.
+  const double least = !track_.after_gap ? options_.minimum_inlier_ratio
+                       : agrees          ? tracking.min_ratio_after_gap
+                                         : options_.good_inlier_ratio;
+  const bool believed =
+      ratio >= least && match->inliers >= options_.minimum_points &&
+      (agrees || here.hits >= tracking.min_hits) &&
+      !((track_.after_gap || !agrees) && Contradicts(here, before));
+  if (!believed && (track_.after_gap || Contradicts(there, before))) {
+    outcome->verdict = Outcome::Verdict::kContradicted;
+    outcome->why = track_.after_gap
+                       ? "scans are missing and the next one does not fit"
+                       : "what the robot sees contradicts what it saw before";
+  }
+  outcome->seen_through = before;
+  if (trace_) {
+    char text[256];
+    std::snprintf(text, sizeof text,
+                  "%s gap %d ratio %.2f/%.2f n %d chi %.1f hits %d intr %d "
+                  "unk %d seen %d thr %d before %.2f refused %d",
+                  believed               ? "believed"
+                  : outcome->why.empty() ? "odometry"
+                                         : "contra",
+                  static_cast<int>(track_.after_gap), match->inlier_ratio,
+                  ratio, match->inliers, innovation, here.hits, here.intruders,
+                  here.unknown, here.seen, here.seen_through, before,
+                  track_.refused);
+    trace_(text);
+  }
+  return believed;
+}
+
 OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
                                                 const Pose2& motion) {
-  const TrackingOptions& tracking = options_.tracking;
-  Track& track = track_;
-  const Eigen::Matrix3d motion_covariance =
-      OdometryCovariance(motion, options_.noise);
-  const Pose2 key_pose = track.keys.back().pose;
-  const double turn = std::abs(motion[2]);
-  const double distance = motion.head<2>().norm();
-
   Outcome outcome;
   RefinedScan& result = outcome.refined;
-  result.since_key = Compose(track.since_key, {motion, motion_covariance});
-  result.pose = Compose(track.last_pose, motion);
+  result.since_key = Compose(
+      track_.since_key, {motion, OdometryCovariance(motion, options_.noise)});
+  result.pose = Compose(track_.last_pose, motion);
   result.odometry_only = true;
-  if (!options_.match_scans || track.matcher.empty() ||
+  if (!options_.match_scans || track_.matcher.empty() ||
       static_cast<int>(points_.size()) < options_.minimum_points) {
     return outcome;
   }
-  MatchPrior prior;
-  prior.pose = result.pose;
-  // What was not matched since adds up.
-  prior.information = track.refused == 0
-                          ? motion_covariance.inverse()
-                          : OdometryCovariance(Pose2(distance + track.way, 0.0,
-                                                     turn + track.turn),
-                                               options_.noise)
-                                .inverse();
-  MatchResult match = MatchPoints(points_, prior, distance, turn);
-  if (track.moving > 0) --track.moving;
-  Eigen::Vector3d left = match.pose - prior.pose;
-  left[2] = NormalizeAngle(left[2]);
-  if (track.moving > 0 || match.inlier_ratio < options_.good_inlier_ratio ||
-      left.dot(prior.information * left) > options_.clutter_innovation) {
-    // What may move is not what stands: where it speaks for another pose than
-    // the rest, the rest counts.
-    std::vector<ScanPoint> standing = WithoutClutter(scan);
-    if (!standing.empty()) {
-      const MatchResult other = MatchPoints(standing, prior, distance, turn);
-      const Pose2 apart = Between(match.pose, other.pose);
-      if (other.inlier_ratio >= options_.minimum_inlier_ratio &&
-          other.inliers >= options_.minimum_points &&
-          (apart.head<2>().norm() > options_.clutter_distance ||
-           std::abs(apart[2]) > options_.clutter_rotation)) {
-        match = other;
-        points_ = std::move(standing);
-        track.moving = options_.clutter_memory;
-        if (trace_) trace_("without clutter");
-      }
-    }
+  const MatchPrior prior = PriorOf(result.pose, motion);
+  MatchResult match = MatchPoints(points_, prior, motion);
+  // What may move is not what stands: where it speaks for another pose than the
+  // rest, the rest counts.
+  if (track_.moving > 0) --track_.moving;
+  if (track_.moving > 0 || match.inlier_ratio < options_.good_inlier_ratio ||
+      SquaredInnovation(match, prior) > options_.clutter_innovation) {
+    MatchWithoutClutter(scan, prior, motion, &match);
   }
   bool believed = match.inlier_ratio >= options_.good_inlier_ratio;
-  Eigen::Vector3d innovation = match.pose - prior.pose;
-  innovation[2] = NormalizeAngle(innovation[2]);
-  const double squared = innovation.dot(prior.information * innovation);
-  const bool agrees = squared <= tracking.max_innovation;
+  const double innovation = SquaredInnovation(match, prior);
   // Few returns fit in many places.
   const bool sees_little = 2 * points_.size() < scan.ranges.size();
-  if (!believed || track.after_gap || (sees_little && !agrees)) {
-    const Eigen::Vector2d laser = scan.laser_offset.head<2>();
-    std::vector<bool> intruders;
-    ScanAgreement there =
-        track.matcher.Compare(points_, prior.pose, laser, &intruders);
-    ScanAgreement here = track.matcher.Compare(points_, match.pose, laser);
-    if (there.intruders >= kLeastIntruders && !track.after_gap) {
-      // What moves is not what stands: without what has come into the way the
-      // scan may speak for odometry.
-      std::vector<ScanPoint> standing;
-      for (std::size_t i = 0; i < points_.size(); ++i) {
-        if (!intruders[i]) standing.push_back(points_[i]);
-      }
-      const MatchResult other =
-          track.matcher.Refine(standing, prior.pose, prior);
-      const ScanAgreement agreement =
-          track.matcher.Compare(points_, other.pose, laser);
-      if (Quality(agreement) >= Quality(here)) {
-        match = other;
-        here = agreement;
-      }
-    }
-    // What contradicted the scan before already is no news.
-    const double before = track.after_gap
-                              ? SeenThrough(track.matcher.Compare(
-                                    track.last_points, track.last_pose, laser))
-                              : 0.0;
-    const auto contradicts = [&](const ScanAgreement& a) {
-      const double most = track.after_gap ? tracking.max_intruders_after_gap
-                                          : tracking.max_intruders;
-      const double through = track.after_gap
-                                 ? tracking.max_seen_through_after_gap
-                                 : tracking.max_seen_through;
-      return (a.intruders >= kLeastIntruders &&
-              a.intruders > most * (a.hits + a.intruders)) ||
-             (a.seen_through >= kLeastSeenThrough &&
-              SeenThrough(a) > through + before);
-    };
-    const double ratio =
-        match.inlier_ratio / std::max(kLeastKnown, KnownShare(here));
-    // After a gap a match must be better.
-    const double least = !track.after_gap ? options_.minimum_inlier_ratio
-                         : agrees         ? tracking.min_ratio_after_gap
-                                          : options_.good_inlier_ratio;
-    believed = ratio >= least && match.inliers >= options_.minimum_points &&
-               (agrees || here.hits >= tracking.min_hits) &&
-               !((track.after_gap || !agrees) && contradicts(here));
-    if (!believed && (track.after_gap || contradicts(there))) {
-      outcome.verdict = Outcome::Verdict::kContradicted;
-      outcome.why = track.after_gap
-                        ? "scans are missing and the next one does not fit"
-                        : "what the robot sees contradicts what it saw before";
-    }
-    outcome.seen_through = before;
-    if (trace_) {
-      char text[256];
-      std::snprintf(text, sizeof text,
-                    "%s gap %d ratio %.2f/%.2f n %d chi %.1f hits %d intr %d "
-                    "unk %d seen %d thr %d before %.2f refused %d",
-                    believed              ? "believed"
-                    : outcome.why.empty() ? "odometry"
-                                          : "contra",
-                    static_cast<int>(track.after_gap), match.inlier_ratio,
-                    ratio, match.inliers, squared, here.hits, here.intruders,
-                    here.unknown, here.seen, here.seen_through, before,
-                    track.refused);
-      trace_(text);
-    }
+  if (!believed || track_.after_gap ||
+      (sees_little && innovation > options_.tracking.max_innovation)) {
+    believed = StandsUpTo(scan, prior, innovation, &match, &outcome);
   }
   if (!believed) {
     ++refusals_;
@@ -306,14 +344,11 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   outcome.verdict = Outcome::Verdict::kBelieved;
   result.pose = match.pose;
   result.odometry_only = false;
+  const Pose2 key_pose = track_.keys.back().pose;
   result.since_key.mean = Between(key_pose, match.pose);
-  // From the refined frame's axes to the key scan's.
-  const double c = std::cos(key_pose[2]);
-  const double s = std::sin(key_pose[2]);
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  rotation.topLeftCorner<2, 2>() << c, s, -s, c;
   // What the returns leave open is as uncertain as all the odometry since
   // the key scan, not as that of the last step alone.
+  const Eigen::Matrix3d rotation = RotationInto(key_pose);
   result.since_key.covariance =
       (rotation * match.information * rotation.transpose() +
        result.since_key.covariance.inverse())
@@ -322,36 +357,9 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   return outcome;
 }
 
-RefinedScan OdometryRefiner::Process(const Scan& scan) {
-  ExtractScanPoints(scan, options_.points, &points_);
-  const int index = count_++;
-  const Eigen::Vector2d laser = scan.laser_offset.head<2>();
-  SettledScan done;
-  done.index = index;
-  RefinedScan& result = done.refined;
-  if (!started_) {
-    started_ = true;
-    result.pose = scan.odometry;
-    result.is_key = true;
-    last_odometry_ = scan.odometry;
-    last_time_ = scan.timestamp;
-    track_.last_pose = scan.odometry;
-    track_.last_points = points_;
-    track_.keys.push_back({index, scan.odometry, points_, laser});
-    RebuildReference(&track_);
-    Archive(track_.keys.back());
-    done.points = points_;
-    settled_.push_back(done);
-    return result;
-  }
-
-  const TrackingOptions& tracking = options_.tracking;
-  const Pose2 motion = Between(last_odometry_, scan.odometry);
-  const double seconds = scan.timestamp - last_time_;
-  last_odometry_ = scan.odometry;
-  last_time_ = scan.timestamp;
-  if (seconds > tracking.gap_seconds &&
-      seconds > tracking.gap_factor * usual_step_) {
+void OdometryRefiner::NoteGap(double seconds) {
+  if (seconds > options_.tracking.gap_seconds &&
+      seconds > options_.tracking.gap_factor * usual_step_) {
     track_.after_gap = true;
   }
   if (seconds > 0.0) {
@@ -359,145 +367,178 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
                       ? seconds
                       : usual_step_ + kUsualShare * (seconds - usual_step_);
   }
-  if (open_ != nullptr) {
-    open_->way += motion.head<2>().norm();
-    open_->seconds += std::max(0.0, seconds);
-  }
+}
 
-  Outcome outcome = Match(scan, motion);
-  result = outcome.refined;
-  const double way = motion.head<2>().norm();
-  const double turn = std::abs(motion[2]);
+void OdometryRefiner::NoteMatch(const Outcome& outcome, const Pose2& motion) {
   if (outcome.verdict == Outcome::Verdict::kBelieved) {
     track_.way = 0.0;
     track_.turn = 0.0;
     track_.refused = 0;
     track_.after_gap = false;
   } else if (options_.match_scans) {
-    track_.way += way;
-    track_.turn += turn;
+    track_.way += motion.head<2>().norm();
+    track_.turn += std::abs(motion[2]);
     ++track_.refused;
-    // One scan that contradicts may be a door or a person: without a gap in
-    // the log it takes several in a row.
-    const bool contradicted =
-        outcome.verdict == Outcome::Verdict::kContradicted &&
-        (track_.after_gap || track_.refused >= tracking.min_contradictions);
-    if (contradicted || track_.way > tracking.max_blind_way ||
-        track_.turn > tracking.max_blind_turn) {
-      if (trace_) trace_("LOST " + outcome.why);
-      const UncertainPose2 since_key = result.since_key;
-      const Pose2 pose = result.pose;
-      const double blind_way = track_.way;
-      const bool tiny =
-          open_ != nullptr &&
-          static_cast<int>(open_->keys.size()) < tracking.min_tie_keys &&
-          pending_.size() < kMostPending;
-      if (open_ != nullptr && !tiny) Tie(true);
-      ++losses_;
-      if (open_ == nullptr) {
-        open_ = std::make_unique<OpenTie>(std::move(track_));
-        open_->last_sure = index - open_->before.refused;
-        open_->why = outcome.why.empty()
-                         ? "nothing that the robot saw could be matched"
-                         : outcome.why;
-        open_->way = blind_way;
-        open_->seconds = std::max(0.0, seconds);
-        // The scans that were refused are settled already.
-      } else {
-        // What has been tracked since is too little to be a track.
-        for (SettledScan& pending : pending_) {
-          pending.refined.is_key = false;
-          pending.refined.odometry_only = true;
-          pending.refined.tie = TrackTie::kNone;
-          pending.refined.since_key = UncertainPose2();
-          pending.refined.since_key.mean =
-              Between(open_->before.keys.back().pose, pending.refined.pose);
-          pending.points.clear();
-        }
-        open_->keys.clear();
-      }
-      open_->seen_through = outcome.seen_through;
-      open_->odometry_holds = open_->odometry_holds && !contradicted;
-      open_->first = index;
-      open_->next_attempt = tracking.min_tie_keys;
-      open_->next_global = tracking.first_global_keys;
-      track_ = Track(options_.matcher);
-      result = RefinedScan();
-      result.pose = pose;
-      result.since_key = since_key;
-      result.is_key = true;
-      result.odometry_only = true;
-      track_.last_pose = pose;
-      track_.last_points = points_;
-      track_.keys.push_back({index, pose, points_, laser});
-      RebuildReference(&track_);
-      open_->keys.push_back(track_.keys.back());
-      done.points = points_;
-      pending_.push_back(done);
-      return result;
-    }
   }
+}
 
-  track_.since_key = result.since_key;
-  track_.last_pose = result.pose;
+bool OdometryRefiner::IsContradicted(const Outcome& outcome) const {
+  // One scan that contradicts may be a door or a person: without a gap in
+  // the log it takes several in a row.
+  return outcome.verdict == Outcome::Verdict::kContradicted &&
+         (track_.after_gap ||
+          track_.refused >= options_.tracking.min_contradictions);
+}
+
+bool OdometryRefiner::IsLost(const Outcome& outcome) const {
+  if (outcome.verdict == Outcome::Verdict::kBelieved || !options_.match_scans) {
+    return false;
+  }
+  return IsContradicted(outcome) ||
+         track_.way > options_.tracking.max_blind_way ||
+         track_.turn > options_.tracking.max_blind_turn;
+}
+
+void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
+  const TrackingOptions& tracking = options_.tracking;
+  if (trace_) trace_("LOST " + outcome.why);
+  const double blind_way = track_.way;
+  const bool contradicted = IsContradicted(outcome);
+  const bool tiny =
+      open_ != nullptr &&
+      static_cast<int>(open_->keys.size()) < tracking.min_tie_keys &&
+      pending_.size() < kMostPending;
+  if (open_ != nullptr && !tiny) Tie(true);
+  ++losses_;
+  if (open_ == nullptr) {
+    // The scans that were refused are settled already.
+    open_ = std::make_unique<OpenTie>(std::move(track_));
+    open_->last_sure = scan - open_->before.refused;
+    open_->why = outcome.why.empty()
+                     ? "nothing that the robot saw could be matched"
+                     : outcome.why;
+    open_->way = blind_way;
+    open_->seconds = std::max(0.0, seconds);
+  } else {
+    // What has been tracked since is too little to be a track.
+    for (SettledScan& pending : pending_) {
+      pending.refined.is_key = false;
+      pending.refined.odometry_only = true;
+      pending.refined.tie = TrackTie::kNone;
+      pending.refined.since_key = UncertainPose2();
+      pending.refined.since_key.mean =
+          Between(open_->before.keys.back().pose, pending.refined.pose);
+      pending.points.clear();
+    }
+    open_->keys.clear();
+  }
+  open_->seen_through = outcome.seen_through;
+  open_->odometry_holds = open_->odometry_holds && !contradicted;
+  open_->first = scan;
+  open_->next_attempt = tracking.min_tie_keys;
+  open_->next_global = tracking.first_global_keys;
+  track_ = Track(options_.matcher);
+}
+
+void OdometryRefiner::BeginTrack(const Scan& scan, SettledScan* first) {
+  RefinedScan& refined = first->refined;
+  refined.is_key = true;
+  first->points = points_;
+  track_.last_pose = refined.pose;
+  track_.last_points = points_;
+  track_.keys.push_back(
+      {first->index, refined.pose, points_, scan.laser_offset.head<2>()});
+  RebuildReference(&track_);
+}
+
+void OdometryRefiner::ContinueTrack(const Scan& scan, SettledScan* next) {
+  RefinedScan& refined = next->refined;
+  track_.since_key = refined.since_key;
+  track_.last_pose = refined.pose;
   track_.last_points = points_;
   const bool moved =
-      result.since_key.mean.head<2>().norm() >= options_.key_distance ||
-      std::abs(result.since_key.mean[2]) >= options_.key_rotation;
+      refined.since_key.mean.head<2>().norm() >= options_.key_distance ||
+      std::abs(refined.since_key.mean[2]) >= options_.key_rotation;
   // A scan that was refused anchors nothing.
-  if (moved && (!result.odometry_only || !options_.match_scans)) {
-    result.is_key = true;
-    done.points = points_;
-    // Where things move, what may move enters no reference.
-    if (track_.moving > 0) {
-      std::vector<ScanPoint> standing = WithoutClutter(scan);
-      if (!standing.empty()) points_ = std::move(standing);
-    }
-    track_.keys.push_back({index, result.pose, points_, laser});
-    while (static_cast<int>(track_.keys.size()) > options_.window) {
-      track_.keys.pop_front();
-    }
-    RebuildReference(&track_);
-    track_.since_key = UncertainPose2();
+  if (!moved || (refined.odometry_only && options_.match_scans)) return;
+  refined.is_key = true;
+  next->points = points_;
+  // Where things move, what may move enters no reference.
+  if (track_.moving > 0) {
+    std::vector<ScanPoint> standing = WithoutClutter(scan);
+    if (!standing.empty()) points_ = std::move(standing);
+  }
+  track_.keys.push_back(
+      {next->index, refined.pose, points_, scan.laser_offset.head<2>()});
+  while (static_cast<int>(track_.keys.size()) > options_.window) {
+    track_.keys.pop_front();
+  }
+  RebuildReference(&track_);
+  track_.since_key = UncertainPose2();
+}
+
+RefinedScan OdometryRefiner::Process(const Scan& scan) {
+  ExtractScanPoints(scan, options_.points, &points_);
+  SettledScan done;
+  done.index = count_++;
+  const Pose2 motion =
+      started_ ? Between(last_odometry_, scan.odometry) : Pose2::Zero();
+  const double seconds = started_ ? scan.timestamp - last_time_ : 0.0;
+  last_odometry_ = scan.odometry;
+  last_time_ = scan.timestamp;
+  if (!started_) {
+    started_ = true;
+    done.refined.pose = scan.odometry;
+    BeginTrack(scan, &done);
+    Archive(track_.keys.back());
+    settled_.push_back(done);
+    return done.refined;
+  }
+
+  NoteGap(seconds);
+  if (open_ != nullptr) {
+    open_->way += motion.head<2>().norm();
+    open_->seconds += std::max(0.0, seconds);
+  }
+  const Outcome outcome = Match(scan, motion);
+  NoteMatch(outcome, motion);
+  done.refined = outcome.refined;
+  const bool is_lost = IsLost(outcome);
+  if (is_lost) {
+    Lose(done.index, seconds, outcome);
+    BeginTrack(scan, &done);
+  } else {
+    ContinueTrack(scan, &done);
   }
   if (open_ == nullptr) {
-    if (result.is_key) Archive(track_.keys.back());
+    if (done.refined.is_key) Archive(track_.keys.back());
     settled_.push_back(done);
-    return result;
+    return done.refined;
   }
   pending_.push_back(done);
-  if (result.is_key) {
-    open_->keys.push_back(track_.keys.back());
+  if (!done.refined.is_key) return done.refined;
+  open_->keys.push_back(track_.keys.back());
+  if (!is_lost) {
     const int keys = static_cast<int>(open_->keys.size());
-    if (keys >= tracking.max_open_keys) {
+    if (keys >= options_.tracking.max_open_keys) {
       Tie(true);
     } else if (keys >= open_->next_attempt) {
       Tie(false);
     }
   }
-  return result;
+  return done.refined;
 }
 
-bool OdometryRefiner::FindTie(
-    const std::vector<KeyScan>& keys, const ScanMatcher& reference,
-    const std::function<std::vector<Visit>(const Pose2&)>& visits,
-    const Pose2& center, double translation_window, std::size_t begin,
-    std::size_t end, double seen_through, bool is_global, Hypothesis* found) {
-  const TrackingOptions& tracking = options_.tracking;
-  const double min_support =
-      is_global ? tracking.min_global_support : tracking.min_tie_support;
-  const double min_inliers =
-      is_global ? tracking.min_global_inliers : tracking.min_tie_inliers;
-  const KeyScan& middle = keys[(begin + end) / 2];
-  // What the track has seen, in the frame of its middle.
-  std::vector<Eigen::Vector2d> sparse;
-  std::vector<ScanPoint> dense;
+OdometryRefiner::TrackView OdometryRefiner::ViewOf(
+    const std::vector<KeyScan>& keys, std::size_t begin, std::size_t end) {
+  TrackView view;
   std::set<std::array<long, 2>> taken;
   std::set<std::array<long, 2>> taken_dense;
-  std::vector<Pose2> relative;
+  const Pose2& middle = keys[(begin + end) / 2].pose;
   for (std::size_t k = begin; k < end; ++k) {
-    relative.push_back(Between(middle.pose, keys[k].pose));
-    const PoseTransform transform(relative.back());
+    view.keys.push_back(&keys[k]);
+    view.relative.push_back(Between(middle, keys[k].pose));
+    const PoseTransform transform(view.relative.back());
     for (const ScanPoint& point : keys[k].points) {
       const ScanPoint moved = Moved(point, transform);
       const auto cell = [&](double spacing) {
@@ -505,68 +546,91 @@ bool OdometryRefiner::FindTie(
                                    std::lround(moved.position.y() / spacing)};
       };
       if (taken.insert(cell(kSearchSpacing)).second) {
-        sparse.push_back(moved.position);
+        view.sparse.push_back(moved.position);
       }
       if (moved.normal.squaredNorm() > 0.0 &&
           taken_dense.insert(cell(kArchiveSpacing)).second) {
-        dense.push_back(moved);
+        view.dense.push_back(moved);
       }
     }
   }
+  return view;
+}
+
+bool OdometryRefiner::Judge(const TrackView& view, const ScoredPose& peak,
+                            const Visit& visit, double seen_through,
+                            bool is_global, Hypothesis* hypothesis) const {
+  const TrackingOptions& tracking = options_.tracking;
+  MatchPrior none;
+  none.pose = peak.pose;
+  const MatchResult match = visit.matcher->Refine(view.dense, peak.pose, none);
+  const Pose2 moved = Between(peak.pose, match.pose);
+  // Nothing there to hold it.
+  if (moved.head<2>().norm() > ScanMatcher::kPeakDistance ||
+      std::abs(moved[2]) > ScanMatcher::kPeakRotation) {
+    return false;
+  }
+  hypothesis->pose = match.pose;
+  hypothesis->information = match.information;
+  hypothesis->begin = visit.begin;
+  hypothesis->end = visit.end;
+  ScanAgreement sum;
+  for (std::size_t k = 0; k < view.keys.size(); ++k) {
+    const ScanAgreement a = visit.matcher->Compare(
+        view.keys[k]->points, Compose(match.pose, view.relative[k]),
+        view.keys[k]->laser);
+    sum.hits += a.hits;
+    sum.intruders += a.intruders;
+    sum.unknown += a.unknown;
+    sum.seen += a.seen;
+    sum.seen_through += a.seen_through;
+  }
+  const double min_support =
+      is_global ? tracking.min_global_support : tracking.min_tie_support;
+  const double min_inliers =
+      is_global ? tracking.min_global_inliers : tracking.min_tie_inliers;
+  const double inliers =
+      match.inlier_ratio / std::max(kLeastKnown, KnownShare(sum));
+  hypothesis->quality = Quality(sum) * std::min(1.0, inliers);
+  hypothesis->holds =
+      peak.score >= tracking.min_tie_score &&
+      sum.hits >= min_support * (sum.hits + sum.intruders) &&
+      inliers >= min_inliers &&
+      SeenThrough(sum) <= tracking.max_tie_seen_through + seen_through &&
+      KnownShare(sum) >= tracking.min_tie_known &&
+      sum.hits >= tracking.min_tie_hits * static_cast<int>(view.keys.size());
+  if (trace_) {
+    char text[256];
+    std::snprintf(text, sizeof text,
+                  "  peak %.2f visit %d-%d -> %.2f %.2f %.1f ratio %.2f "
+                  "hits %d intr %d unk %d seen %d thr %d q %.3f holds %d",
+                  peak.score, static_cast<int>(visit.begin),
+                  static_cast<int>(visit.end), match.pose[0], match.pose[1],
+                  RadToDeg(match.pose[2]), match.inlier_ratio, sum.hits,
+                  sum.intruders, sum.unknown, sum.seen, sum.seen_through,
+                  hypothesis->quality, static_cast<int>(hypothesis->holds));
+    trace_(text);
+  }
+  return true;
+}
+
+bool OdometryRefiner::FindTie(
+    const std::vector<KeyScan>& keys, const ScanMatcher& reference,
+    const std::function<std::vector<Visit>(const Pose2&)>& visits,
+    const Pose2& center, double translation_window, std::size_t begin,
+    std::size_t end, double seen_through, bool is_global, Hypothesis* found) {
+  const TrackView view = ViewOf(keys, begin, end);
   const std::vector<ScoredPose> peaks = reference.Peaks(
-      sparse, center, translation_window, kPi, kLeastScore, kPeakShare, kPeaks,
+      view.sparse, center, translation_window, kPi, kLeastScore, kPeakShare,
+      kPeaks,
       is_global ? kNearArchive : std::numeric_limits<double>::infinity());
   std::vector<Hypothesis> hypotheses;
   for (const ScoredPose& peak : peaks) {
-    MatchPrior none;
-    none.pose = peak.pose;
     for (const Visit& visit : visits(peak.pose)) {
-      const MatchResult match = visit.matcher->Refine(dense, peak.pose, none);
-      const Pose2 moved = Between(peak.pose, match.pose);
-      // Nothing there to hold it.
-      if (moved.head<2>().norm() > ScanMatcher::kPeakDistance ||
-          std::abs(moved[2]) > ScanMatcher::kPeakRotation) {
-        continue;
-      }
       Hypothesis hypothesis;
-      hypothesis.pose = match.pose;
-      hypothesis.information = match.information;
-      hypothesis.begin = visit.begin;
-      hypothesis.end = visit.end;
-      ScanAgreement sum;
-      for (std::size_t k = begin; k < end; ++k) {
-        const ScanAgreement a = visit.matcher->Compare(
-            keys[k].points, Compose(match.pose, relative[k - begin]),
-            keys[k].laser);
-        sum.hits += a.hits;
-        sum.intruders += a.intruders;
-        sum.unknown += a.unknown;
-        sum.seen += a.seen;
-        sum.seen_through += a.seen_through;
+      if (Judge(view, peak, visit, seen_through, is_global, &hypothesis)) {
+        hypotheses.push_back(hypothesis);
       }
-      const double inliers =
-          match.inlier_ratio / std::max(kLeastKnown, KnownShare(sum));
-      hypothesis.quality = Quality(sum) * std::min(1.0, inliers);
-      hypothesis.holds =
-          peak.score >= tracking.min_tie_score &&
-          sum.hits >= min_support * (sum.hits + sum.intruders) &&
-          inliers >= min_inliers &&
-          SeenThrough(sum) <= tracking.max_tie_seen_through + seen_through &&
-          KnownShare(sum) >= tracking.min_tie_known &&
-          sum.hits >= tracking.min_tie_hits * static_cast<int>(end - begin);
-      if (trace_) {
-        char text[256];
-        std::snprintf(text, sizeof text,
-                      "  peak %.2f visit %d-%d -> %.2f %.2f %.1f ratio %.2f "
-                      "hits %d intr %d unk %d seen %d thr %d q %.3f holds %d",
-                      peak.score, static_cast<int>(visit.begin),
-                      static_cast<int>(visit.end), match.pose[0], match.pose[1],
-                      RadToDeg(match.pose[2]), match.inlier_ratio, sum.hits,
-                      sum.intruders, sum.unknown, sum.seen, sum.seen_through,
-                      hypothesis.quality, static_cast<int>(hypothesis.holds));
-        trace_(text);
-      }
-      hypotheses.push_back(hypothesis);
     }
   }
   const Hypothesis* best = nullptr;
@@ -588,7 +652,9 @@ bool OdometryRefiner::FindTie(
             (same_visit ? ScanMatcher::kPeakRotation : kVisitRotation)) {
       continue;
     }
-    if (rival.quality > tracking.rival_share * best->quality) return false;
+    if (rival.quality > options_.tracking.rival_share * best->quality) {
+      return false;
+    }
   }
   *found = *best;
   return true;
@@ -723,10 +789,7 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
 
 Eigen::Matrix3d OdometryRefiner::TieCovariance(const Hypothesis& found,
                                                const Pose2& from) const {
-  const double c = std::cos(from[2]);
-  const double s = std::sin(from[2]);
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  rotation.topLeftCorner<2, 2>() << c, s, -s, c;
+  const Eigen::Matrix3d rotation = RotationInto(from);
   const Eigen::Matrix3d information =
       rotation * found.information * rotation.transpose() +
       Diagonal(kOpenSigma, kPi).inverse();

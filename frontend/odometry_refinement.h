@@ -333,21 +333,51 @@ class OdometryRefiner {
     int next_attempt = 0;
     int next_global = 0;
   };
+  // What matching says of a scan.
   struct Outcome;
-  struct Agreement;
 
   template <typename Archive>
   void ExchangeState(Archive& archive);
   void RebuildReference(Track* track);
+  // Matches the scan, which odometry moved by `motion` since the one before.
   Outcome Match(const Scan& scan, const Pose2& motion);
+  // The pose by odometry, as uncertain as all odometry since the last match.
+  MatchPrior PriorOf(const Pose2& pose, const Pose2& motion) const;
+  // The best pose of `points` near the prior's.
+  MatchResult MatchPoints(const std::vector<ScanPoint>& points,
+                          const MatchPrior& prior, const Pose2& motion);
   // Returns of the last scan that do not lie on clutter; none when there is
   // little of it.
   std::vector<ScanPoint> WithoutClutter(const Scan& scan) const;
-  // The best pose of `points` near the prior's.
-  MatchResult MatchPoints(const std::vector<ScanPoint>& points,
-                          const MatchPrior& prior, double distance,
-                          double turn);
-  void Lose(const Scan& scan, const std::string& why, bool odometry_holds);
+  // Takes the match of the returns that do not lie on clutter where it is
+  // another one.
+  void MatchWithoutClutter(const Scan& scan, const MatchPrior& prior,
+                           const Pose2& motion, MatchResult* match);
+  // Takes the match of the returns that are no intruders where it agrees with
+  // the reference at least as well as the present one, `here`.
+  void MatchWithoutIntruders(const std::vector<bool>& intruders,
+                             const MatchPrior& prior,
+                             const Eigen::Vector2d& laser, MatchResult* match,
+                             ScanAgreement* here) const;
+  // Whether a match that is not plainly good stands up to what the reference
+  // knows of solid and free space. Otherwise the outcome says if the scan
+  // contradicts the reference. `innovation`: chi-square against the prior.
+  bool StandsUpTo(const Scan& scan, const MatchPrior& prior, double innovation,
+                  MatchResult* match, Outcome* outcome) const;
+  // Whether more is intruding or seen through than may be; `seen_through`:
+  // share that was before.
+  bool Contradicts(const ScanAgreement& agreement, double seen_through) const;
+  // Time since the scan before, s.
+  void NoteGap(double seconds);
+  // Way and turn without a match.
+  void NoteMatch(const Outcome& outcome, const Pose2& motion);
+  bool IsContradicted(const Outcome& outcome) const;
+  bool IsLost(const Outcome& outcome) const;
+  // Opens a tie, or starts the open one again, at this scan.
+  void Lose(int scan, double seconds, const Outcome& outcome);
+  // The first scan of a track, and the ones after it.
+  void BeginTrack(const Scan& scan, SettledScan* first);
+  void ContinueTrack(const Scan& scan, SettledScan* next);
   // Looks for the tie; settles the track when it is found or `last`.
   void Tie(bool last);
   // Scans that a tie is judged by, and where it would hang.
@@ -365,6 +395,20 @@ class OdometryRefiner {
     std::size_t begin = 0;
     std::size_t end = 0;
   };
+  // What key scans of a track have seen, in the frame of their middle.
+  struct TrackView {
+    std::vector<const KeyScan*> keys;
+    std::vector<Pose2> relative;
+    // To search with, and those with normals to match with.
+    std::vector<Eigen::Vector2d> sparse;
+    std::vector<ScanPoint> dense;
+  };
+  static TrackView ViewOf(const std::vector<KeyScan>& keys, std::size_t begin,
+                          std::size_t end);
+  // What a visit says of a pose of the track; false when nothing there holds
+  // it. `seen_through`: share of the reference that was before.
+  bool Judge(const TrackView& view, const ScoredPose& peak, const Visit& visit,
+             double seen_through, bool is_global, Hypothesis* hypothesis) const;
   // The pose of the middle of the open track's key scans [begin, end) that
   // explains them best, if it is clear. `visits` gives what was seen around a
   // pose, each time that the robot was there.

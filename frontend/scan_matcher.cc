@@ -76,6 +76,209 @@ struct Nearest {
   }
 };
 
+// What PeakSearch looks at.
+struct PeakGrid {
+  // By level: the best score of 2^level cells each way from a cell on.
+  const std::vector<std::vector<std::int16_t>>& levels;
+  // Size with the pad, cells.
+  int columns;
+  int rows;
+  // Of the first cell that is not of the pad, m.
+  Eigen::Vector2d origin;
+  double resolution;
+  const std::vector<Viewpoint>& viewpoints;
+};
+
+// Branch and bound over translations and rotations of points on a grid.
+class PeakSearch {
+ public:
+  // `minimum_score`: the least of a peak, of a share of what all points on
+  // surfaces would have.
+  PeakSearch(const PeakGrid& grid, const std::vector<Eigen::Vector2d>& points,
+             const Pose2& center, double translation_window,
+             double rotation_window, double minimum_score)
+      : grid_(grid),
+        center_(center),
+        window_(
+            static_cast<int>(std::ceil(translation_window / grid.resolution))),
+        rotation_window_(rotation_window),
+        unit_(255.0 * static_cast<double>(points.size())),
+        least_(minimum_score * unit_) {
+    double farthest = 1.0;
+    for (const Eigen::Vector2d& point : points) {
+      farthest = std::max(farthest, point.norm());
+    }
+    const double step =
+        std::clamp(kRotationError / farthest, kLeastRotation, kMostRotation);
+    rotations_ = static_cast<int>(std::ceil(rotation_window / step));
+    cells_.resize(2 * rotations_ + 1);
+    for (std::size_t k = 0; k < cells_.size(); ++k) {
+      cells_[k] = CellsAt(points, Angle(static_cast<int>(k)));
+    }
+  }
+
+  // Opens the coarsest nodes of the window that are within `reach`, m, of a
+  // viewpoint.
+  void OpenAll(double reach) {
+    const int stride = 1 << (kLevels - 1);
+    for (int y = -window_; y <= window_; y += stride) {
+      for (int x = -window_; x <= window_; x += stride) {
+        if (!IsNear(x, y, reach)) continue;
+        for (int k = 0; k < static_cast<int>(cells_.size()); ++k) {
+          Open(kLevels - 1, k, x, y);
+        }
+      }
+    }
+  }
+
+  // The peaks, best first, that have `share` of the best one's score.
+  std::vector<ScoredPose> Run(double share, int max_peaks) {
+    std::vector<ScoredPose> peaks;
+    while (!open_.empty() && static_cast<int>(peaks.size()) < max_peaks &&
+           nodes_ < kMaxNodes) {
+      const Node node = open_.top();
+      open_.pop();
+      if (node.bound < least_) break;
+      if (IsBesideAny(node, peaks)) continue;
+      if (node.level == 0) {
+        if (peaks.empty()) least_ = std::max(least_, share * node.bound);
+        peaks.push_back({PoseOf(node), node.bound / unit_});
+      } else {
+        Split(node);
+      }
+    }
+    return peaks;
+  }
+
+ private:
+  struct Cell {
+    int x;
+    int y;
+  };
+  // Translations by [x, x + 2^level) and [y, y + 2^level) cells at one
+  // rotation; none of them scores more than `bound`.
+  struct Node {
+    int bound;
+    int level;
+    int rotation;
+    int x;
+    int y;
+    bool operator<(const Node& other) const {
+      return std::tie(bound, other.level, other.rotation, other.x, other.y) <
+             std::tie(other.bound, level, rotation, x, y);
+    }
+  };
+
+  double Angle(int rotation) const {
+    return center_[2] + (rotations_ > 0 ? (rotation - rotations_) *
+                                              (rotation_window_ / rotations_)
+                                        : 0.0);
+  }
+
+  Pose2 PoseOf(const Node& node) const {
+    return Pose2(center_[0] + node.x * grid_.resolution,
+                 center_[1] + node.y * grid_.resolution,
+                 NormalizeAngle(Angle(node.rotation)));
+  }
+
+  // Cells of the points, the pad included.
+  std::vector<Cell> CellsAt(const std::vector<Eigen::Vector2d>& points,
+                            double angle) const {
+    const double c = std::cos(angle) / grid_.resolution;
+    const double s = std::sin(angle) / grid_.resolution;
+    const Eigen::Vector2d shift =
+        (center_.head<2>() - grid_.origin) / grid_.resolution;
+    std::vector<Cell> cells;
+    cells.reserve(points.size());
+    for (const Eigen::Vector2d& point : points) {
+      const double x = shift.x() + c * point.x() - s * point.y();
+      const double y = shift.y() + s * point.x() + c * point.y();
+      cells.push_back({static_cast<int>(std::floor(x)) + kLevelPad,
+                       static_cast<int>(std::floor(y)) + kLevelPad});
+    }
+    return cells;
+  }
+
+  int Bound(int level, int rotation, int x, int y) const {
+    const std::vector<std::int16_t>& scores = grid_.levels[level];
+    const int columns = grid_.columns;
+    const int rows = grid_.rows;
+    int sum = 0;
+    for (const Cell& cell : cells_[rotation]) {
+      const int column = cell.x + x;
+      const int row = cell.y + y;
+      if (static_cast<unsigned>(column) < static_cast<unsigned>(columns) &&
+          static_cast<unsigned>(row) < static_cast<unsigned>(rows)) {
+        sum += scores[static_cast<std::size_t>(row) * columns + column];
+      }
+    }
+    return sum;
+  }
+
+  void Open(int level, int rotation, int x, int y) {
+    ++nodes_;
+    const int bound = Bound(level, rotation, x, y);
+    if (bound >= least_ && bound > 0) {
+      open_.push({bound, level, rotation, x, y});
+    }
+  }
+
+  void Split(const Node& node) {
+    const int half = 1 << (node.level - 1);
+    for (int y = node.y; y <= std::min(node.y + half, window_); y += half) {
+      for (int x = node.x; x <= std::min(node.x + half, window_); x += half) {
+        Open(node.level - 1, node.rotation, x, y);
+      }
+    }
+  }
+
+  // Whether some pose of a coarsest node may be within reach of a viewpoint.
+  bool IsNear(int x, int y, double reach) const {
+    if (!std::isfinite(reach)) return true;
+    const double half = 0.5 * (1 << (kLevels - 1));
+    // From the middle of a node its corners are so far.
+    const double half_diagonal = std::sqrt(2.0) * half * grid_.resolution;
+    const Eigen::Vector2d middle(center_[0] + (x + half) * grid_.resolution,
+                                 center_[1] + (y + half) * grid_.resolution);
+    return std::any_of(grid_.viewpoints.begin(), grid_.viewpoints.end(),
+                       [&](const Viewpoint& viewpoint) {
+                         return (viewpoint.position - middle).norm() <=
+                                reach + half_diagonal;
+                       });
+  }
+
+  // Whether all of the node lies beside one of the peaks.
+  bool IsBesideAny(const Node& node,
+                   const std::vector<ScoredPose>& peaks) const {
+    const double heading = Angle(node.rotation);
+    const double size = ((1 << node.level) - 1) * grid_.resolution;
+    return std::any_of(peaks.begin(), peaks.end(), [&](const ScoredPose& peak) {
+      const double dx = center_[0] + node.x * grid_.resolution - peak.pose[0];
+      const double dy = center_[1] + node.y * grid_.resolution - peak.pose[1];
+      return std::abs(NormalizeAngle(heading - peak.pose[2])) <
+                 ScanMatcher::kPeakRotation &&
+             std::hypot(std::max(std::abs(dx), std::abs(dx + size)),
+                        std::max(std::abs(dy), std::abs(dy + size))) <
+                 ScanMatcher::kPeakDistance;
+    });
+  }
+
+  const PeakGrid& grid_;
+  const Pose2 center_;
+  // Cells each way.
+  const int window_;
+  const double rotation_window_;
+  // The largest sum of scores.
+  const double unit_;
+  double least_;
+  // Each way.
+  int rotations_ = 0;
+  // By rotation.
+  std::vector<std::vector<Cell>> cells_;
+  std::priority_queue<Node> open_;
+  int nodes_ = 0;
+};
+
 }  // namespace
 
 ScanMatcher::ScanMatcher(const ScanMatcherOptions& options)
@@ -531,137 +734,15 @@ std::vector<ScoredPose> ScanMatcher::Peaks(
     const std::vector<Eigen::Vector2d>& points, const Pose2& center,
     double translation_window, double rotation_window, double minimum_score,
     double share, int max_peaks, double reach) const {
-  std::vector<ScoredPose> peaks;
-  if (reference_.empty() || points.empty()) return peaks;
+  if (reference_.empty() || points.empty()) return {};
   if (levels_.empty()) BuildLevels();
-  double farthest = 1.0;
-  for (const Eigen::Vector2d& point : points) {
-    farthest = std::max(farthest, point.norm());
-  }
-  const double step =
-      std::clamp(kRotationError / farthest, kLeastRotation, kMostRotation);
-  const int rotations = static_cast<int>(std::ceil(rotation_window / step));
-  const double resolution = options_.grid_resolution;
-  const int window =
-      static_cast<int>(std::ceil(translation_window / resolution));
-  const int columns = field_columns_ + kLevelPad;
-  const int rows = field_rows_ + kLevelPad;
-
-  // Cells of the points by rotation, the pad included.
-  struct Cell {
-    int x;
-    int y;
-  };
-  std::vector<std::vector<Cell>> cells(2 * rotations + 1);
-  const auto angle = [&](int k) {
-    return center[2] + (rotations > 0
-                            ? (k - rotations) * (rotation_window / rotations)
-                            : 0.0);
-  };
-  for (std::size_t k = 0; k < cells.size(); ++k) {
-    const double c = std::cos(angle(static_cast<int>(k))) / resolution;
-    const double s = std::sin(angle(static_cast<int>(k))) / resolution;
-    const Eigen::Vector2d shift = (center.head<2>() - origin_) / resolution;
-    for (const Eigen::Vector2d& point : points) {
-      const double x = shift.x() + c * point.x() - s * point.y();
-      const double y = shift.y() + s * point.x() + c * point.y();
-      cells[k].push_back({static_cast<int>(std::floor(x)) + kLevelPad,
-                          static_cast<int>(std::floor(y)) + kLevelPad});
-    }
-  }
-
-  struct Node {
-    int bound;
-    int level;
-    int rotation;
-    int x;
-    int y;
-    bool operator<(const Node& other) const {
-      return std::tie(bound, other.level, other.rotation, other.x, other.y) <
-             std::tie(other.bound, level, rotation, x, y);
-    }
-  };
-  const auto bound = [&](int level, int rotation, int x, int y) {
-    const std::vector<std::int16_t>& scores = levels_[level];
-    int sum = 0;
-    for (const Cell& cell : cells[rotation]) {
-      const int column = cell.x + x;
-      const int row = cell.y + y;
-      if (static_cast<unsigned>(column) < static_cast<unsigned>(columns) &&
-          static_cast<unsigned>(row) < static_cast<unsigned>(rows)) {
-        sum += scores[static_cast<std::size_t>(row) * columns + column];
-      }
-    }
-    return sum;
-  };
-  const double unit = 255.0 * static_cast<double>(points.size());
-  double least = minimum_score * unit;
-  std::priority_queue<Node> open;
-  int nodes = 0;
-  const auto push = [&](int level, int rotation, int x, int y) {
-    ++nodes;
-    const int value = bound(level, rotation, x, y);
-    if (value >= least && value > 0) open.push({value, level, rotation, x, y});
-  };
-  const int stride = 1 << (kLevels - 1);
-  // From the middle of a node its corners are so far.
-  const double half_diagonal = 0.5 * std::sqrt(2.0) * stride * resolution;
-  const auto is_near = [&](int x, int y) {
-    if (!std::isfinite(reach)) return true;
-    const Eigen::Vector2d middle(center[0] + (x + 0.5 * stride) * resolution,
-                                 center[1] + (y + 0.5 * stride) * resolution);
-    return std::any_of(viewpoints_.begin(), viewpoints_.end(),
-                       [&](const Viewpoint& viewpoint) {
-                         return (viewpoint.position - middle).norm() <=
-                                reach + half_diagonal;
-                       });
-  };
-  for (int y = -window; y <= window; y += stride) {
-    for (int x = -window; x <= window; x += stride) {
-      if (!is_near(x, y)) continue;
-      for (int k = 0; k < static_cast<int>(cells.size()); ++k) {
-        push(kLevels - 1, k, x, y);
-      }
-    }
-  }
-  while (!open.empty() && static_cast<int>(peaks.size()) < max_peaks &&
-         nodes < kMaxNodes) {
-    const Node node = open.top();
-    open.pop();
-    if (node.bound < least) break;
-    const double heading = angle(node.rotation);
-    // All of the node lies beside a peak.
-    bool beside = false;
-    const double size = ((1 << node.level) - 1) * resolution;
-    for (const ScoredPose& peak : peaks) {
-      const double dx = center[0] + node.x * resolution - peak.pose[0];
-      const double dy = center[1] + node.y * resolution - peak.pose[1];
-      beside =
-          beside ||
-          (std::abs(NormalizeAngle(heading - peak.pose[2])) < kPeakRotation &&
-           std::hypot(std::max(std::abs(dx), std::abs(dx + size)),
-                      std::max(std::abs(dy), std::abs(dy + size))) <
-               kPeakDistance);
-    }
-    if (beside) continue;
-    if (node.level == 0) {
-      ScoredPose peak;
-      peak.pose =
-          Pose2(center[0] + node.x * resolution,
-                center[1] + node.y * resolution, NormalizeAngle(heading));
-      peak.score = node.bound / unit;
-      if (peaks.empty()) least = std::max(least, share * node.bound);
-      peaks.push_back(peak);
-      continue;
-    }
-    const int half = 1 << (node.level - 1);
-    for (int y = node.y; y <= std::min(node.y + half, window); y += half) {
-      for (int x = node.x; x <= std::min(node.x + half, window); x += half) {
-        push(node.level - 1, node.rotation, x, y);
-      }
-    }
-  }
-  return peaks;
+  const PeakGrid grid{
+      levels_, field_columns_ + kLevelPad, field_rows_ + kLevelPad,
+      origin_, options_.grid_resolution,   viewpoints_};
+  PeakSearch search(grid, points, center, translation_window, rotation_window,
+                    minimum_score);
+  search.OpenAll(reach);
+  return search.Run(share, max_peaks);
 }
 
 ScanAgreement ScanMatcher::Compare(const std::vector<ScanPoint>& scan,

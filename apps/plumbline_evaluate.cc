@@ -566,6 +566,7 @@ int main(int argc, char** argv) {
         "rpe_unit", "rpe_all_pairs"}},
       {"Comparison with relations and truth",
        {"time_tolerance", "minimum_wall_length", "maximum_wall_offset"}}};
+  info.interrupts_end_it = true;
   plumbline::ParseFlags(info, argc, argv);
   return plumbline::RunMain(plumbline::Run);
 }

@@ -8,6 +8,7 @@
 #include <plumbline/core/number_text.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/core/version.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -43,9 +44,17 @@ volatile std::sig_atomic_t interrupted = 0;
 
 extern "C" void HandleInterrupt(int) { interrupted = 1; }
 
-void CatchInterrupts() {
+// Only what is safe within a signal handler.
+extern "C" void EndAtInterrupt(int) {
+  constexpr char kWords[] = "interrupted\n";
+  [[maybe_unused]] const ssize_t written =
+      write(STDERR_FILENO, kWords, sizeof(kWords) - 1);
+  _exit(kExitInterrupted);
+}
+
+void CatchInterrupts(bool end_at_once) {
   struct sigaction action = {};
-  action.sa_handler = HandleInterrupt;
+  action.sa_handler = end_at_once ? EndAtInterrupt : HandleInterrupt;
   // The second signal finds the default action: the way out of work that does
   // not ask often enough.
   action.sa_flags = SA_RESETHAND | SA_RESTART;
@@ -250,7 +259,7 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
     static const std::string name = info.name;
     google::InitGoogleLogging(name.c_str());
   }
-  CatchInterrupts();
+  CatchInterrupts(info.interrupts_end_it);
   return arguments;
 }
 

@@ -46,12 +46,15 @@ struct AppInfo {
   std::vector<FlagGroup> groups;
   /// Arguments that are no flags are refused unless this is true.
   bool takes_arguments = false;
+  /// Ctrl-C and SIGTERM end the process at once, with status kExitInterrupted:
+  /// of binaries that have nothing to show before they are done, and so do not
+  /// ask InterruptRequested().
+  bool interrupts_end_it = false;
 };
 
 /// Parses the command line (and --flagfile, command_line.h; --fromenv), starts
-/// glog (warnings
-/// and worse, on stderr only) and catches Ctrl-C and SIGTERM. Returns the
-/// arguments that are no flags.
+/// glog (warnings and worse, on stderr only) and catches Ctrl-C and SIGTERM.
+/// Returns the arguments that are no flags.
 ///
 /// Ends the process: with status 0 after --help and --version, with kExitUsage
 /// and a message on stderr for an unknown flag, a value that does not parse, a

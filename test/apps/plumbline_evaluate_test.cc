@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstdio>
 #include <fstream>
@@ -53,6 +54,21 @@ class EvaluateTest : public ::testing::Test {
   std::string binary_;
   std::string folder_;
 };
+
+// Nobody writes to the pipe.
+TEST_F(EvaluateTest, AnInterruptEndsIt) {
+  const std::string pipe_name = folder_ + "pipe";
+  std::remove(pipe_name.c_str());
+  ASSERT_EQ(mkfifo(pipe_name.c_str(), 0600), 0);
+  std::string output;
+  EXPECT_EQ(RunInShell("'" + binary_ + "'" + Flag("trajectory", "pipe") +
+                           Flag("relations", "true.relations") +
+                           " & sleep 1; kill -INT $!; wait $!; exit $?",
+                       &output),
+            130)
+      << output;
+  EXPECT_THAT(output, HasSubstr("interrupted"));
+}
 
 TEST_F(EvaluateTest, Relations) {
   std::string output;

@@ -1,17 +1,24 @@
 #!/usr/bin/env python3
 """Treats the binaries as the world does, and counts what they make of it.
 
-  test/faults/run.py BIN_DIR [--kills=N] [--bad_inputs=N] [--seed=N]
+  test/faults/run.py BIN_DIR [--kills=N] [--bad_inputs=N] [--interrupts=N]
+      [--copies=N,N,...] [--seed=N] [--datasets=FOLDER] [--parts=PART,...]
 
 Kills runs of plumbline_solve at moments spread over their whole length, limits
 the size of the files that they may write (a disk that is full at every file in
-turn), takes the output folder away, makes it read-only, and feeds inputs that
-are made wrong by rule. Ends with status 1 when anything is found:
+turn), takes the output folder away, makes it read-only, sets the clock back and
+forth, interrupts runs at all of their steps, feeds inputs that are made wrong
+by rule, and the bundled log many times over. With the folder of the public
+logs and graphs a share of it is done with them. Ends with status 1 when
+anything is found:
 
 - a folder that holds files of two runs and does not say so, or files missing;
 - a file of somebody else that is changed or gone;
 - a run that was killed and gone on with, and ends with other bytes than one
   that never was;
+- more than 2 s from an interrupt to the end, as processor time of the process;
+- N copies of a log, one after the other, that take more than 1.25 N times the
+  processor time or memory of one;
 - an exit status other than 0, 1, 2 and 130, or an error without a message that
   says what was expected.
 """
@@ -28,6 +35,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -147,40 +155,155 @@ def kills(solve, count, rng):
           "same map.json, nothing left behind" % (count, ended, states))
 
 
+def cpu_seconds(pid):
+    """Processor time of a process that runs, s; None once it has ended."""
+    try:
+        with open("/proc/%d/stat" % pid) as file:
+            fields = file.read().rsplit(")", 1)[1].split()
+    except OSError:
+        return None
+    if fields[0] == "Z":
+        return None
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def wait_for_cpu(process, seconds):
+    """False when the process ends before."""
+    while True:
+        spent = cpu_seconds(process.pid)
+        if spent is None:
+            return False
+        if spent >= seconds:
+            return True
+        time.sleep(min(0.05, max(0.002, (seconds - spent) / 2)))
+
+
+def finish(process):
+    """Waits; exit status, processor time in s and peak memory in MB."""
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return (process.returncode, usage.ru_utime + usage.ru_stime,
+            usage.ru_maxrss / 1024)
+
+
 FILES = ["map.json", "graph.g2o", "trajectory.tum", "map.svg", "floorplan.dxf",
          "occupancy.pgm"]
 
 
-def resumed(solve, count, rng):
-    """Killed at any moment, with a state kept at the end of every stage."""
-    flags = ["--checkpoint_every=1e-9", "--quiet"]
-    folder = new_folder(solve.root, "resumed")
-    begin = time.monotonic()
-    solve.run(folder, *flags)
-    length = time.monotonic() - begin
-    wanted = {name: digest(os.path.join(folder, name)) for name in FILES}
-    alike = with_state = 0
-    for i in range(count):
-        shutil.rmtree(folder)
-        os.makedirs(folder)
-        process = subprocess.Popen(solve.command(folder, *flags))
-        time.sleep(length * (i + rng.random()) / count)
-        process.kill()
-        process.wait()
-        with_state += os.path.exists(
-            os.path.join(folder, "checkpoint.plumbline"))
-        again = solve.run(folder, *flags)
-        if again.returncode != 0:
-            finding("gone on with: " + again.stderr)
-        elif {name: digest(os.path.join(folder, name))
-              for name in FILES} != wanted:
-            finding("gone on with: other bytes")
-        elif "checkpoint.plumbline" in os.listdir(folder):
-            finding("gone on with: the checkpoint is left")
-        else:
-            alike += 1
-    print("killed and gone on with: %d, %d of them from a state, %d ended with "
-          "the same bytes" % (count, with_state, alike))
+def contents(folder):
+    """Digests of what a run has to give the same each time, by name."""
+    if os.path.exists(os.path.join(folder, "sweep.json")):
+        names = ["sweep.csv", "sweep.svg"]
+        for run in sorted(os.listdir(os.path.join(folder, "runs"))):
+            names += [os.path.join("runs", run, name) for name in FILES]
+    else:
+        names = FILES
+    return {name: digest(os.path.join(folder, name)) if
+            os.path.exists(os.path.join(folder, name)) else "missing"
+            for name in names}
+
+
+class Victims:
+    """Commands that are killed: each a function of the output folder."""
+
+    def __init__(self, solve, datasets):
+        log_flags = ["--checkpoint_every=1e-9", "--quiet"]
+        self.commands = {"log": lambda folder: solve.command(folder, *log_flags)}
+        source = new_folder(solve.root, "graph_source")
+        solve.run(source, "--quiet", "--outputs=graph.g2o")
+        graph = os.path.join(source, "graph.g2o")
+        self.commands["graph"] = lambda folder: [
+            solve.binary, "--input=" + graph, "--output_dir=" + folder,
+            "--num_threads=1", "--quiet"]
+        short = os.path.join(solve.root, "short.log")
+        with open(short, "w") as file:
+            file.write(office(60))
+        self.commands["sweep"] = lambda folder: [
+            os.path.join(os.path.dirname(solve.binary), "plumbline_sweep"),
+            "--output_dir=" + folder, "--grid=link_radius=5,10,20", "--jobs=1",
+            "--times=false", "--quiet", "--", solve.binary, "--input=" + short,
+            "--num_threads=1", "--quiet"]
+        if datasets:
+            log = os.path.join(datasets, "fr079.clf.bz2")
+            self.commands["fr079"] = lambda folder: [
+                solve.binary, "--input=" + log, "--output_dir=" + folder,
+                "--num_threads=1", *log_flags]
+
+    def share(self, count):
+        """How many kills of each."""
+        few = min(count // 10, 5) if "fr079" in self.commands else 0
+        shares = {"graph": count // 5, "sweep": count // 5}
+        if few:
+            shares["fr079"] = few
+        shares["log"] = count - sum(shares.values())
+        return shares
+
+
+def kill_group(process):
+    """A process and its children, as when the power goes."""
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def resumed(solve, count, rng, datasets):
+    """Killed at any moment, with a state kept at the end of every stage; the
+    same command then ends with the same bytes."""
+    victims = Victims(solve, datasets)
+    for name, kills_of_it in sorted(victims.share(count).items()):
+        folder = os.path.join(solve.root, "resumed")
+        command = victims.commands[name](folder)
+        shutil.rmtree(folder, ignore_errors=True)
+        process = subprocess.Popen(command, stderr=subprocess.DEVNULL,
+                                   stdout=subprocess.DEVNULL)
+        begin = time.monotonic()
+        status, length, _ = finish(process)
+        wall = time.monotonic() - begin
+        if status != 0:
+            finding("%s: the run that is not killed: status %d" % (name, status))
+            continue
+        wanted = contents(folder)
+        alike = with_state = with_runs = ended = 0
+        for i in range(kills_of_it):
+            shutil.rmtree(folder)
+            fraction = (i + rng.random()) / kills_of_it
+            process = subprocess.Popen(command, stderr=subprocess.DEVNULL,
+                                       stdout=subprocess.DEVNULL,
+                                       start_new_session=True)
+            if name == "sweep":
+                # Its children have the processor time.
+                time.sleep(wall * fraction)
+                ended += process.poll() is not None
+            else:
+                ended += not wait_for_cpu(process, length * fraction)
+            try:
+                kill_group(process)
+            except ProcessLookupError:
+                pass
+            if not os.path.isdir(folder):
+                os.makedirs(folder)
+            with_state += "checkpoint.plumbline" in os.listdir(folder)
+            with_runs += os.path.isdir(os.path.join(folder, "runs"))
+            if name != "sweep" and state_of(folder) not in (
+                    "none", "whole", "partial", "mixed"):
+                finding("%s, kill %d: %s" % (name, i, state_of(folder)))
+            again = subprocess.run(command, capture_output=True, text=True,
+                                   errors="replace", stdin=subprocess.DEVNULL)
+            left = [path for path in os.listdir(folder)
+                    if ".tmp" in path or path == "checkpoint.plumbline"]
+            if again.returncode != 0:
+                finding("%s, gone on with: %s" % (name, again.stderr))
+            elif contents(folder) != wanted:
+                finding("%s, kill %d, gone on with: other bytes" % (name, i))
+            elif left:
+                finding("%s, gone on with: left behind: %s" %
+                        (name, " ".join(left)))
+            else:
+                alike += 1
+        print("killed and gone on with, %s (%.1f s of processor): %d, %d of "
+              "them after the end, %d from a state, %d with runs of a sweep; "
+              "%d ended with the same bytes" %
+              (name, length, kills_of_it, ended, with_state, with_runs, alike),
+              flush=True)
 
 
 def full_disk(solve):
@@ -208,24 +331,273 @@ def full_disk(solve):
           "each" % (len(sizes), failed))
 
 
-def folders(solve):
-    folder = new_folder(solve.root, "vanishing")
-    process = subprocess.Popen(solve.command(folder, "--quiet"))
-    time.sleep(0.05)
-    shutil.rmtree(folder)
-    if process.wait() not in (0, 2):
-        finding("vanishing folder: status %d" % process.returncode)
-    if os.path.isdir(folder) and state_of(folder) not in ("none", "whole"):
-        finding("vanishing folder: " + state_of(folder))
-    count = 1
+def full_tmpfs(solve):
+    """The same with a disk that is full, of which root can make one."""
     if os.geteuid() != 0:
-        locked = new_folder(solve.root, "locked")
-        os.chmod(locked, 0o555)
-        if solve.run(locked).returncode != 2:
-            finding("read-only folder")
-        os.chmod(locked, 0o755)
-        count += 1
-    print("folders that vanish or are locked: %d" % count)
+        print("full file system: not tried, only root can mount one")
+        return
+    disk = new_folder(solve.root, "disk")
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64M", "tmpfs", disk],
+                      capture_output=True).returncode != 0:
+        print("full file system: not tried, mount is refused")
+        return
+    try:
+        folder = new_folder(disk, "out")
+        flags = ["--quiet", "--checkpoint_every=1e-9"]
+        solve.run(folder, *flags)
+        before = {name: digest(os.path.join(folder, name))
+                  for name in os.listdir(folder)}
+        needed = sum(os.path.getsize(os.path.join(folder, name))
+                     for name in before)
+        failed = 0
+        shares = 12
+        for share in range(shares):
+            ballast = os.path.join(disk, "ballast")
+            free = os.statvfs(disk).f_bavail * os.statvfs(disk).f_frsize
+            with open(ballast, "wb") as file:
+                file.truncate(0)
+                os.posix_fallocate(file.fileno(), 0,
+                                   free - needed * share // shares)
+            result = solve.run(folder, *flags)
+            os.remove(ballast)
+            failed += result.returncode != 0
+            if result.returncode == 0:
+                if state_of(folder) != "whole":
+                    finding("full file system: " + state_of(folder))
+                continue
+            now = {name: digest(os.path.join(folder, name))
+                   for name in os.listdir(folder)
+                   if name != "checkpoint.plumbline"}
+            if (result.returncode != 2 or
+                    "No space left on device" not in result.stderr):
+                finding("full file system: %d %s" %
+                        (result.returncode, result.stderr))
+            if now != before:
+                finding("full file system: the earlier run is not as it was")
+        # And what was kept is gone on with once there is room.
+        again = solve.run(folder, *flags)
+        if again.returncode != 0 or state_of(folder) != "whole":
+            finding("full file system, after it: " + again.stderr)
+        print("full file system: %d, %d runs failed, the earlier run whole "
+              "after each" % (shares, failed))
+    finally:
+        subprocess.run(["umount", disk])
+
+
+def folders(solve, rng):
+    folder = new_folder(solve.root, "vanishing")
+    begin = time.monotonic()
+    solve.run(folder, "--quiet")
+    length = time.monotonic() - begin
+    vanishing = 10
+    for i in range(vanishing):
+        shutil.rmtree(folder, ignore_errors=True)
+        os.makedirs(folder)
+        process = subprocess.Popen(
+            solve.command(folder, "--quiet", "--checkpoint_every=1e-9"),
+            stderr=subprocess.DEVNULL)
+        time.sleep(length * (i + rng.random()) / vanishing)
+        shutil.rmtree(folder, ignore_errors=True)
+        # Files of the same run may be gone while others are put there.
+        allowed = {0: ("none", "whole"), 2: ("none", "whole", "mixed")}
+        status = process.wait()
+        state = state_of(folder) if os.path.isdir(folder) else "none"
+        if state not in allowed.get(status, ()):
+            finding("vanishing folder: status %d, %s" % (status, state))
+    # Root may write everywhere: then as nobody.
+    other = {} if os.geteuid() != 0 else {"user": 65534, "group": 65534}
+    os.chmod(solve.root, 0o755)
+    locked = new_folder(solve.root, "locked")
+    os.chmod(locked, 0o555)
+    result = subprocess.run(solve.command(locked), capture_output=True,
+                            text=True, **other)
+    if result.returncode != 2 or "Permission denied" not in result.stderr:
+        finding("read-only folder: %d %s" % (result.returncode, result.stderr))
+    if os.listdir(locked) != ["thesis.tex"]:
+        finding("read-only folder: it has changed")
+    os.chmod(locked, 0o755)
+    print("folders: %d that vanish, 1 that is read-only" % vanishing)
+
+
+FAKETIME = "/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1"
+
+
+def clocks(solve, rng):
+    """Runs under a clock that stands elsewhere and jumps by up to a year in
+    both directions while they go on; the same files come out."""
+    if not os.path.exists(FAKETIME):
+        print("clocks: not tried, the package faketime is not installed")
+        return
+    folder = new_folder(solve.root, "clock")
+    solve.run(folder, "--quiet")
+    wanted = contents(folder)
+    offsets = os.path.join(solve.root, "offset")
+    count = jumps = 0
+    for monotonic in ("1", "0"):
+        environment = dict(os.environ, LD_PRELOAD=FAKETIME,
+                           FAKETIME_TIMESTAMP_FILE=offsets, FAKETIME_NO_CACHE="1",
+                           DONT_FAKE_MONOTONIC=monotonic)
+        for start in (0, -20 * 365 * 86400, 10 * 365 * 86400):
+            shutil.rmtree(folder)
+            folder = new_folder(solve.root, "clock")
+
+            def set_offset(seconds):
+                with open(offsets + ".new", "w") as file:
+                    file.write("%+d\n" % seconds)
+                os.rename(offsets + ".new", offsets)
+
+            set_offset(start)
+            process = subprocess.Popen(
+                solve.command(folder, "--quiet", "--checkpoint_every=0.05"),
+                env=environment, stderr=subprocess.PIPE, text=True)
+            while process.poll() is None:
+                set_offset(start + rng.choice([-365 * 86400, -3600, -1, 1, 3600,
+                                               365 * 86400]))
+                jumps += 1
+                time.sleep(0.02)
+            count += 1
+            if process.returncode != 0 or state_of(folder) != "whole":
+                finding("clock: " + process.stderr.read())
+            elif contents(folder) != wanted:
+                finding("clock: other bytes")
+            process.stderr.close()
+    print("clocks: %d runs with %d jumps" % (count, jumps))
+
+
+def last_step(path):
+    """What --verbose has said last."""
+    with open(path, "rb") as file:
+        lines = file.read().decode(errors="replace").splitlines()
+    steps = [line for line in lines if ", after " in line]
+    return steps[-1].split(", after ")[0].split(":")[-1].strip() if steps else "begin"
+
+
+def interrupts(solve, count, rng, datasets):
+    """SIGINT at moments spread over the run: how long until the end?"""
+    inputs = {"office": os.path.join(SOURCE, "datasets/office.clf.gz")}
+    if datasets:
+        inputs["mit-killian"] = os.path.join(datasets, "mit-killian.clf.bz2")
+        inputs["city10000"] = os.path.join(datasets, "graphs/city10000.g2o.bz2")
+    said = os.path.join(solve.root, "said")
+    for name, path in inputs.items():
+        kept = os.path.join(solve.root, "states_" + name)
+        os.makedirs(kept)
+
+        def command(folder):
+            return [solve.binary, "--input=" + path, "--output_dir=" + folder,
+                    "--num_threads=1", "--verbose", "--checkpoint_every=1e-9"]
+
+        def start(folder):
+            with open(said, "w") as file:
+                return subprocess.Popen(command(folder), stderr=file,
+                                        stdout=subprocess.DEVNULL)
+
+        folder = new_folder(solve.root, "interrupted_" + name)
+        process = start(folder)
+        # One that waits for the process would take its times.
+        states = []
+        waiter = threading.Thread(target=lambda: os.waitid(
+            os.P_PID, process.pid, os.WEXITED | os.WNOWAIT))
+        waiter.start()
+        checkpoint = os.path.join(folder, "checkpoint.plumbline")
+        while waiter.is_alive():
+            try:
+                state = os.path.join(kept, str(os.stat(checkpoint).st_mtime_ns))
+                if not os.path.exists(state):
+                    os.link(checkpoint, state)
+                    states.append((cpu_seconds(process.pid), state))
+            except OSError:
+                pass
+            time.sleep(0.005)
+        status, length, _ = finish(process)
+        if status != 0:
+            finding("%s: status %d" % (name, status))
+            continue
+        worst = []
+        times = count if name == "office" else max(1, count // 3)
+        for i in range(times):
+            at = length * (i + rng.random()) / times
+            folder = new_folder(solve.root, "interrupted_%s_%d" % (name, i))
+            # From the last state before.
+            before = [state for state in states if state[0] <= at]
+            if before:
+                shutil.copy(before[-1][1],
+                            os.path.join(folder, "checkpoint.plumbline"))
+                at -= before[-1][0]
+            process = start(folder)
+            alive = wait_for_cpu(process, at)
+            step = last_step(said)
+            spent = cpu_seconds(process.pid)
+            begin = time.monotonic()
+            process.send_signal(signal.SIGINT)
+            status, total, _ = finish(process)
+            wall = time.monotonic() - begin
+            if not alive or spent is None or status == 0:
+                worst.append((0.0, 0.0, "after the end"))
+            else:
+                worst.append((total - spent, wall, step))
+                if status != 130 or state_of(folder) not in ("partial", "none"):
+                    finding("%s, interrupt %d: status %d, folder %s" %
+                            (name, i, status, state_of(folder)))
+                if total - spent > 2.0:
+                    finding("%s, interrupt in '%s': %.2f s of processor until "
+                            "the end" % (name, step, total - spent))
+            shutil.rmtree(folder)
+        worst.sort(reverse=True)
+        print("interrupts, %s (%.1f s of processor, %d states): %d; longest "
+              "until the end:" % (name, length, len(states), times))
+        for processor, wall, step in worst[:8]:
+            print("  %.2f s of processor, %.2f s by the clock, after '%s'" %
+                  (processor, wall, step), flush=True)
+
+
+def repeated(copies, has_jump, path):
+    """The bundled log, driven so many times: over and over from its start, with
+    a jump of odometry between, or there and back."""
+    header, scans = [], []
+    with gzip.open(os.path.join(SOURCE, "datasets/office.clf.gz"), "rt") as log:
+        for line in log:
+            (scans if line.startswith("FLASER") else header).append(line.split())
+    stamp = 1000.0
+    with open(path, "w") as file:
+        for words in header:
+            if words and (words[0].startswith("#") or words[0] == "PARAM"):
+                file.write(" ".join(words) + "\n")
+        for copy in range(copies):
+            for words in scans if has_jump or copy % 2 == 0 else scans[::-1]:
+                stamp += 0.2
+                file.write(" ".join(words[:-3] + ["%f" % stamp, words[-2],
+                                                  "%f" % stamp]) + "\n")
+
+
+def copies_of_a_log(solve, numbers):
+    """Time and memory grow with the length of a log, not with its square."""
+    for has_jump in (False, True):
+        one = None
+        for copies in numbers:
+            log = os.path.join(solve.root, "copies.log")
+            repeated(copies, has_jump, log)
+            folder = os.path.join(solve.root, "copies")
+            process = subprocess.Popen(
+                [solve.binary, "--input=" + log, "--output_dir=" + folder,
+                 "--num_threads=1", "--quiet"], stderr=subprocess.DEVNULL)
+            status, seconds, memory = finish(process)
+            if status != 0:
+                finding("%d copies: status %d" % (copies, status))
+                continue
+            with open(os.path.join(folder, "summary.json")) as file:
+                relations = json.load(file)["counts"]["constraints"][
+                    "pose_pose"]["measurement"]
+            if one is None:
+                one = (seconds / copies, memory)
+            print("%d copies, %s: %.1f s of processor (%.1f times one), %.0f MB "
+                  "(%.1f times), %d relations between poses" %
+                  (copies, "with jumps" if has_jump else "without jumps",
+                   seconds, seconds / one[0], memory, memory / one[1],
+                   relations), flush=True)
+            if copies > 1 and max(seconds / one[0],
+                                  memory / one[1]) > 1.25 * copies:
+                finding("%d copies cost too much" % copies)
 
 
 GRAPH = """VERTEX_SE2 0 0 0 0
@@ -346,22 +718,48 @@ def bad_inputs(binaries, root, count, rng):
           (count, len(kinds), dict(sorted(statuses.items()))))
 
 
+PARTS = ["kills", "resumed", "full_disk", "folders", "clocks", "interrupts",
+         "bad_inputs", "copies"]
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("bin_dir")
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--bad_inputs", type=int, default=1000)
+    parser.add_argument("--interrupts", type=int, default=40,
+                        help="of the bundled log; a third of it of each other")
+    parser.add_argument("--copies", default="1,2,5,10,20")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--datasets", default="",
+                        help="folder of the public logs and graphs")
+    parser.add_argument("--parts", default=",".join(PARTS))
     arguments = parser.parse_args()
+    parts = arguments.parts.split(",")
+    if not set(parts) <= set(PARTS):
+        parser.error("--parts: expected some of " + ", ".join(PARTS))
     rng = random.Random(arguments.seed)
     root = tempfile.mkdtemp(prefix="plumbline_faults_")
-    solve = Solve(arguments.bin_dir, root)
-    if arguments.kills > 0:
+    solve = Solve(os.path.abspath(arguments.bin_dir), root)
+    if "kills" in parts:
         kills(solve, arguments.kills, rng)
-        resumed(solve, arguments.kills, rng)
-    full_disk(solve)
-    folders(solve)
-    bad_inputs(arguments.bin_dir, root, arguments.bad_inputs, rng)
+    if "resumed" in parts:
+        resumed(solve, arguments.kills, rng, arguments.datasets)
+    if "full_disk" in parts:
+        full_disk(solve)
+        full_tmpfs(solve)
+    if "folders" in parts:
+        folders(solve, rng)
+    if "clocks" in parts:
+        clocks(solve, rng)
+    if "interrupts" in parts:
+        interrupts(solve, arguments.interrupts, rng, arguments.datasets)
+    if "bad_inputs" in parts:
+        # The same ones whichever parts are run.
+        bad_inputs(arguments.bin_dir, root, arguments.bad_inputs,
+                   random.Random(arguments.seed))
+    if "copies" in parts:
+        copies_of_a_log(solve, [int(n) for n in arguments.copies.split(",")])
     if findings:
         print("%d findings; the files are in %s" % (len(findings), root))
         return 1

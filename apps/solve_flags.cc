@@ -328,6 +328,7 @@ void TakeFrontEndFlags(LogSolverOptions* options) {
   options->adjustment.num_threads = NumThreadsFromFlags();
   options->check.points = options->odometry.points;
   options->check.num_threads = NumThreadsFromFlags();
+  options->completion.num_threads = NumThreadsFromFlags();
 }
 
 // Throws when a flag was given this value, which needs segments. A default of

@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/core/wall.h>
 #include <plumbline/frontend/wall_completion.h>
 
@@ -6,7 +7,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <initializer_list>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 
@@ -21,6 +24,12 @@ constexpr int kBlock = 4;
 constexpr float kFloatMargin = 1.001f;
 // A wall has at least so many cells.
 constexpr std::size_t kFewestCells = 6;
+// Scans and seeds that are looked at by all threads together, before what was
+// found is taken in.
+constexpr std::size_t kScansAtOnce = 256;
+constexpr std::size_t kSeedsAtOnce = 64;
+constexpr std::size_t kMostSeedsAtOnce = 1024;
+constexpr std::size_t kWordBits = 64;
 
 std::int64_t CellKey(std::int64_t column, std::int64_t row) {
   // Unsigned, since a negative column cannot be shifted.
@@ -50,7 +59,6 @@ class WallIndex {
   }
 
   void Insert(const IndexedWall& wall) {
-    has_last_ = false;
     walls_.push_back(wall);
     const int i = static_cast<int>(walls_.size()) - 1;
     const double begin = wall.begin - reach_;
@@ -72,19 +80,24 @@ class WallIndex {
     }
   }
 
-  bool Explains(const Eigen::Vector2d& point, double offset, double gap) {
+  // The cell asked for last: neighbouring returns mostly fall into one.
+  struct LastCell {
+    bool is_known = false;
+    std::int64_t key = 0;
+    const std::vector<int>* walls = nullptr;
+  };
+
+  bool Explains(const Eigen::Vector2d& point, double offset, double gap,
+                LastCell* last) const {
     const std::int64_t key =
         CellKey(static_cast<std::int64_t>(std::floor(point.x() / kIndexCell)),
                 static_cast<std::int64_t>(std::floor(point.y() / kIndexCell)));
-    // Neighbouring returns mostly fall into one cell.
-    if (!has_last_ || key != last_key_) {
+    if (!last->is_known || key != last->key) {
       const auto found = cells_.find(key);
-      last_ = found == cells_.end() ? nullptr : &found->second;
-      last_key_ = key;
-      has_last_ = true;
+      *last = {true, key, found == cells_.end() ? nullptr : &found->second};
     }
-    if (last_ == nullptr) return false;
-    for (int index : *last_) {
+    if (last->walls == nullptr) return false;
+    for (const int index : *last->walls) {
       const Wall& wall = walls_[index];
       if (std::abs(wall.Across(point)) > offset) continue;
       const double along = wall.Along(point);
@@ -102,10 +115,6 @@ class WallIndex {
   std::size_t num_known_ = 0;
   std::vector<IndexedWall> walls_;
   std::unordered_map<std::int64_t, std::vector<int>> cells_;
-  // The cell asked for last.
-  bool has_last_ = false;
-  std::int64_t last_key_ = 0;
-  const std::vector<int>* last_ = nullptr;
 };
 
 // Returns gathered in one cell.
@@ -227,6 +236,7 @@ class Completion {
       }
     }
     half_way.push_back(count);
+    NumberReturns(scans, count);
     for (std::size_t k = 0; k + 2 < half_way.size(); ++k) {
       Look(scans, poses, half_way[k], half_way[k + 2], {1.0});
     }
@@ -237,19 +247,14 @@ class Completion {
   }
 
  private:
-  // Every so many times that it is asked.
   bool IsStopped() {
-    constexpr int kEvery = 256;
-    if (++asked_ % kEvery == 0 && stop_ && stop_()) is_stopped_ = true;
+    if (!is_stopped_ && stop_ && stop_()) is_stopped_ = true;
     return is_stopped_;
   }
 
   void Look(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
             std::size_t begin, std::size_t end,
             std::initializer_list<double> smears) {
-    cells_.clear();
-    cell_of_.clear();
-    buckets_.clear();
     Gather(scans, poses, begin, end);
     FillBuckets();
     FitDirections();
@@ -265,51 +270,133 @@ class Completion {
     });
     for (const double smear : smears) {
       scatter_ = smear * options_.max_scatter;
-      for (int seed : order) {
-        if (IsStopped()) return;
-        if (!cells_[seed].used) Grow(seed);
+      GrowAll(order);
+      if (is_stopped_) return;
+    }
+  }
+
+  // Grows a wall from each of these cells in turn that is not used by then.
+  // Most seeds come to nothing and change nothing, so that many are tried at a
+  // time; those after the first that makes a wall are tried once more.
+  void GrowAll(const std::vector<int>& seeds) {
+    const auto threads =
+        static_cast<std::size_t>(std::max(1, options_.num_threads));
+    std::size_t at_once = kSeedsAtOnce;
+    std::vector<int> tried;
+    std::vector<std::optional<GrownWall>> grown;
+    scratch_.resize(threads);
+    for (std::size_t k = 0; k < seeds.size() && !IsStopped();) {
+      tried.clear();
+      std::size_t end = k;
+      while (end < seeds.size() && tried.size() < at_once) {
+        if (!cells_[seeds[end]].used) tried.push_back(static_cast<int>(end));
+        ++end;
+      }
+      const std::size_t share = (tried.size() + threads - 1) / threads;
+      grown.assign(threads, std::nullopt);
+      ParallelFor(threads, options_.num_threads, [&](std::size_t t) {
+        const std::size_t last = std::min(tried.size(), (t + 1) * share);
+        for (std::size_t i = t * share; i < last && !grown[t]; ++i) {
+          grown[t] = Grow(seeds[tried[i]], &scratch_[t]);
+          if (grown[t]) grown[t]->position = tried[i];
+        }
+      });
+      const auto first =
+          std::find_if(grown.begin(), grown.end(),
+                       [](const auto& wall) { return wall.has_value(); });
+      if (first == grown.end()) {
+        k = end;
+        at_once = std::min(2 * at_once, kMostSeedsAtOnce);
+      } else {
+        k = (*first)->position + 1;
+        Keep(**first);
+        at_once = kSeedsAtOnce;
       }
     }
   }
 
+  // A bit of each return says when nobody need look at it again.
+  void NumberReturns(const std::vector<Scan>& scans, std::size_t count) {
+    first_word_.assign(1, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      first_word_.push_back(first_word_.back() +
+                            (scans[i].ranges.size() + kWordBits - 1) /
+                                kWordBits);
+    }
+    is_done_.assign(first_word_.back(), 0);
+  }
+
+  // Sorts the returns that no wall explains into cells.
   void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
               std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end && !IsStopped(); ++i) {
-      const Scan& scan = scans[i];
-      const Pose2 laser = Compose(poses[i], scan.laser_offset);
-      for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
-        const double range = scan.ranges[beam];
-        if (!(range >= options_.points.minimum_range) ||
-            range > options_.points.usable_range) {
-          continue;
-        }
-        const double angle =
-            scan.bearings.empty()
-                ? laser[2] + scan.start_angle + beam * scan.angle_step
-                : laser[2] + scan.bearings[beam];
-        const Eigen::Vector2d ray(std::cos(angle), std::sin(angle));
-        const Eigen::Vector2d point = laser.head<2>() + range * ray;
-        if (index_.Explains(point, options_.explained_offset,
-                            options_.explained_gap)) {
-          continue;
-        }
-        const auto column = static_cast<std::int64_t>(
-            std::floor(point.x() / options_.cell_size));
-        const auto row = static_cast<std::int64_t>(
-            std::floor(point.y() / options_.cell_size));
-        const auto inserted = cell_of_.try_emplace(
-            CellKey(column, row), static_cast<int>(cells_.size()));
-        if (inserted.second) {
-          cells_.emplace_back();
-        }
-        Cell& cell = cells_[inserted.first->second];
-        cell.sum += point;
-        cell.view -= ray;
-        ++cell.returns;
-        if (cell.scans.empty() || cell.scans.back() != i) {
-          cell.scans.push_back(i);
-        }
+    cells_.clear();
+    cell_of_.clear();
+    std::vector<std::vector<Return>> unexplained(kScansAtOnce);
+    for (std::size_t i = begin; i < end && !IsStopped(); i += kScansAtOnce) {
+      const std::size_t count = std::min(kScansAtOnce, end - i);
+      ParallelFor(count, options_.num_threads, [&](std::size_t k) {
+        FindUnexplained(scans[i + k], poses[i + k],
+                        is_done_.data() + first_word_[i + k], &unexplained[k]);
+      });
+      for (std::size_t k = 0; k < count; ++k) {
+        for (const Return& one : unexplained[k]) AddToCell(one, i + k);
       }
+    }
+  }
+
+  struct Return {
+    Eigen::Vector2d point;
+    // From the laser, of length 1.
+    Eigen::Vector2d ray;
+  };
+
+  // Those of a scan, at this pose. Explained once is explained for good, as
+  // walls only come.
+  void FindUnexplained(const Scan& scan, const Pose2& pose,
+                       std::uint64_t* is_done,
+                       std::vector<Return>* unexplained) const {
+    unexplained->clear();
+    const Pose2 laser = Compose(pose, scan.laser_offset);
+    WallIndex::LastCell last;
+    for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
+      std::uint64_t& word = is_done[beam / kWordBits];
+      const std::uint64_t bit = std::uint64_t{1} << (beam % kWordBits);
+      if ((word & bit) != 0) continue;
+      const double range = scan.ranges[beam];
+      if (!(range >= options_.points.minimum_range) ||
+          range > options_.points.usable_range) {
+        word |= bit;
+        continue;
+      }
+      const double angle =
+          scan.bearings.empty()
+              ? laser[2] + scan.start_angle + beam * scan.angle_step
+              : laser[2] + scan.bearings[beam];
+      const Eigen::Vector2d ray(std::cos(angle), std::sin(angle));
+      const Eigen::Vector2d point = laser.head<2>() + range * ray;
+      if (index_.Explains(point, options_.explained_offset,
+                          options_.explained_gap, &last)) {
+        word |= bit;
+      } else {
+        unexplained->push_back({point, ray});
+      }
+    }
+  }
+
+  void AddToCell(const Return& one, std::size_t scan) {
+    const auto column = static_cast<std::int64_t>(
+        std::floor(one.point.x() / options_.cell_size));
+    const auto row = static_cast<std::int64_t>(
+        std::floor(one.point.y() / options_.cell_size));
+    const auto inserted = cell_of_.try_emplace(CellKey(column, row),
+                                               static_cast<int>(cells_.size()));
+    if (inserted.second) cells_.emplace_back();
+    Cell& cell = cells_[inserted.first->second];
+    cell.sum += one.point;
+    cell.view -= one.ray;
+    ++cell.returns;
+    if (cell.scans.empty() || cell.scans.back() != scan) {
+      cell.scans.push_back(scan);
     }
   }
 
@@ -317,6 +404,7 @@ class Completion {
   void FillBuckets() {
     bucket_size_ = std::max(options_.normal_radius, options_.max_gap);
     bucket_of_.clear();
+    buckets_.clear();
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       Cell& cell = cells_[i];
       cell.mean = cell.sum / cell.returns;
@@ -330,9 +418,12 @@ class Completion {
       cell.bucket = inserted.first->second;
       buckets_[cell.bucket].entries.push_back({cell.mean, static_cast<int>(i)});
     }
+    num_slots_ = 0;
     for (Bucket& bucket : buckets_) {
       bucket.around = BucketsAround(bucket.middle);
       bucket.FillLocal();
+      bucket.first_slot = num_slots_;
+      num_slots_ += bucket.x.size();
     }
   }
 
@@ -414,60 +505,96 @@ class Completion {
     }
   }
 
-  // Makes a wall of what lies in line with a cell, when it is long, whole and
-  // straight enough.
-  void Grow(int seed) {
+  // A wall that a cell has grown to.
+  struct GrownWall {
     GrownLine line;
+    std::vector<int> cells;
+    double begin = 0.0, end = 0.0;
+    // Towards the lasers that saw it.
+    Eigen::Vector2d view = Eigen::Vector2d::Zero();
+    // The seed's place among all.
+    std::size_t position = 0;
+  };
+
+  // What growing needs, kept for its memory.
+  struct Scratch {
+    // By slot: taken in, or never to be. All 0 between two calls.
+    std::vector<std::uint8_t> is_settled;
+    std::vector<std::size_t> settled;
+    std::vector<int> members;
+  };
+
+  // What lies in line with a cell, when it is long, whole and straight enough
+  // for a wall.
+  std::optional<GrownWall> Grow(int seed, Scratch* scratch) const {
+    GrownWall wall;
+    GrownLine& line = wall.line;
     line.origin = cells_[seed].mean;
     line.direction = cells_[seed].direction;
-    const std::vector<int> on = FitFinally(CollectInLine(seed, &line), &line);
-    if (on.empty() || line.across > scatter_ * scatter_) return;
+    CollectInLine(seed, &line, scratch);
+    wall.cells = FitFinally(scratch->members, &line);
+    const std::vector<int>& on = wall.cells;
+    if (on.empty() || line.across > scatter_ * scatter_) return std::nullopt;
     std::vector<double> places;
-    Eigen::Vector2d view = Eigen::Vector2d::Zero();
     for (const int index : on) {
       places.push_back(line.Along(cells_[index].mean));
-      view += cells_[index].view;
+      wall.view += cells_[index].view;
     }
     std::sort(places.begin(), places.end());
     const double length = places.back() - places.front();
-    if (length < options_.min_length || !IsCovered(places)) return;
+    if (length < options_.min_length || !IsCovered(places)) return std::nullopt;
     // The direction must be as certain as that of any other wall.
     const double end_variance = line.across * length * length /
                                 (static_cast<double>(on.size()) * line.along);
     if (end_variance > options_.max_end_sigma * options_.max_end_sigma *
                            (scatter_ / options_.max_scatter)) {
-      return;
+      return std::nullopt;
     }
-    for (const int index : on) Use(index);
-    UseUp(line.point(), line.direction, places.front(), places.back());
+    wall.begin = places.front();
+    wall.end = places.back();
+    return wall;
+  }
+
+  void Keep(const GrownWall& wall) {
+    const GrownLine& line = wall.line;
+    for (const int index : wall.cells) Use(index);
+    UseUp(line.point(), line.direction, wall.begin, wall.end);
     DropUsed();
 
-    const double middle = 0.5 * (places.front() + places.back());
+    const double middle = 0.5 * (wall.begin + wall.end);
     const Eigen::Vector2d position = line.point() + middle * line.direction;
     // y towards the side from which it was seen.
     Eigen::Vector2d direction = line.direction;
-    if (Cross(direction, view) < 0.0) direction = -direction;
+    if (Cross(direction, wall.view) < 0.0) direction = -direction;
     Add(Pose2(position.x(), position.y(),
               std::atan2(direction.y(), direction.x())),
-        length, CountScans(on));
+        wall.end - wall.begin, CountScans(wall.cells));
   }
 
-  // Cells in line with the seed, each within the gap of another one. Fits the
-  // line to them on the way; without enough of them there are none.
-  std::vector<int> CollectInLine(int seed, GrownLine* line) {
-    std::vector<int> members = {seed};
-    std::vector<char>& in = in_;
-    in.resize(cells_.size(), 0);
-    in[seed] = 1;
+  // Cells in line with the seed, each within the gap of another one, become the
+  // members. Fits the line to them on the way.
+  void CollectInLine(int seed, GrownLine* line, Scratch* scratch) const {
+    std::vector<int>& members = scratch->members;
+    members.assign(1, seed);
+    std::vector<std::uint8_t>& is_settled = scratch->is_settled;
+    is_settled.resize(num_slots_, 0);
+    const auto settle = [&](std::size_t slot) {
+      is_settled[slot] = 1;
+      scratch->settled.push_back(slot);
+    };
+    const Bucket& first = buckets_[cells_[seed].bucket];
+    settle(first.first_slot + first.SlotOf(seed));
+    const Eigen::Vector2d view = cells_[seed].view;
     Fit fit;
     fit.Add(Eigen::Vector2d::Zero(), 1.0);
     const double cos_turn = std::cos(options_.max_turn);
     const double squared_gap = options_.max_gap * options_.max_gap;
+    // Reach of the line.
+    const double reach = ReachAcross();
     for (std::size_t k = 0; k < members.size(); ++k) {
       const Cell& cell = cells_[members[k]];
       const std::size_t size = members.size();
-      // Reaches of a bucket's square across the line, and of the line.
-      const double reach = ReachAcross();
+      // Reach of a bucket's square across the line.
       const double half_width =
           0.5 * bucket_size_ *
               (std::abs(line->direction.x()) + std::abs(line->direction.y())) +
@@ -478,31 +605,34 @@ class Completion {
         const double across =
             Cross(line->direction, bucket.middle - line->point());
         if (std::abs(across) > reach + half_width) continue;
-        const auto look = [&](const Bucket::Entry& entry) {
+        const auto look = [&](const Bucket::Entry& entry, std::size_t slot) {
           if ((entry.mean - cell.mean).squaredNorm() > squared_gap ||
-              in[entry.index] || line->Distance(entry.mean) > reach) {
+              line->Distance(entry.mean) > reach) {
             return;
           }
           const Cell& other = cells_[entry.index];
           // Seen from the same side.
-          if (other.view.dot(cells_[seed].view) < 0.0) return;
+          if (other.view.dot(view) < 0.0) {
+            settle(slot);
+            return;
+          }
           if (other.direction.squaredNorm() > 0.0 &&
               std::abs(other.direction.dot(line->direction)) < cos_turn) {
             return;
           }
-          in[entry.index] = 1;
+          settle(slot);
           members.push_back(entry.index);
           fit.Add(entry.mean - line->origin, 1.0);
         };
         bucket.VisitNear(cell.mean, squared_gap, line->direction, across, reach,
-                         look);
+                         is_settled, look);
       }
       if (members.size() >= kFewestCells && members.size() > size) {
         line->FitTo(fit);
       }
     }
-    for (const int index : members) in[index] = 0;
-    return members;
+    for (const std::size_t slot : scratch->settled) is_settled[slot] = 0;
+    scratch->settled.clear();
   }
 
   // Fits the line once more, to what lies on it, returns counted, and cuts it
@@ -736,7 +866,6 @@ class Completion {
   const Registry& registry_;
   const WallCompletionOptions options_;
   const std::function<bool()>& stop_;
-  int asked_ = 0;
   bool is_stopped_ = false;
   WallIndex index_;
   std::vector<Cell> cells_;
@@ -756,6 +885,15 @@ class Completion {
     // The means once more, from the middle on, to leave out what is clearly too
     // far away several at a time.
     std::vector<float> x, y;
+    // Number of its first entry's slot; every place in x has one.
+    std::size_t first_slot = 0;
+
+    // Place of a cell that is among the entries.
+    std::size_t SlotOf(int index) const {
+      std::size_t slot = 0;
+      while (entries[slot].index != index) ++slot;
+      return slot;
+    }
 
     // After every change of the entries.
     void FillLocal() {
@@ -769,13 +907,15 @@ class Completion {
       }
     }
 
-    // Calls `look(entry)`, in their order, with those within the gap of a place
-    // and within `reach` of a line, and some more. The line has a direction and
-    // passes the middle at `across`, which is to its left.
+    // Calls `look(entry, slot)`, in their order, with those within the gap of a
+    // place and within `reach` of a line that are not settled, and some more
+    // that are not. The line has a direction and passes the middle at `across`,
+    // which is to its left.
     template <typename Look>
     void VisitNear(const Eigen::Vector2d& place, double squared_gap,
                    const Eigen::Vector2d& direction, double across,
-                   double reach, const Look& look) const {
+                   double reach, const std::vector<std::uint8_t>& is_settled,
+                   const Look& look) const {
       using Block = Eigen::Array<float, kBlock, 1>;
       const Eigen::Vector2f local = (place - middle).cast<float>();
       const Eigen::Vector2f along = direction.cast<float>();
@@ -784,6 +924,10 @@ class Completion {
       const auto per_reach = static_cast<float>(1.0 / reach);
       const std::size_t count = entries.size();
       for (std::size_t i = 0; i < count; i += kBlock) {
+        std::uint32_t settled;
+        static_assert(sizeof(settled) == kBlock);
+        std::memcpy(&settled, &is_settled[first_slot + i], sizeof(settled));
+        if (settled == 0x01010101u) continue;
         const Eigen::Map<const Block> own_x(&x[i]);
         const Eigen::Map<const Block> own_y(&y[i]);
         const Block dx = own_x - local.x();
@@ -794,7 +938,11 @@ class Completion {
             per_reach;
         if (gaps.max(offsets).minCoeff() > kFloatMargin) continue;
         const std::size_t end = std::min<std::size_t>(i + kBlock, count);
-        for (std::size_t j = i; j < end; ++j) look(entries[j]);
+        for (std::size_t j = i; j < end; ++j) {
+          if (is_settled[first_slot + j] == 0) {
+            look(entries[j], first_slot + j);
+          }
+        }
       }
     }
   };
@@ -802,7 +950,11 @@ class Completion {
   std::unordered_map<std::int64_t, int> bucket_of_;
   // Buckets that hold cells which have been used.
   std::vector<int> used_up_;
-  std::vector<char> in_;
+  std::size_t num_slots_ = 0;
+  std::vector<Scratch> scratch_;
+  // Words of the returns' bits: the first one of each scan.
+  std::vector<std::size_t> first_word_;
+  std::vector<std::uint64_t> is_done_;
   Transaction transaction_;
 };
 

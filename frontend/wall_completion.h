@@ -56,6 +56,9 @@ struct WallCompletionOptions {
   int links = 3;
   double link_offset_sigma = 0.03;
   double link_angle_sigma = DegToRad(0.7);
+  /// Threads that look at scans and grow walls; what is found does not depend
+  /// on their number.
+  int num_threads = 1;
 };
 
 /// Finds walls that no single scan saw well enough: glimpsed through doors, a

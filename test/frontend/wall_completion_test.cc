@@ -137,6 +137,46 @@ TEST(WallCompletionKinkTest, AnEndThatTurnsAwayIsCutOff) {
   }
 }
 
+// Seeds are tried many at a time, and most of them come to nothing.
+TEST(WallCompletionThreadsTest, TheSameWallsWithAnyNumberOfThreads) {
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  std::vector<Wall> world;
+  for (int i = 0; i < 12; ++i) {
+    const Eigen::Vector2d corner(-6.0 + i, 2.0 + 0.3 * (i % 3));
+    world.push_back({corner, corner + Eigen::Vector2d(0.9, 0.02 * i)});
+    world.push_back({corner, corner + Eigen::Vector2d(0.1, 0.8)});
+  }
+  testing::Laser laser;
+  laser.start_angle = DegToRad(20.0);
+  laser.angle_step = DegToRad(1.0);
+  laser.beams = 141;
+  laser.sigma = 0.02;
+  Noise noise(11);
+  std::vector<Scan> scans;
+  std::vector<Pose2> poses;
+  for (int i = 0; i <= 300; ++i) {
+    poses.emplace_back(-6.0 + 0.04 * i, 0.0, 0.0);
+    scans.push_back(MakeScan(world, poses.back(), laser, &noise));
+  }
+  std::vector<std::vector<double>> first;
+  for (const int threads : {1, 2, 5}) {
+    WallCompletionOptions options;
+    options.num_threads = threads;
+    std::vector<std::vector<double>> walls;
+    const Transaction found =
+        FindGlimpsedWalls(Graph(), registry, scans, poses, options);
+    for (const Feature& wall : found.added_features()) {
+      walls.emplace_back(wall.parameters.begin(), wall.parameters.end());
+      walls.back().push_back(wall.extent_end);
+      walls.back().push_back(static_cast<double>(wall.observations));
+    }
+    if (threads == 1) first = walls;
+    EXPECT_GT(walls.size(), 5u);
+    EXPECT_EQ(walls, first) << threads;
+  }
+}
+
 TEST_F(WallCompletionTest, FindsTheWallSeenThroughTheDoor) {
   const Transaction walls =
       FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_);

@@ -7,6 +7,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/initial_guess.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/core/plugin.h>
 #include <plumbline/core/sha256.h>
 #include <plumbline/core/stopwatch.h>
@@ -1052,6 +1053,7 @@ int Run() {
     Remark("%s: removed what a run that was killed had left: %s",
            FLAGS_output_dir.c_str(), Joined(folder.cleaned()).c_str());
   }
+  const ThreadsScope threads(NumThreadsFromFlags());
   if (inputs.size() > 1) {
     return SolveLogs(inputs, starts, registry, &clock, &folder);
   }

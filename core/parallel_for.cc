@@ -3,6 +3,19 @@
 #include <future>
 
 namespace plumbline {
+namespace {
+
+thread_local int threads_here = 1;
+
+}  // namespace
+
+int ThreadsHere() { return threads_here; }
+
+ThreadsScope::ThreadsScope(int num_threads) : before_(threads_here) {
+  threads_here = num_threads;
+}
+
+ThreadsScope::~ThreadsScope() { threads_here = before_; }
 
 int GrantedThreads(int wanted) {
   std::promise<void> counted;

@@ -43,6 +43,23 @@ void ParallelFor(std::size_t count, int num_threads, const Function& function) {
   }
 }
 
+/// Threads for loops of whoever is not told how many to use, as a detector:
+/// what the ThreadsScope of this thread says, 1 where there is none. Threads of
+/// a ParallelFor have none, so that loops within loops do not multiply them.
+int ThreadsHere();
+
+/// Sets ThreadsHere() of this thread while it lives.
+class ThreadsScope {
+ public:
+  explicit ThreadsScope(int num_threads);
+  ThreadsScope(const ThreadsScope&) = delete;
+  ThreadsScope& operator=(const ThreadsScope&) = delete;
+  ~ThreadsScope();
+
+ private:
+  const int before_;
+};
+
 /// How many of `wanted` threads (1 or more, the caller's among them) the system
 /// grants at this moment, found by a try. For libraries with threads of their
 /// own, which throw or abort when they get none.

@@ -53,19 +53,30 @@ ComparedWall Prepare(const PlaceWall& wall, const PlaceMatchOptions& options) {
   return prepared;
 }
 
-ComparedWall Move(const ComparedWall& wall, const Vector2d& pivot,
-                  const Vector3d& displacement) {
-  ComparedWall moved = wall;
-  const double c = std::cos(displacement[2]);
-  const double s = std::sin(displacement[2]);
-  Eigen::Matrix2d rotation;
-  rotation << c, -s, s, c;
-  moved.position =
-      pivot + rotation * (wall.position - pivot) + displacement.head<2>();
-  moved.direction = rotation * wall.direction;
-  moved.angle = wall.angle + displacement[2];
-  return moved;
-}
+// Moves walls by one displacement.
+class Mover {
+ public:
+  Mover(const Vector2d& pivot, const Vector3d& displacement)
+      : pivot_(pivot), displacement_(displacement) {
+    const double c = std::cos(displacement[2]);
+    const double s = std::sin(displacement[2]);
+    rotation_ << c, -s, s, c;
+  }
+
+  ComparedWall Move(const ComparedWall& wall) const {
+    ComparedWall moved = wall;
+    moved.position =
+        pivot_ + rotation_ * (wall.position - pivot_) + displacement_.head<2>();
+    moved.direction = rotation_ * wall.direction;
+    moved.angle = wall.angle + displacement_[2];
+    return moved;
+  }
+
+ private:
+  Vector2d pivot_;
+  Vector3d displacement_;
+  Eigen::Matrix2d rotation_;
+};
 
 // How `second` lies beside `first`.
 struct Comparison {
@@ -77,9 +88,14 @@ struct Comparison {
   double second_middle;
 };
 
+// Direction of the second against the first.
+double Turn(const ComparedWall& first, const ComparedWall& second) {
+  return NormalizeAngle(second.angle - first.angle);
+}
+
 Comparison Compare(const ComparedWall& first, const ComparedWall& second) {
   Comparison c;
-  c.angle = NormalizeAngle(second.angle - first.angle);
+  c.angle = Turn(first, second);
   const double from = first.Along(second.At(second.begin));
   const double to = first.Along(second.At(second.end));
   const double low = std::max(first.begin, std::min(from, to));
@@ -190,10 +206,11 @@ class Matcher {
       ranges_[j] = across;
       std::vector<double> offsets;
       for (std::size_t i = 0; i < first_.size(); ++i) {
-        const Comparison c = Compare(first_[i], wall);
-        if (std::abs(c.angle) > AngleGate(first_[i], wall, covariance_(2, 2))) {
+        if (std::abs(Turn(first_[i], wall)) >
+            AngleGate(first_[i], wall, covariance_(2, 2))) {
           continue;
         }
+        const Comparison c = Compare(first_[i], wall);
         if (c.overlap + along < options_.min_overlap) continue;
         const Vector2d to_first = first_[i].position - middle;
         const double offset = -first_[i].normal().dot(to_first);
@@ -225,10 +242,10 @@ class Matcher {
     for (int round = 0; round < kSolverRounds; ++round) {
       Matrix3d normal = prior_;
       Vector3d right = -prior_ * displacement;
+      const Mover mover(pivot_, displacement);
       for (const Candidate& pair : pairs) {
         const ComparedWall& first = first_[pair.first];
-        const ComparedWall moved =
-            Move(second_[pair.second], pivot_, displacement);
+        const ComparedWall moved = mover.Move(second_[pair.second]);
         Comparison c = Compare(first, moved);
         if (c.overlap <= 0.0) {
           // Not side by side yet: the second's own middle.
@@ -259,23 +276,27 @@ class Matcher {
     Explanation explanation;
     std::vector<Line> lines;
     double conflicts = 0.0;
+    const Mover mover(pivot_, displacement);
     for (std::size_t j = 0; j < second_.size(); ++j) {
       if (by_second_[j].empty()) continue;
-      const ComparedWall moved = Move(second_[j], pivot_, displacement);
+      const ComparedWall moved = mover.Move(second_[j]);
       double least = options_.tolerance;
       double in_conflict = 0.0;
       std::vector<WallMatch> found;
       for (const int i : by_second_[j]) {
+        // Most walls are across the other, which needs no more.
+        const double turn = std::abs(Turn(first_[i], moved));
+        const bool is_parallel = turn <= AngleGate(first_[i], moved, 0.0);
+        if (!is_parallel && turn > kConflictAngle) continue;
         const Comparison c = Compare(first_[i], moved);
         if (c.overlap < options_.min_overlap) continue;
         const double offset = std::abs(c.offset);
-        if (offset <= options_.tolerance &&
-            std::abs(c.angle) <= AngleGate(first_[i], moved, 0.0)) {
+        if (offset <= options_.tolerance && is_parallel) {
           found.push_back(
               {i, static_cast<int>(j), c.second_middle, c.overlap, c.offset});
           least = std::min(least, offset);
         } else if (offset <= options_.conflict_depth &&
-                   std::abs(c.angle) <= kConflictAngle) {
+                   turn <= kConflictAngle) {
           in_conflict = std::max(in_conflict, c.overlap);
         }
       }
@@ -408,12 +429,12 @@ class Matcher {
   bool IsAmbiguous(const WallMatch& match, std::size_t best) const {
     const Hypothesis& own = hypotheses_[best];
     const ComparedWall moved =
-        Move(second_[match.second], pivot_, own.displacement);
+        Mover(pivot_, own.displacement).Move(second_[match.second]);
     const Vector2d point = moved.At(match.along);
     for (const Hypothesis& rival : hypotheses_) {
       if (rival.worth < own.worth - options_.rival_margin) continue;
       const ComparedWall elsewhere =
-          Move(second_[match.second], pivot_, rival.displacement);
+          Mover(pivot_, rival.displacement).Move(second_[match.second]);
       const Vector2d other = elsewhere.At(match.along);
       if (std::abs(moved.normal().dot(other - point)) > options_.rival_offset) {
         return true;

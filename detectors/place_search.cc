@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/detectors/place_search.h>
 #include <plumbline/detectors/wall_ways.h>
 
@@ -12,6 +13,10 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
+
+// Places that are compared by all threads together, and between two questions
+// whether to stop.
+constexpr std::size_t kPlacesAtOnce = 32;
 
 // How well an anchor is known in the frame of its part of the graph: standard
 // deviations of the position (both coordinates together, m) and of the
@@ -36,18 +41,29 @@ class PlaceSearch {
 
   void Run() {
     MeasureAnchors();
-    for (std::size_t i = 0; i < places_.size() && !is_stopped_; ++i) {
-      ComparePlace(i);
+    // Comparisons change nothing; what they tell is taken in one by one.
+    std::vector<Comparison> compared(kPlacesAtOnce);
+    for (std::size_t i = 0; i < places_.size(); i += kPlacesAtOnce) {
+      if (scope_.ShouldStop()) return;
+      const std::size_t count = std::min(kPlacesAtOnce, places_.size() - i);
+      ParallelFor(count, ThreadsHere(),
+                  [&](std::size_t k) { ComparePlace(i + k, &compared[k]); });
+      for (std::size_t k = 0; k < count; ++k) {
+        totals_ += compared[k].tally;
+        for (const Found& one : compared[k].found) {
+          AddMatches(places_[i + k], one, compared[k].found);
+        }
+      }
     }
     scope_.Count("places", static_cast<std::int64_t>(places_.size()));
-    scope_.Count("place pairs", pairs_);
-    scope_.Count("place pairs refused: one visit", same_visit_);
-    scope_.Count("place pairs refused: no way between them", no_way_);
-    scope_.Count("place pairs refused: out of reach", out_of_reach_);
-    scope_.Count("place pairs refused: no news", no_news_);
-    scope_.Count("place pairs refused: nothing fits", nothing_fits_);
-    scope_.Count("place pairs refused: ambiguous", ambiguous_);
-    scope_.Count("place pairs refused: too little evidence", weak_);
+    scope_.Count("place pairs", totals_.pairs);
+    scope_.Count("place pairs refused: one visit", totals_.same_visit);
+    scope_.Count("place pairs refused: no way between them", totals_.no_way);
+    scope_.Count("place pairs refused: out of reach", totals_.out_of_reach);
+    scope_.Count("place pairs refused: no news", totals_.no_news);
+    scope_.Count("place pairs refused: nothing fits", totals_.nothing_fits);
+    scope_.Count("place pairs refused: ambiguous", totals_.ambiguous);
+    scope_.Count("place pairs refused: too little evidence", totals_.weak);
     scope_.Count("wall matches", matches_);
     scope_.Count("wall matches refused: contradicted", contradicted_);
     scope_.Count("wall matches refused: one already", one_already_);
@@ -60,11 +76,50 @@ class PlaceSearch {
     PlaceMatch match;
   };
 
+  // Pairs of places, and why they were refused.
+  struct Tally {
+    std::int64_t pairs = 0;
+    std::int64_t same_visit = 0;
+    std::int64_t no_way = 0;
+    std::int64_t out_of_reach = 0;
+    std::int64_t no_news = 0;
+    std::int64_t nothing_fits = 0;
+    std::int64_t ambiguous = 0;
+    std::int64_t weak = 0;
+
+    Tally& operator+=(const Tally& o) {
+      pairs += o.pairs;
+      same_visit += o.same_visit;
+      no_way += o.no_way;
+      out_of_reach += o.out_of_reach;
+      no_news += o.no_news;
+      nothing_fits += o.nothing_fits;
+      ambiguous += o.ambiguous;
+      weak += o.weak;
+      return *this;
+    }
+    void Count(PlaceMatch::Outcome outcome) {
+      no_news += outcome == PlaceMatch::Outcome::kNoNews;
+      nothing_fits += outcome == PlaceMatch::Outcome::kNothingFits;
+      ambiguous += outcome == PlaceMatch::Outcome::kAmbiguous;
+      weak += outcome == PlaceMatch::Outcome::kTooLittleEvidence;
+    }
+  };
+
+  // Of one place with those before it.
+  struct Comparison {
+    std::vector<Found> found;
+    Tally tally;
+    WallWays::Search search;
+  };
+
   const PlaceWall& Anchor(std::size_t place) const {
     return walls_.wall(places_[place].anchor);
   }
 
-  // Of each place that there is a way from to another.
+  // Of each place that there is a way from to another. From then on nobody
+  // asks for covariances that are not known, which makes marginals_ safe to ask
+  // from several threads.
   void MeasureAnchors() {
     const std::vector<std::size_t> parts = ways_.Parts();
     std::vector<int> places_in(parts.size(), 0);
@@ -137,35 +192,39 @@ class PlaceSearch {
   }
 
   // Compares a place with those before it: each pair once.
-  void ComparePlace(std::size_t index) {
-    const std::vector<double> ways = ways_.From(places_[index].anchor);
-    const std::vector<std::size_t> others = WithinReach(index, ways);
+  void ComparePlace(std::size_t index, Comparison* comparison) const {
+    comparison->found.clear();
+    comparison->tally = Tally();
+    const std::vector<double> ways =
+        ways_.From(places_[index].anchor, &comparison->search);
+    const std::vector<std::size_t> others =
+        WithinReach(index, ways, &comparison->tally);
     if (others.empty()) return;
-    const std::vector<Found> found = Match(index, others, ways);
-    for (const Found& one : found) AddMatches(places_[index], one, found);
+    comparison->found = Match(index, others, ways, &comparison->tally);
   }
 
   std::vector<std::size_t> WithinReach(std::size_t index,
-                                       const std::vector<double>& ways) {
+                                       const std::vector<double>& ways,
+                                       Tally* tally) const {
     const WallPlace& own = places_[index];
     const std::map<int, int> near =
         walls_.Within(own.anchor, options_.min_links - 1);
     std::vector<std::size_t> others;
     for (std::size_t p = 0; p < index; ++p) {
-      ++pairs_;
+      ++tally->pairs;
       if (near.count(places_[p].anchor) > 0) {
-        ++same_visit_;
+        ++tally->same_visit;
         continue;
       }
       const double way = ways[places_[p].anchor];
       if (!std::isfinite(way)) {
-        ++no_way_;
+        ++tally->no_way;
         continue;
       }
       const double sigma = options_.covariance_scale * LargestSigma(index, p);
       if (!IsInReach(own, places_[p],
                      sigma * sigma + 2.0 * AddedVariance(way))) {
-        ++out_of_reach_;
+        ++tally->out_of_reach;
         continue;
       }
       others.push_back(p);
@@ -175,7 +234,8 @@ class PlaceSearch {
 
   std::vector<Found> Match(std::size_t index,
                            const std::vector<std::size_t>& others,
-                           const std::vector<double>& ways) {
+                           const std::vector<double>& ways,
+                           Tally* tally) const {
     std::vector<FeatureId> anchors;
     for (const std::size_t p : others) anchors.push_back(Anchor(p).id);
     const std::vector<Matrix3d> covariances =
@@ -183,30 +243,22 @@ class PlaceSearch {
     const std::vector<PlaceWall> own_walls = WallsOf(places_[index]);
     std::vector<Found> found;
     for (std::size_t k = 0; k < others.size(); ++k) {
-      if ((is_stopped_ = scope_.ShouldStop())) return {};
       const WallPlace& other = places_[others[k]];
       const Matrix3d prior =
           Prior(covariances[k], Anchor(index).direction, ways[other.anchor]);
       if (!IsInReach(places_[index], other, prior(0, 0) + prior(1, 1))) {
-        ++out_of_reach_;
+        ++tally->out_of_reach;
         continue;
       }
       PlaceMatch match =
           MatchPlaces(own_walls, WallsOf(other), Anchor(others[k]).position,
                       prior, options_.match);
-      Count(match.outcome);
+      tally->Count(match.outcome);
       if (!match.matches.empty()) {
         found.push_back({others[k], std::move(match)});
       }
     }
     return found;
-  }
-
-  void Count(PlaceMatch::Outcome outcome) {
-    no_news_ += outcome == PlaceMatch::Outcome::kNoNews;
-    nothing_fits_ += outcome == PlaceMatch::Outcome::kNothingFits;
-    ambiguous_ += outcome == PlaceMatch::Outcome::kAmbiguous;
-    weak_ += outcome == PlaceMatch::Outcome::kTooLittleEvidence;
   }
 
   void AddMatches(const WallPlace& own, const Found& one,
@@ -246,16 +298,8 @@ class PlaceSearch {
   WallWays ways_;
   std::vector<WallPlace> places_;
   std::vector<AnchorSigma> sigmas_;
-  bool is_stopped_ = false;
 
-  std::int64_t pairs_ = 0;
-  std::int64_t same_visit_ = 0;
-  std::int64_t no_way_ = 0;
-  std::int64_t out_of_reach_ = 0;
-  std::int64_t no_news_ = 0;
-  std::int64_t nothing_fits_ = 0;
-  std::int64_t ambiguous_ = 0;
-  std::int64_t weak_ = 0;
+  Tally totals_;
   std::int64_t matches_ = 0;
   std::int64_t contradicted_ = 0;
   std::int64_t one_already_ = 0;

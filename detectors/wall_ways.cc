@@ -65,29 +65,30 @@ WallWays::WallWays(const WallGraph& walls, int closure_links) {
   if (longest > 0.0) step_ = longest / kStepsOfLongest;
 }
 
-std::vector<double> WallWays::From(int wall) {
+std::vector<double> WallWays::From(int wall, Search* search) const {
   std::vector<double> ways(begin_.size() - 1,
                            std::numeric_limits<double>::infinity());
   ways[wall] = 0.0;
   // Nearest first to a step: a heap's order costs more than the few ways that
   // are shortened once more.
-  if (buckets_.empty()) buckets_.resize(1);
-  buckets_[0].push_back({wall, 0.0});
-  for (std::size_t b = 0; b < buckets_.size(); ++b) {
+  std::vector<std::vector<Way>>& buckets = search->buckets_;
+  if (buckets.empty()) buckets.resize(1);
+  buckets[0].push_back({wall, 0.0});
+  for (std::size_t b = 0; b < buckets.size(); ++b) {
     // Grows while it is gone through.
-    for (std::size_t k = 0; k < buckets_[b].size(); ++k) {
-      const Way nearest = buckets_[b][k];
+    for (std::size_t k = 0; k < buckets[b].size(); ++k) {
+      const Way nearest = buckets[b][k];
       if (nearest.length > ways[nearest.to]) continue;
       for (int w = begin_[nearest.to]; w < begin_[nearest.to + 1]; ++w) {
         const Way way = {ways_[w].to, nearest.length + ways_[w].length};
         if (!(way.length < ways[way.to])) continue;
         ways[way.to] = way.length;
         const auto step = static_cast<std::size_t>(way.length / step_);
-        if (step >= buckets_.size()) buckets_.resize(step + 1);
-        buckets_[step].push_back(way);
+        if (step >= buckets.size()) buckets.resize(step + 1);
+        buckets[step].push_back(way);
       }
     }
-    buckets_[b].clear();
+    buckets[b].clear();
   }
   return ways;
 }

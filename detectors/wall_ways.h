@@ -18,11 +18,13 @@ namespace plumbline {
 /// them: then nothing is free to move between the two visits.
 class WallWays {
  public:
+  class Search;
+
   WallWays(const WallGraph& walls, int closure_links);
 
   /// Length of the shortest way from a wall to every other, m; infinite where
-  /// there is none.
-  std::vector<double> From(int wall);
+  /// there is none. `search` may be of any call before, of this thread.
+  std::vector<double> From(int wall, Search* search) const;
 
   /// Of each wall, the number of the part in which there are ways between all:
   /// the smallest index in it.
@@ -37,8 +39,16 @@ class WallWays {
   // Those of one wall after those of the one before.
   std::vector<Way> ways_;
   std::vector<int> begin_;
-  // Of the search: ways by the steps of their length, m.
+  // Of a search, m.
   double step_ = 1.0;
+};
+
+/// What a search needs, kept for its memory.
+class WallWays::Search {
+ private:
+  friend class WallWays;
+
+  // Ways by the steps of their length.
   std::vector<std::vector<Way>> buckets_;
 };
 

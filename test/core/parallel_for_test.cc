@@ -7,6 +7,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace plumbline {
@@ -43,6 +44,23 @@ TEST(ParallelForTest, TheFirstExceptionIsThrownAfterAllIsDone) {
 TEST(ParallelForTest, GrantedThreads) {
   for (const int threads : {1, 2, 9})
     EXPECT_EQ(GrantedThreads(threads), threads);
+}
+
+// Who is not told asks for the scope, which threads of a loop do not inherit.
+TEST(ParallelForTest, ThreadsHereAreThoseOfTheScope) {
+  EXPECT_EQ(ThreadsHere(), 1);
+  {
+    const ThreadsScope outer(4);
+    {
+      const ThreadsScope inner(2);
+      EXPECT_EQ(ThreadsHere(), 2);
+    }
+    EXPECT_EQ(ThreadsHere(), 4);
+    int of_thread = 0;
+    std::thread([&] { of_thread = ThreadsHere(); }).join();
+    EXPECT_EQ(of_thread, 1);
+  }
+  EXPECT_EQ(ThreadsHere(), 1);
 }
 
 // As many threads as there is room for do the work. (In a process of its own:

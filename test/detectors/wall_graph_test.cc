@@ -55,9 +55,10 @@ TEST_F(WallGraphTest, WaysGoAlongMeasurements) {
   // Along a corridor a closure says nothing about the way along it.
   AddClosure(0, 4);
   const WallGraph walls(graph_);
-  WallWays ways(walls, 2);
+  const WallWays ways(walls, 2);
+  WallWays::Search search;
   for (int repeat = 0; repeat < 2; ++repeat) {
-    EXPECT_THAT(ways.From(1),
+    EXPECT_THAT(ways.From(1, &search),
                 ElementsAre(4.0, 0.0, 4.0, 8.0, 12.0,
                             std::numeric_limits<double>::infinity()));
   }
@@ -76,13 +77,14 @@ TEST_F(WallGraphTest, AClosureThatHoldsTwoDirectionsIsAWay) {
   AddLink(far, again);
   AddLink(again, across_again);
   AddClosure(first, again);
+  WallWays::Search search;
   {
     const WallGraph walls(graph_);
-    EXPECT_NEAR(WallWays(walls, 2).From(first)[again], 100.0, 0.1);
+    EXPECT_NEAR(WallWays(walls, 2).From(first, &search)[again], 100.0, 0.1);
   }
   AddClosure(across, across_again);
   const WallGraph walls(graph_);
-  EXPECT_NEAR(WallWays(walls, 2).From(first)[again], 0.01, 1e-9);
+  EXPECT_NEAR(WallWays(walls, 2).From(first, &search)[again], 0.01, 1e-9);
 }
 
 TEST_F(WallGraphTest, PlacesCoverTheWalls) {

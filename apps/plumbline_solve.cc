@@ -640,6 +640,7 @@ void TakeMap(const std::string& name, const std::vector<Scan>& scans,
                  ReplayWithoutStructure(scans, registry, options, result,
                                         [] { return InterruptRequested(); }));
   };
+  outcome->breaks = result.breaks;
   outcome->trace = solver.trace();
   outcome->occupancy = OccupancyOptionsFromFlags();
   outcome->title = TitleOf(name) + (FLAGS_structure ? ", with structure"

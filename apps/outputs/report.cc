@@ -1,13 +1,18 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/version.h>
+#include <plumbline/factors/chi_square.h>
 #include <plumbline/outputs/map_drawing.h>
 #include <plumbline/outputs/report.h>
+#include <plumbline/outputs/report_picture.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <exception>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -22,6 +27,11 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kLeastWay = 0.1;  // m, between poses of the path
+// Of the grid's picture.
+constexpr double kMostPixels = 4e6;
+// Opaque, red, green, blue.
+constexpr std::uint32_t kOccupiedPixel = 0xff6b7682;
+constexpr std::uint32_t kFreePixel = 0xffeef1f4;
 
 // To a tenth of a millimetre, or of the unit that it is in: the page stays
 // small. What is not finite becomes null.
@@ -111,15 +121,32 @@ Json UnitsOfRows(const Graph& graph) {
   return units;
 }
 
+// In the relation's units; null when it is not finite.
+Json ErrorToJson(const Eigen::VectorXd& error) {
+  if (!error.allFinite()) return nullptr;
+  Json array = Json::array();
+  for (const double value : error) array.push_back(Digits(value));
+  return array;
+}
+
 // f(x) (-) u at the present state, in the relation's units; null when it cannot
 // be evaluated.
-Json JsonOfError(const Graph& graph, const Constraint& constraint) {
+Json ErrorNow(const Graph& graph, const Constraint& constraint) {
   try {
-    const Eigen::VectorXd error = plumbline::ErrorOf(graph, constraint);
-    if (!error.allFinite()) return nullptr;
-    Json array = Json::array();
-    for (const double value : error) array.push_back(Digits(value));
-    return array;
+    return ErrorToJson(plumbline::ErrorOf(graph, constraint));
+  } catch (const std::exception&) {
+    return nullptr;
+  }
+}
+
+// Delta at the present state; null when it cannot be evaluated.
+Json DeltaNow(const Graph& graph, const Constraint& constraint) {
+  try {
+    const double squared =
+        WhitenedError(constraint, FeaturesOf(graph, constraint)).squaredNorm();
+    if (!std::isfinite(squared)) return nullptr;
+    const int degrees = InformationRank(constraint.information);
+    return degrees < 1 ? Json(1.0) : Digits(ChiSquarePValue(squared, degrees));
   } catch (const std::exception&) {
     return nullptr;
   }
@@ -195,10 +222,29 @@ Json FeaturesToJson(const Report& report,
   return json;
 }
 
-Json StructureToJson(const Graph& graph, Names* relations, Names* sources) {
+// What tells why a constraint was broken, and whether it would be now.
+Json BrokenToJson(const Report& report, const Constraint& constraint) {
+  const Graph& graph = *report.graph;
+  Json json = {
+      {"limit",
+       Digits(std::min(report.delta_threshold, constraint.break_below))},
+      {"tolerance", ToleranceOf(constraint)},
+      {"error", ErrorNow(graph, constraint)},
+      {"delta", DeltaNow(graph, constraint)},
+  };
+  const auto record = report.breaks.find(constraint.id);
+  if (record != report.breaks.end()) {
+    json["iteration_then"] = record->second.iteration;
+    json["error_then"] = ErrorToJson(record->second.error);
+  }
+  return json;
+}
+
+Json StructureToJson(const Report& report, Names* relations, Names* sources) {
+  const Graph& graph = *report.graph;
   Json id = Json::array(), relation = Json::array(), features = Json::array();
-  Json delta = Json::array(), live = Json::array(), error = Json::array();
-  Json tolerance = Json::array(), source = Json::array();
+  Json delta = Json::array(), live = Json::array(), source = Json::array();
+  Json broken = Json::array();
   for (const Constraint* constraint : graph.Constraints()) {
     if (constraint->kind != ConstraintClass::kStructure) continue;
     const bool is_live = constraint->state == ConstraintState::kLive;
@@ -207,9 +253,8 @@ Json StructureToJson(const Graph& graph, Names* relations, Names* sources) {
     features.push_back(constraint->features);
     delta.push_back(Digits(constraint->delta));
     live.push_back(is_live ? 1 : 0);
-    // Only the broken ones are listed with their reasons.
-    error.push_back(is_live ? Json(nullptr) : JsonOfError(graph, *constraint));
-    tolerance.push_back(is_live ? Json(nullptr) : ToleranceOf(*constraint));
+    broken.push_back(is_live ? Json(nullptr)
+                             : BrokenToJson(report, *constraint));
     source.push_back(sources->Add(constraint->source));
   }
   Json json;
@@ -218,9 +263,8 @@ Json StructureToJson(const Graph& graph, Names* relations, Names* sources) {
   json["features"] = std::move(features);
   json["delta"] = std::move(delta);
   json["live"] = std::move(live);
-  json["error"] = std::move(error);
-  json["tolerance"] = std::move(tolerance);
   json["source"] = std::move(source);
+  json["broken"] = std::move(broken);
   return json;
 }
 
@@ -279,7 +323,67 @@ Json BuildingToJson(const BuildingPlan* plan) {
                      {"rooms", door.rooms},
                      {"driven", door.is_driven ? 1 : 0}});
   }
-  return {{"rooms", std::move(rooms)}, {"doors", std::move(doors)}};
+  Json walls = Json::array();
+  for (const PlanWall& wall : plan->walls) {
+    walls.push_back(ring_to_json(BodyOf(wall)));
+  }
+  return {{"rooms", std::move(rooms)},
+          {"doors", std::move(doors)},
+          {"walls", std::move(walls)}};
+}
+
+// Hypotheses that walls of different visits are one: their places among the
+// structure of StructureToJson.
+Json ClosuresToJson(const Graph& graph) {
+  Json places = Json::array();
+  int place = 0;
+  for (const Constraint* constraint : graph.Constraints()) {
+    if (constraint->kind != ConstraintClass::kStructure) continue;
+    if (constraint->type->Is(RelationRole::kSameWall)) places.push_back(place);
+    ++place;
+  }
+  return places;
+}
+
+// The grid as a picture, unknown cells clear; coarser where it is large: a
+// pixel is then occupied where one of its cells is.
+Json GridToJson(const OccupancyGrid* grid) {
+  if (grid == nullptr) return nullptr;
+  int cells = 1;
+  while (static_cast<double>(grid->width()) * grid->height() /
+             (static_cast<double>(cells) * cells) >
+         kMostPixels) {
+    ++cells;
+  }
+  ReportPicture picture;
+  picture.width = (grid->width() + cells - 1) / cells;
+  picture.height = (grid->height() + cells - 1) / cells;
+  picture.pixels.assign(static_cast<std::size_t>(picture.width) *
+                            static_cast<std::size_t>(picture.height),
+                        0);
+  for (int row = 0; row < grid->height(); ++row) {
+    for (int column = 0; column < grid->width(); ++column) {
+      const std::uint8_t value = grid->Pixel(column, row);
+      if (value == OccupancyGrid::kUnknown) continue;
+      // The first row of a picture is the upper one.
+      std::uint32_t& pixel =
+          picture.pixels[static_cast<std::size_t>(picture.height - 1 -
+                                                  row / cells) *
+                             static_cast<std::size_t>(picture.width) +
+                         static_cast<std::size_t>(column / cells)];
+      if (value == OccupancyGrid::kOccupied) {
+        pixel = kOccupiedPixel;
+      } else if (pixel == 0) {
+        pixel = kFreePixel;
+      }
+    }
+  }
+  return {{"x", Rounded(grid->origin().x())},
+          {"y", Rounded(grid->origin().y())},
+          {"resolution", Rounded(grid->resolution() * cells, 1e9)},
+          {"width", picture.width},
+          {"height", picture.height},
+          {"png", PngInBase64(picture)}};
 }
 
 Json TraceToJson(const std::vector<EmTraceRow>& trace) {
@@ -335,7 +439,13 @@ Json DataToJson(const Report& report) {
   }
   json["clusters"] = drawing.cluster_features;
   json["features"] = FeaturesToJson(report, clusters, &types, &sources);
-  json["structure"] = StructureToJson(*report.graph, &relations, &sources);
+  json["structure"] = StructureToJson(report, &relations, &sources);
+  json["closures"] = ClosuresToJson(*report.graph);
+  json["grid"] = GridToJson(report.grid);
+  json["live"] =
+      report.reload_seconds > 0
+          ? Json{{"stage", report.stage}, {"seconds", report.reload_seconds}}
+          : Json(nullptr);
   json["types"] = types.ToJson();
   json["sources"] = sources.ToJson();
   json["relations"] = relations.ToJson();
@@ -362,13 +472,13 @@ Json RunToJson(const Report& report) {
   for (const EmTraceRow& row : report.trace) {
     phase_seconds.push_back(Digits(row.phase.seconds));
   }
+  Json steps = Json::array();
+  for (const auto& [name, seconds] : summary.step_seconds) {
+    steps.push_back({name, Digits(seconds)});
+  }
   return {{"flags", std::move(flags)},
-          {"time_s",
-           {{"total", Digits(summary.total_seconds)},
-            {"parse", Digits(summary.parse_seconds)},
-            {"frontend", Digits(summary.frontend_seconds)},
-            {"detect", Digits(summary.detect_seconds)},
-            {"solve", Digits(summary.solve_seconds)}}},
+          {"time_s", {{"total", Digits(summary.total_seconds)}}},
+          {"steps", std::move(steps)},
           {"peak_memory_bytes", summary.peak_memory_bytes},
           {"phase_seconds", std::move(phase_seconds)}};
 }

@@ -1,11 +1,13 @@
 #ifndef PLUMBLINE_OUTPUTS_REPORT_H_
 #define PLUMBLINE_OUTPUTS_REPORT_H_
 
+#include <plumbline/core/break_log.h>
 #include <plumbline/core/flag_value.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/map_without_structure.h>
 #include <plumbline/outputs/em_trace.h>
+#include <plumbline/outputs/occupancy_grid.h>
 #include <plumbline/outputs/summary.h>
 #include <plumbline/plan/building_plan.h>
 
@@ -32,15 +34,24 @@ struct Report {
   std::vector<FlagValue> flags;
   double delta_threshold = 0.0;
   std::string title;
+  /// A layer under the walls: what is free and occupied; null where there is
+  /// none.
+  const OccupancyGrid* grid = nullptr;
+  /// How what is broken was broken, as far as it is known.
+  BreakRecords breaks;
+  /// Of a run that is still under way: what it is at, and after how many
+  /// seconds the page loads itself anew. 0: it stays as it is.
+  std::string stage;
+  int reload_seconds = 0;
 };
 
 /// Writes one page that needs nothing but a browser: the map with and without
-/// structure, rooms with their areas and doors, what supports each wall, the
-/// levels of structure, delta, costs by phase of EM, broken constraints, times,
-/// flags. Names and paths are data in
-/// it, never markup. The same report gives the same bytes; what differs between
-/// two runs of the same input (times, memory, flags) stands on one line, in the
-/// element with the id "run".
+/// structure, over the grid and the rooms, what supports each wall, closures,
+/// the levels of structure, delta, costs by phase of EM, broken constraints
+/// (when, and what they would be now), times, flags. Names and paths are data
+/// in it, never markup. The same report gives the same bytes; what differs
+/// between two runs of the same input (times, memory, flags) stands on one
+/// line, in the element with the id "run".
 void WriteReport(const Report& report, std::ostream& output);
 
 /// Writes it to a file, whole or not at all. Throws Error when it cannot be

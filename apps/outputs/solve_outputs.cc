@@ -82,6 +82,11 @@ class SharedParts {
     return are_rooms_found_ ? &plan.building : nullptr;
   }
 
+  // The same, once all writers have run; null when none needed it.
+  const BuildingPlan* BuildingIfMade() const {
+    return are_rooms_found_ ? &plan_.building : nullptr;
+  }
+
   // Why the plan of a log has no rooms; empty when they were looked for.
   const std::string& no_rooms() const { return no_rooms_; }
 
@@ -143,6 +148,11 @@ Report MakeReport(const SolveOutcome& outcome) {
   report.flags = outcome.flags;
   report.delta_threshold = outcome.delta_threshold;
   report.title = outcome.title;
+  report.breaks = outcome.breaks;
+  if (outcome.scans != nullptr && !outcome.trajectory.empty()) {
+    std::string reason;
+    report.grid = outcome.parts->Grid(outcome, &reason);
+  }
   return report;
 }
 
@@ -230,6 +240,10 @@ WriteResult RunWriter(const OutputWriterType& writer,
 }  // namespace
 
 SolveOutcome::SolveOutcome() : parts(std::make_shared<SharedParts>()) {}
+
+const BuildingPlan* SolveOutcome::BuildingIfMade() const {
+  return parts->BuildingIfMade();
+}
 
 void RegisterBuiltinOutputWriters(Registry* registry) {
   const auto add = [&](const char* name, const char* description,

@@ -1,12 +1,14 @@
 #ifndef PLUMBLINE_OUTPUTS_SOLVE_OUTPUTS_H_
 #define PLUMBLINE_OUTPUTS_SOLVE_OUTPUTS_H_
 
+#include <plumbline/core/break_log.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/map_without_structure.h>
 #include <plumbline/frontend/output_writer.h>
 #include <plumbline/outputs/occupancy_grid.h>
 #include <plumbline/outputs/summary.h>
+#include <plumbline/plan/building_plan.h>
 
 #include <filesystem>
 #include <functional>
@@ -46,12 +48,18 @@ struct SolveOutcome : SolvedRun {
   double ellipse_sigmas = 0.0;
   /// Makes the map without structure, for the report; may be null.
   std::function<MapWithoutStructure()> without_structure;
+  /// How broken constraints were broken, as far as it is known: for the report.
+  BreakRecords breaks;
   /// Complete but for the times and memory of writing.
   Summary summary;
   /// What several files show, made by the first that does: for the writers.
   std::shared_ptr<SharedParts> parts;
 
   SolveOutcome();
+
+  /// Rooms and doors; null when none of the files that were written needed
+  /// them, or they could not be looked for.
+  const BuildingPlan* BuildingIfMade() const;
 };
 
 /// So many logs can be solved together.

@@ -111,6 +111,7 @@ LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
       options_(WithProfile(profile_, options)),
       graph_(std::make_unique<Graph>()),
       refiner_(options_.odometry) {
+  break_log_.Attach(graph_.get());
   session_ = std::make_unique<SolverSession>(graph_.get(), registry_,
                                              options_.session);
   em_ =
@@ -197,7 +198,8 @@ void LogSolver::TakeAnew(const std::vector<Scan>& scans, double* em_seconds) {
   }
   DropEm();
   builder_.reset();
-  graph_ = std::make_unique<Graph>();
+  MakeGraph();
+  break_log_.records().clear();
   builder_ = profile_.make_builder(options_, graph_.get(), registry_);
   Renew(StructureDetectors());
   scans_since_em_ = 0;
@@ -443,6 +445,7 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Stage end,
       em_before_.detect_seconds + em_->totals().detect_seconds;
   context->result.solve_seconds =
       em_before_.solve_seconds + em_->totals().solve_seconds;
+  context->result.breaks = break_log_.records();
   scans_ = {};
   return std::move(context->result);
 }
@@ -486,7 +489,7 @@ void LogSolver::ExchangeState(Archive& archive, Stage* stage,
                               Context* context) {
   ExchangeAll(archive, *stage, context->result, context->keys, context->places,
               context->first_map, context->first_trajectory,
-              context->first_length, em_before_, trace_);
+              context->first_length, em_before_, trace_, break_log_.records());
   Exchange(archive, registry_, *graph_);
 }
 
@@ -672,7 +675,7 @@ void LogSolver::ReturnToFirstMap(Context* context) {
   context->adjustment.reset();
   StateReader reader(context->first_map);
   DropEm();
-  graph_ = std::make_unique<Graph>();
+  MakeGraph();
   Exchange(reader, registry_, *graph_);
   Renew();
   context->places.clear();
@@ -747,6 +750,12 @@ void LogSolver::CheckMap(Context* context) const {
                    });
 }
 
+void LogSolver::MakeGraph() {
+  break_log_.Detach();
+  graph_ = std::make_unique<Graph>();
+  break_log_.Attach(graph_.get());
+}
+
 void LogSolver::ClearGraph() {
   Transaction clear;
   for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
@@ -796,6 +805,7 @@ void LogSolver::ReplaceEm(Hierarchy detectors, const EmOptions& options) {
 void LogSolver::TraceEm() {
   em_->SetTrace([this](EmPhase phase) {
     phase.iteration += em_before_.iterations;
+    break_log_.SetIteration(phase.iteration);
     trace_.push_back(std::move(phase));
   });
 }

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_PIPELINE_LOG_SOLVER_H_
 #define PLUMBLINE_PIPELINE_LOG_SOLVER_H_
 
+#include <plumbline/core/break_log.h>
 #include <plumbline/core/em.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/hierarchy_spec.h>
@@ -134,6 +135,8 @@ struct LogSolverResult {
   /// replay the log in another way (without_structure.h).
   std::vector<RefinedScan> refined;
   std::vector<KeyScanRecord> records;
+  /// How what is broken in the map was broken.
+  BreakRecords breaks;
 };
 
 /// Whether poses are recovered once all scans are in (pose_recovery.h): the map
@@ -288,6 +291,8 @@ class LogSolver {
   void BeginClosing();
   void CountEm();
   void ReplaceEm(Hierarchy detectors, const EmOptions& options);
+  // An empty graph in place of the one there was.
+  void MakeGraph();
   // Takes everything out of the graph: what the front-end made of the scans has
   // served to place the poses.
   void ClearGraph();
@@ -302,6 +307,8 @@ class LogSolver {
   const RawFeatureProfile& profile_;
   LogSolverOptions options_;
   std::unique_ptr<Graph> graph_;
+  // Of what is broken in the graph.
+  BreakLog break_log_;
   std::unique_ptr<SolverSession> session_;
   std::unique_ptr<EmOrchestrator> em_;
   OdometryRefiner refiner_;

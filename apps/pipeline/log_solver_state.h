@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_PIPELINE_LOG_SOLVER_STATE_H_
 #define PLUMBLINE_PIPELINE_LOG_SOLVER_STATE_H_
 
+#include <plumbline/core/break_log.h>
 #include <plumbline/core/em.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
@@ -38,20 +39,26 @@ void Exchange(Archive& archive, EmPhase& row) {
 }
 
 template <typename Archive>
+void Exchange(Archive& archive, BreakRecord& record) {
+  auto& [iteration, error] = record;
+  ExchangeAll(archive, iteration, error);
+}
+
+template <typename Archive>
 void Exchange(Archive& archive, LogSolverResult& result) {
   auto& [trajectory, em, initial_cost, final_cost, frontend_seconds,
          detect_seconds, solve_seconds, relocalization_seconds,
          completion_seconds, adjustment_seconds, glimpsed_walls, scan_relations,
          wall_votes, scan_seconds, key_scans, wide_searches, refused_matches,
          lost_tracks, loose, feature_matches, features_created,
-         second_map_refused, interrupted, refined, records] = result;
+         second_map_refused, interrupted, refined, records, breaks] = result;
   ExchangeAll(archive, trajectory, em, initial_cost, final_cost,
               frontend_seconds, detect_seconds, solve_seconds,
               relocalization_seconds, completion_seconds, adjustment_seconds,
               glimpsed_walls, scan_relations, wall_votes, scan_seconds,
               key_scans, wide_searches, refused_matches, lost_tracks, loose,
               feature_matches, features_created, second_map_refused,
-              interrupted, refined, records);
+              interrupted, refined, records, breaks);
 }
 
 // Types go by their registered names.

@@ -6,17 +6,20 @@
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/graph_json.h>
 #include <plumbline/core/initial_guess.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/plugin.h>
 #include <plumbline/core/sha256.h>
 #include <plumbline/core/stopwatch.h>
+#include <plumbline/core/text_file.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/core/version.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/key_scan_archive.h>
 #include <plumbline/frontend/log_reader.h>
 #include <plumbline/frontend/scan_odometry.h>
 #include <plumbline/outputs/building_frame.h>
@@ -154,6 +157,18 @@ class RunClock {
   double step_begin_ = 0.0;
 };
 
+// Which files --outputs asks for. Where a log is only localized the map is as
+// it was, and so are the files that are made of it alone.
+std::set<std::string> OutputsFromFlags(const Registry& registry) {
+  std::set<std::string> names = SelectOutputs(FLAGS_outputs, registry);
+  if (!FLAGS_localize) return names;
+  std::set<std::string> left;
+  for (const char* name : {"map.png", "map.svg", "trajectory.tum"}) {
+    if (names.count(name) > 0) left.insert(name);
+  }
+  return left;
+}
+
 // Writes all files and puts them in place together, the summary last: it knows
 // what the others took.
 void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
@@ -172,8 +187,8 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
     {
       std::unique_ptr<Progress> progress;
       written = WriteSolveOutputs(
-          *outcome, SelectOutputs(FLAGS_outputs, *outcome->registry),
-          folder->staging(), NumThreadsFromFlags(), [&](int done, int total) {
+          *outcome, OutputsFromFlags(*outcome->registry), folder->staging(),
+          NumThreadsFromFlags(), [&](int done, int total) {
             if (progress == nullptr) {
               progress = std::make_unique<Progress>("writing", "files", total);
             }
@@ -202,7 +217,7 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
 
 // All files that the run reads, as far as flags name them.
 std::vector<std::filesystem::path> InputFiles() {
-  std::vector<std::filesystem::path> files = {FLAGS_structure_prior};
+  std::vector<std::filesystem::path> files = {FLAGS_structure_prior, FLAGS_map};
   for (const std::string& input : InputsFromFlags()) {
     files.emplace_back(input == "-" ? "/dev/stdin" : input);
   }
@@ -634,6 +649,13 @@ void TakeMap(const std::string& name, const std::vector<Scan>& scans,
   const Pose2 moved_by = AlignOutputs(result.trajectory, outcome);
   if (!InterruptRequested()) TakeMarginals(nullptr, outcome);
   outcome->scans = &scans;
+  outcome->key_scans = [&scans, &result, moved_by] {
+    std::vector<Pose2> moved;
+    for (const Pose2& pose : result.trajectory) {
+      moved.push_back(Compose(moved_by, pose));
+    }
+    return MakeKeyScanArchive(scans, result.refined, result.records, moved);
+  };
   outcome->without_structure = [&scans, &registry, &options, &result,
                                 moved_by] {
     return Moved(moved_by,
@@ -817,18 +839,91 @@ SeveralLogsResult RunSeveralLogs(const Registry& registry,
   return SolveSeveralLogs(registry, std::move(logs), options, control);
 }
 
+// The map of earlier logs.
+struct EarlierMap {
+  KeyScanArchive key_scans;
+  Graph graph;
+};
+
+// What --map names; null without.
+std::unique_ptr<EarlierMap> EarlierMapFromFlags(const Registry& registry) {
+  constexpr std::size_t kLargestMap = std::size_t{1} << 31;
+  if (FLAGS_map.empty()) {
+    if (!FLAGS_localize) return nullptr;
+    throw Error("--localize", 0, "nothing to localize in", "--map=map.json");
+  }
+  if (FLAGS_localize && FLAGS_align == "building") {
+    throw Error("--align", 0, "--localize gives poses in the frame of --map",
+                "one of them");
+  }
+  const std::string text = ReadTextFile(FLAGS_map, kLargestMap);
+  auto map = std::make_unique<EarlierMap>();
+  map->key_scans = ReadKeyScans(text, FLAGS_map);
+  std::istringstream input(text);
+  ReadGraphJson(input, FLAGS_map, registry, &map->graph);
+  std::error_code error;
+  if (std::filesystem::equivalent(
+          std::filesystem::absolute(FLAGS_map).parent_path(), FLAGS_output_dir,
+          error)) {
+    throw Error("--output_dir", 0, "is the folder of --map", "another folder");
+  }
+  return map;
+}
+
+// Says which logs fit nowhere in the earlier map.
+void TellElsewhere(const std::vector<std::unique_ptr<OpenInput>>& inputs,
+                   const SeveralLogsResult& solved) {
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const TrackPlacement& placement = solved.logs[i].placement;
+    if (placement.found) continue;
+    std::fprintf(stderr, "%s fits nowhere in %s: %s\n",
+                 PrintableUtf8(inputs[i]->log.name).c_str(),
+                 PrintableUtf8(FLAGS_map).c_str(), placement.why_not.c_str());
+  }
+  std::fprintf(stderr, "nothing is written\n");
+}
+
+// Writes where the robot was in the earlier map.
+void WriteLocalized(const EarlierMap& earlier, const Registry& registry,
+                    const std::string& title, const MapOfLogs& map,
+                    Summary summary, RunClock* clock, OutputFolder* folder) {
+  SolveOutcome outcome;
+  outcome.summary = std::move(summary);
+  TellOfTrack(title, map.scans, map.result, &outcome.summary);
+  const auto begin =
+      static_cast<std::ptrdiff_t>(earlier.key_scans.scans.size());
+  const std::vector<Scan> scans(map.scans.begin() + begin, map.scans.end());
+  const std::vector<Pose2> poses(map.result.trajectory.begin() + begin,
+                                 map.result.trajectory.end());
+  outcome.summary.scans = outcome.summary.scans_in_log =
+      static_cast<std::int64_t>(poses.size());
+  outcome.trajectory = TimedTrajectory(scans, poses);
+  outcome.graph = &earlier.graph;
+  outcome.registry = &registry;
+  outcome.scans = &scans;
+  outcome.title = title + ", in " + TitleOf(FLAGS_map);
+  WriteOutputs(&outcome, clock, folder);
+}
+
+// `earlier`: the map that the logs continue or are found in, or null.
 int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
               const std::vector<std::optional<Pose2>>& starts,
-              const Registry& registry, RunClock* clock, OutputFolder* folder) {
+              const EarlierMap* earlier, const Registry& registry,
+              RunClock* clock, OutputFolder* folder) {
   SeveralLogsOptions options;
   options.solver = LogSolverOptionsFromFlags(registry);
   options.starts = starts;
+  if (earlier != nullptr) {
+    options.earlier = &earlier->key_scans;
+    options.earlier_wall_length = LengthOfWalls(earlier->graph);
+    options.localize_only = FLAGS_localize;
+  }
   CheckHierarchy(options.solver, registry);
   RemarkOnFlags("--input", "list of logs", "graphs", GraphFlags());
   if (options.solver.features != RawFeatures::kSegments ||
       options.solver.refine != Refinement::kFull) {
     throw Error("--input", 0,
-                "several logs do not go with --features=points, "
+                "several logs, or --map, do not go with --features=points, "
                 "--refine=map or --refine=none",
                 "segments and full refinement");
   }
@@ -845,7 +940,16 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
                  "written\n");
     return kExitInterrupted;
   }
+  if (solved.is_elsewhere) {
+    TellElsewhere(inputs, solved);
+    return kExitElsewhere;
+  }
   common.logs = DescribeLogs(inputs, solved);
+  if (FLAGS_localize) {
+    WriteLocalized(*earlier, registry, TitleOf(inputs.front()->log.name),
+                   solved.maps.front(), std::move(common), clock, folder);
+    return kExitSuccess;
+  }
 
   // The output folder's own map comes last: its summary is the run's.
   for (std::size_t m = solved.maps.size(); m-- > 0;) {
@@ -1033,6 +1137,7 @@ int Run() {
   }
   const auto starts =
       ForFlag("start_pose", [&] { return StartPosesFromFlags(names.size()); });
+  const std::unique_ptr<EarlierMap> earlier = EarlierMapFromFlags(registry);
   std::vector<std::unique_ptr<OpenInput>> inputs;
   for (const std::string& name : names) {
     inputs.push_back(Open(name, registry, reader));
@@ -1040,7 +1145,7 @@ int Run() {
       std::fprintf(stderr, "interrupted: nothing was read yet\n");
       return kExitInterrupted;
     }
-    if (names.size() > 1 && inputs.back()->is_graph) {
+    if ((names.size() > 1 || earlier != nullptr) && inputs.back()->is_graph) {
       throw Error("--input", 0, name + " is a graph",
                   "one graph alone, or logs");
     }
@@ -1048,15 +1153,14 @@ int Run() {
   // What is wrong with the folder is said before the work, not after it.
   OutputFolder folder(FLAGS_output_dir, NamesOfAllOutputs(registry),
                       InputFiles());
-  folder.CheckTargets(
-      FilesOfOutputs(SelectOutputs(FLAGS_outputs, registry), registry));
+  folder.CheckTargets(FilesOfOutputs(OutputsFromFlags(registry), registry));
   if (!folder.cleaned().empty()) {
     Remark("%s: removed what a run that was killed had left: %s",
            FLAGS_output_dir.c_str(), Joined(folder.cleaned()).c_str());
   }
   const ThreadsScope threads(NumThreadsFromFlags());
-  if (inputs.size() > 1) {
-    return SolveLogs(inputs, starts, registry, &clock, &folder);
+  if (inputs.size() > 1 || earlier != nullptr) {
+    return SolveLogs(inputs, starts, earlier.get(), registry, &clock, &folder);
   }
   const OpenInput& input = *inputs.front();
   return input.is_graph

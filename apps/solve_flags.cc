@@ -26,11 +26,20 @@ DEFINE_string(input, "",
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 DEFINE_string(log_reader, "",
               "Format of the log; empty: recognized by content");
-DEFINE_string(start_pose, "",
-              "Where the first scan of a log is in the frame of the first "
-              "log's map, roughly, as log:x,y,degrees, several separated by "
-              "slashes (2:3.5,-1,90/3:0,0,0); empty: found by what the logs "
-              "saw");
+DEFINE_string(
+    map, "",
+    "map.json of an earlier run on logs of the same building: its map "
+    "is continued with --input, in its frame. Ends with status 4, and "
+    "writes nothing, when a log fits nowhere in it");
+DEFINE_bool(localize, false,
+            "Only find --input in --map, which stays as it is: "
+            "trajectory.tum has the poses in its frame");
+DEFINE_string(
+    start_pose, "",
+    "Where the first scan of a log is in the frame of the first "
+    "log's map (or of --map), roughly, as log:x,y,degrees, several "
+    "separated by slashes (2:3.5,-1,90/3:0,0,0); empty: found by what "
+    "the logs saw");
 
 DEFINE_string(
     initial_guess, "file",
@@ -348,8 +357,8 @@ void RefuseForPoints(const std::string& flag, const std::string& value,
 std::vector<FlagGroup> SolveFlagGroups() {
   return {
       {"Input and output",
-       {"input", "output_dir", "log_reader", "start_pose", "outputs", "align",
-        "grid_resolution"}},
+       {"input", "output_dir", "log_reader", "map", "localize", "start_pose",
+        "outputs", "align", "grid_resolution"}},
       {"Graphs", GraphFlags()},
       {"Uncertainty", {"marginals", "marginals_hold_gauge", "ellipse_sigmas"}},
       {"Structure",
@@ -381,6 +390,8 @@ std::vector<std::string> GraphFlags() {
 
 std::vector<std::string> LogFlags() {
   return {"align",
+          "map",
+          "localize",
           "grid_resolution",
           "checkpoint_every",
           "em_every",
@@ -518,22 +529,24 @@ std::vector<std::string> InputsFromFlags() {
 
 std::vector<std::optional<Pose2>> StartPosesFromFlags(std::size_t num_logs) {
   std::vector<std::optional<Pose2>> starts(num_logs);
+  const std::size_t first_log = FLAGS_map.empty() ? 2 : 1;
   std::istringstream entries(FLAGS_start_pose);
   std::string entry;
   while (std::getline(entries, entry, '/')) {
     const std::size_t colon = entry.find(':');
     const auto refuse = [&] {
       throw Error("--start_pose", 0, "'" + entry + "'",
-                  "log:x,y,degrees, the log from 2 to " +
-                      std::to_string(num_logs) +
-                      " by its place in --input: 2:3.5,-1,90");
+                  "log:x,y,degrees, the log from " + std::to_string(first_log) +
+                      " to " + std::to_string(num_logs) +
+                      " by its place in --input: " + std::to_string(first_log) +
+                      ":3.5,-1,90");
     };
     if (colon == std::string::npos) refuse();
     std::size_t log = 0;
     const auto [end, error] =
         std::from_chars(entry.data(), entry.data() + colon, log);
-    if (error != std::errc() || end != entry.data() + colon || log < 2 ||
-        log > num_logs) {
+    if (error != std::errc() || end != entry.data() + colon ||
+        log < first_log || log > num_logs) {
       refuse();
     }
     const std::vector<double> numbers =

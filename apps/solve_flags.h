@@ -18,6 +18,8 @@
 DECLARE_string(input);
 DECLARE_string(output_dir);
 DECLARE_string(log_reader);
+DECLARE_string(map);
+DECLARE_bool(localize);
 DECLARE_string(start_pose);
 DECLARE_string(outputs);
 DECLARE_string(align);
@@ -68,7 +70,8 @@ LaserOptions LaserOptionsFromFlags();
 /// file whose name has commas is one.
 std::vector<std::string> InputsFromFlags();
 
-/// By log: where --start_pose says that it starts, in the first log's frame.
+/// By log: where --start_pose says that it starts, in the frame of the first
+/// log, or of --map.
 /// Throws Error when it does not parse or names a log that is not there.
 std::vector<std::optional<Pose2>> StartPosesFromFlags(std::size_t num_logs);
 

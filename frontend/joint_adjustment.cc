@@ -166,6 +166,10 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
           MotionTo(records_, ArrivalAt(records_, begins_, p)).mean;
     }
   }
+  options_.relations.num_held =
+      static_cast<int>(std::lower_bound(begins_.begin(), begins_.end(),
+                                        options_.num_held_records) -
+                       begins_.begin());
   finder_ = std::make_unique<ScanMatchFinder>(places_, options_.relations);
 }
 
@@ -221,7 +225,9 @@ JointAdjustment::JointAdjustment(
     Feature feature;
     feature.type = &pose_type;
     // Without a map the frame is that of the first pose.
-    feature.fixed = !has_map && provisional.empty();
+    const auto num_held = static_cast<std::size_t>(options_.relations.num_held);
+    feature.fixed =
+        (!has_map && provisional.empty()) || provisional.size() < num_held;
     feature.parameters = {pose[0], pose[1], pose[2]};
     feature.observations = 1;
     feature.source = kSource;
@@ -229,6 +235,7 @@ JointAdjustment::JointAdjustment(
   }
   for (std::size_t p = 1; p < poses.size(); ++p) {
     const PlaceArrival arrival = ArrivalAt(records_, begins_, p);
+    if (static_cast<int>(p) < options_.relations.num_held) continue;
     const UncertainPose2 motion = MotionTo(records_, arrival);
     const Eigen::Matrix3d information = motion.covariance.inverse();
     transaction.AddConstraint(MakeMeasurement(

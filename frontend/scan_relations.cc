@@ -118,6 +118,7 @@ std::vector<std::vector<int>> Assign(const std::vector<Submap>& submaps,
         for (const int i : found->second) {
           const Submap& submap = submaps[i];
           if (k >= submap.begin && k < submap.end) continue;
+          if (k < options.num_held && submap.end <= options.num_held) continue;
           const double distance =
               (poses[submap.middle()] - poses[k]).head<2>().norm();
           if (distance <= options.radius) near.emplace_back(distance, i);

@@ -36,6 +36,8 @@ struct ScanRelationOptions {
   /// were matched or tried are matched anew.
   double retry_distance = 0.1;
   double retry_rotation = DegToRad(1.5);
+  /// The first so many places are not matched with each other.
+  int num_held = 0;
   /// The result does not depend on it.
   int num_threads = 1;
 };

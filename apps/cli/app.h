@@ -20,6 +20,8 @@ enum ExitStatus {
   kExitInput = 2,
   /// Any other exception.
   kExitInternal = 3,
+  /// The log is of another building than the map that it was to go into.
+  kExitElsewhere = 4,
   /// Ctrl-C, with what was done so far written out (128 + SIGINT).
   kExitInterrupted = 130,
 };

@@ -74,18 +74,33 @@ void AppendDoor(const PlanDoor& door, int index, std::string* text) {
   *text += door.is_driven ? "true}" : "false}";
 }
 
+void AppendPlan(const BuildingPlan& plan, std::string* text) {
+  *text += ",\n\"rooms\": [";
+  for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
+    *text += i > 0 ? ",\n" : "\n";
+    AppendRoom(plan, static_cast<int>(i), text);
+  }
+  *text += "\n],\n\"doors\": [";
+  for (std::size_t i = 0; i < plan.doors.size(); ++i) {
+    *text += i > 0 ? ",\n" : "\n";
+    AppendDoor(plan.doors[i], static_cast<int>(i), text);
+  }
+  *text += "\n]";
+}
+
 }  // namespace
 
 void WriteMapJson(const Graph& graph, const FeatureCovariances* covariances,
-                  const BuildingPlan* plan, std::ostream& output) {
-  if (plan == nullptr) {
+                  const BuildingPlan* plan, const KeyScanArchive* key_scans,
+                  std::ostream& output) {
+  if (plan == nullptr && key_scans == nullptr) {
     WriteGraphJson(graph, output, covariances);
     return;
   }
   std::ostringstream of_graph;
   WriteGraphJson(graph, of_graph, covariances);
   std::string text = of_graph.str();
-  // The rooms go into the same object.
+  // All goes into the same object.
   const std::string end = "\n}\n";
   if (text.size() < end.size() ||
       text.compare(text.size() - end.size(), end.size(), end) != 0) {
@@ -93,24 +108,20 @@ void WriteMapJson(const Graph& graph, const FeatureCovariances* covariances,
                           "a brace on a line of its own");
   }
   text.resize(text.size() - end.size());
-  text += ",\n\"rooms\": [";
-  for (std::size_t i = 0; i < plan->rooms.size(); ++i) {
-    text += i > 0 ? ",\n" : "\n";
-    AppendRoom(*plan, static_cast<int>(i), &text);
+  if (plan != nullptr) AppendPlan(*plan, &text);
+  if (key_scans != nullptr) {
+    text += ",\n";
+    AppendKeyScans(*key_scans, &text);
   }
-  text += "\n],\n\"doors\": [";
-  for (std::size_t i = 0; i < plan->doors.size(); ++i) {
-    text += i > 0 ? ",\n" : "\n";
-    AppendDoor(plan->doors[i], static_cast<int>(i), &text);
-  }
-  text += "\n]" + end;
+  text += end;
   output.write(text.data(), static_cast<std::streamsize>(text.size()));
 }
 
 void WriteMapJson(const Graph& graph, const FeatureCovariances* covariances,
-                  const BuildingPlan* plan, const std::string& path) {
+                  const BuildingPlan* plan, const KeyScanArchive* key_scans,
+                  const std::string& path) {
   WriteFileAtomically(path, [&](std::ostream& output) {
-    WriteMapJson(graph, covariances, plan, output);
+    WriteMapJson(graph, covariances, plan, key_scans, output);
   });
 }
 

@@ -3,6 +3,7 @@
 
 #include <plumbline/core/graph.h>
 #include <plumbline/core/graph_json.h>
+#include <plumbline/frontend/key_scan_archive.h>
 #include <plumbline/plan/building_plan.h>
 
 #include <ostream>
@@ -24,14 +25,18 @@ namespace plumbline {
 /// Positions are [x, y], m, map frame; numbers are those of floorplan.geojson
 /// and rooms.csv. Without a plan (null) there is neither "rooms" nor "doors";
 /// both are empty when rooms were looked for and there are none. ReadGraphJson
-/// reads the file and passes over both.
+/// reads the file and passes over both. Last come the key scans
+/// (AppendKeyScans), from which another run goes on; without them (null) there
+/// is none of it.
 void WriteMapJson(const Graph& graph, const FeatureCovariances* covariances,
-                  const BuildingPlan* plan, std::ostream& output);
+                  const BuildingPlan* plan, const KeyScanArchive* key_scans,
+                  std::ostream& output);
 
 /// Writes it to a file, whole or not at all. Throws Error when it cannot be
 /// written.
 void WriteMapJson(const Graph& graph, const FeatureCovariances* covariances,
-                  const BuildingPlan* plan, const std::string& path);
+                  const BuildingPlan* plan, const KeyScanArchive* key_scans,
+                  const std::string& path);
 
 }  // namespace plumbline
 

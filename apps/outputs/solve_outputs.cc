@@ -275,10 +275,14 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
       Always([](const SolveOutcome& outcome, const path& folder) {
         WriteMapSvg(Drawing(outcome), folder / "map.svg");
       }));
-  add("map.json", "every feature and constraint, rooms and doors", true, false,
-      Always([](const SolveOutcome& outcome, const path& folder) {
+  add("map.json", "every feature and constraint, rooms and doors, key scans",
+      true, false, Always([](const SolveOutcome& outcome, const path& folder) {
+        KeyScanArchive key_scans;
+        if (outcome.key_scans) key_scans = outcome.key_scans();
         WriteMapJson(*outcome.graph, &outcome.covariances,
-                     outcome.parts->Building(outcome), folder / "map.json");
+                     outcome.parts->Building(outcome),
+                     key_scans.scans.empty() ? nullptr : &key_scans,
+                     folder / "map.json");
       }));
   add("graph.g2o", "the same as g2o text", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {

@@ -4,6 +4,7 @@
 #include <plumbline/core/break_log.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/frontend/key_scan_archive.h>
 #include <plumbline/frontend/map_without_structure.h>
 #include <plumbline/frontend/output_writer.h>
 #include <plumbline/outputs/occupancy_grid.h>
@@ -50,6 +51,8 @@ struct SolveOutcome : SolvedRun {
   std::function<MapWithoutStructure()> without_structure;
   /// How broken constraints were broken, as far as it is known: for the report.
   BreakRecords breaks;
+  /// Makes the key scans that map.json keeps; null for a graph.
+  std::function<KeyScanArchive()> key_scans;
   /// Complete but for the times and memory of writing.
   Summary summary;
   /// What several files show, made by the first that does: for the writers.

@@ -1,4 +1,8 @@
 #include <plumbline/core/error.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/core/session.h>
+#include <plumbline/frontend/joint_adjustment.h>
+#include <plumbline/frontend/relocalization.h>
 #include <plumbline/pipeline/several_logs.h>
 
 #include <algorithm>
@@ -17,6 +21,16 @@ constexpr double kTieSigma = 0.1;
 constexpr double kTieSigmaPerMetre = 0.02;
 constexpr double kTieAngle = DegToRad(1.0);
 constexpr double kTieAnglePerMetre = DegToRad(0.1);
+
+// Key scans of an earlier map, as those of a log that was solved.
+LogSolverResult ResultOf(const KeyScanArchive& earlier) {
+  LogSolverResult result;
+  result.trajectory = earlier.trajectory;
+  result.refined = earlier.refined;
+  result.records = earlier.records;
+  result.scan_seconds.assign(earlier.scans.size(), 0.0f);
+  return result;
+}
 
 // A log as far as its own first map.
 struct FirstMap {
@@ -137,8 +151,16 @@ class Merger {
     if (control_.run.step) control_.run.step("placing of logs");
     std::vector<std::size_t> left;
     for (std::size_t i = 0; i < logs_.size(); ++i) left.push_back(i);
+    if (options_.earlier != nullptr) {
+      FinishInEarlierMap(std::move(left));
+      return std::move(result_);
+    }
     while (!left.empty()) {
-      const Group group = Gather(&left);
+      Group group;
+      group.logs.push_back(left.front());
+      group.views = maps_[left.front()].views;
+      left.erase(left.begin());
+      Gather(&left, &group);
       if (IsStopped()) return std::move(result_);
       Finish(group);
       if (result_.interrupted) return std::move(result_);
@@ -177,19 +199,14 @@ class Merger {
     return i < options_.starts.size() ? options_.starts[i] : std::nullopt;
   }
 
-  // The first log that is left and all that can be placed with it. They leave
-  // `left`.
-  Group Gather(std::vector<std::size_t>* left) {
-    Group group;
-    group.logs.push_back(left->front());
-    group.views = maps_[left->front()].views;
-    left->erase(left->begin());
+  // Adds all logs that can be placed in the group. They leave `left`.
+  void Gather(std::vector<std::size_t>* left, Group* group) {
     bool grows = true;
     while (grows) {
       grows = false;
       for (std::size_t k = 0; k < left->size();) {
-        if (IsStopped()) return group;
-        if (!Place((*left)[k], &group)) {
+        if (IsStopped()) return;
+        if (!Place((*left)[k], group)) {
           ++k;
           continue;
         }
@@ -198,17 +215,74 @@ class Merger {
         grows = true;
       }
     }
-    return group;
+  }
+
+  void FinishInEarlierMap(std::vector<std::size_t> left) {
+    const KeyScanArchive& earlier = *options_.earlier;
+    Group group;
+    std::vector<int> keys;
+    for (const KeyScanRecord& record : earlier.records) {
+      keys.push_back(record.scan);
+    }
+    group.views = MakeKeyViews(earlier.scans, keys, earlier.trajectory,
+                               options_.placement.points);
+    Gather(&left, &group);
+    if (IsStopped()) return;
+    result_.is_elsewhere = !left.empty();
+    if (result_.is_elsewhere) return;
+    if (options_.localize_only) {
+      Localize(group);
+    } else if (!FinishTogether(group)) {
+      for (const std::size_t i : group.logs) RefuseTogether(i);
+      result_.is_elsewhere = true;
+    }
+  }
+
+  // The poses of the logs of the group in the earlier map.
+  void Localize(const Group& group) {
+    if (control_.run.step) control_.run.step("localization");
+    MapOfLogs map;
+    map.logs = group.logs;
+    map.scans = options_.earlier->scans;
+    map.result = ResultOf(*options_.earlier);
+    for (const std::size_t i : group.logs) {
+      Append(result_.logs[i].placement.from, &maps_[i], &map.result);
+      std::move(logs_[i].scans.begin(), logs_[i].scans.end(),
+                std::back_inserter(map.scans));
+    }
+    std::vector<Pose2> keys;
+    for (const KeyScanRecord& record : map.result.records) {
+      keys.push_back(
+          map.result.trajectory[static_cast<std::size_t>(record.scan)]);
+    }
+    Graph graph;
+    SolverSession session(&graph, registry_, options_.solver.session);
+    JointAdjustmentOptions adjustment_options = options_.solver.adjustment;
+    adjustment_options.num_held_records = options_.earlier->records.size();
+    JointAdjustment adjustment(&graph, &session, registry_, map.scans,
+                               map.result.refined, map.result.records, keys,
+                               kNoId, adjustment_options, control_.run.stop);
+    adjustment.Adjust();
+    if (IsStopped()) return;
+    adjustment.MatchAnew();
+    adjustment.Adjust();
+    if (IsStopped()) return;
+    adjustment.EstimateVariances();
+    map.result.scan_relations = adjustment.num_relations();
+    map.result.trajectory = InterpolateScans(
+        map.result.refined, map.result.records, adjustment.KeyPoses());
+    Add(std::move(map));
   }
 
   // Adds a log to the group if it has its place there.
   bool Place(std::size_t i, Group* group) {
     FirstMap& log = maps_[i];
     // The start is given in the first log's frame.
-    const TrackPlacement placement =
-        PlaceTrack(group->views, log.views,
-                   group->logs.front() == 0 ? StartOf(i) : std::nullopt,
-                   options_.placement, control_.run.stop);
+    const TrackPlacement placement = PlaceTrack(
+        group->views, log.views,
+        options_.earlier != nullptr || group->logs.front() == 0 ? StartOf(i)
+                                                                : std::nullopt,
+        options_.placement, control_.run.stop);
     // What came nearest to being its place is what there is to say of it.
     TrackPlacement& told = result_.logs[i].placement;
     if (placement.found || placement.agreeing >= told.agreeing) {
@@ -228,11 +302,7 @@ class Merger {
   void Finish(const Group& group) {
     if (group.logs.size() > 1 && FinishTogether(group)) return;
     for (const std::size_t i : group.logs) {
-      if (group.logs.size() > 1) {
-        result_.logs[i].placement.found = false;
-        result_.logs[i].placement.why_not =
-            "the map of the logs together has hardly any walls";
-      }
+      if (group.logs.size() > 1) RefuseTogether(i);
       MapOfLogs map;
       map.logs = {i};
       map.scans = std::move(logs_[i].scans);
@@ -244,12 +314,25 @@ class Merger {
     }
   }
 
+  void RefuseTogether(std::size_t i) {
+    result_.logs[i].placement.found = false;
+    result_.logs[i].placement.why_not =
+        "the map of the logs together has hardly any walls";
+  }
+
   // False when the logs have no map together.
   bool FinishTogether(const Group& group) {
     MapOfLogs map;
     map.logs = group.logs;
     LogSolverResult first;
     double wall_length = 0.0;
+    std::size_t at = 0;
+    if (options_.earlier != nullptr) {
+      first = ResultOf(*options_.earlier);
+      map.scans = options_.earlier->scans;
+      wall_length = options_.earlier_wall_length;
+      at = map.scans.size();
+    }
     std::vector<LogSolverResult> before;
     for (const std::size_t i : group.logs) {
       before.push_back(maps_[i].result);
@@ -263,7 +346,6 @@ class Merger {
     map.result = map.solver->GoOn(map.scans, std::move(first), wall_length,
                                   control_.run);
     if (map.result.second_map_refused) {
-      std::size_t at = 0;
       for (std::size_t k = 0; k < group.logs.size(); ++k) {
         const std::size_t i = group.logs[k];
         for (Scan& scan : logs_[i].scans) scan = std::move(map.scans[at++]);
@@ -276,7 +358,8 @@ class Merger {
   }
 
   void Add(MapOfLogs map) {
-    std::size_t begin = 0;
+    std::size_t begin =
+        options_.earlier != nullptr ? options_.earlier->scans.size() : 0;
     for (const std::size_t i : map.logs) {
       LogInMap& log = result_.logs[i];
       log.map = result_.maps.size();
@@ -306,6 +389,12 @@ SeveralLogsResult SolveSeveralLogs(const Registry& registry,
       options.solver.refine != Refinement::kFull) {
     throw PLUMBLINE_ERROR("several logs without a second map",
                           "segments and full refinement");
+  }
+  if (options.localize_only && options.earlier == nullptr) {
+    throw PLUMBLINE_ERROR("nothing to localize in", "an earlier map");
+  }
+  if (options.earlier != nullptr && options.earlier->scans.empty()) {
+    throw PLUMBLINE_ERROR("an earlier map without key scans", "key scans");
   }
   for (std::size_t i = 0; i < logs.size(); ++i) {
     if (logs[i].scans.empty()) {

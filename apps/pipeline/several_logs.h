@@ -3,6 +3,7 @@
 
 #include <plumbline/core/registry.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/key_scan_archive.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/track_placement.h>
 #include <plumbline/pipeline/log_solver.h>
@@ -25,6 +26,13 @@ struct SeveralLogsOptions {
   /// somebody knows it roughly (TrackPlacementOptions::start_distance). May be
   /// shorter than the list of logs.
   std::vector<std::optional<Pose2>> starts;
+  /// The map of earlier logs (map.json), in whose frame all is then, starts
+  /// included, and which every log has to be placed in. Null: none. Not owned.
+  const KeyScanArchive* earlier = nullptr;
+  /// Length of the walls of that map, m.
+  double earlier_wall_length = 0.0;
+  /// Find the logs in the earlier map, which stays as it is.
+  bool localize_only = false;
 };
 
 /// What became of one log.
@@ -40,12 +48,13 @@ struct LogInMap {
 
 /// A map of one log or more.
 struct MapOfLogs {
-  /// Indices of the logs, in the order of their scans.
+  /// Indices of the logs, in the order of their scans. Key scans of an earlier
+  /// map come before them.
   std::vector<std::size_t> logs;
   std::vector<Scan> scans;
   /// Of all scans; the frame is that of the first log alone.
   LogSolverResult result;
-  /// Has the graph.
+  /// Has the graph; null where logs are only localized.
   std::unique_ptr<LogSolver> solver;
 };
 
@@ -59,6 +68,9 @@ struct SeveralLogsResult {
   /// Ended early because `stop` said so: there are no maps, or the last of them
   /// is not whole.
   bool interrupted = false;
+  /// A log fits nowhere in the earlier map: there are no maps, and
+  /// LogInMap::placement says why.
+  bool is_elsewhere = false;
 };
 
 /// What SolveSeveralLogs is doing.
@@ -77,6 +89,11 @@ struct SeveralLogsControl {
 /// adjusted together in one second map. A log that fits nowhere begins a map of
 /// its own. The scans are taken out of the logs. Throws Error when options do
 /// not fit or there is no log.
+///
+/// With an earlier map the logs are placed in what its key scans saw, and those
+/// go into the second map with the others'; nothing is made of it when a log
+/// fits nowhere. Where logs are only localized, the poses of the earlier key
+/// scans are held, and the result has nothing but the trajectory.
 SeveralLogsResult SolveSeveralLogs(const Registry& registry,
                                    std::vector<Log> logs,
                                    const SeveralLogsOptions& options,

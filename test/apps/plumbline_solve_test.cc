@@ -926,6 +926,72 @@ TEST_F(SolveTest, SeveralLogs) {
   refuses(first + ",/nowhere.clf", "", "/nowhere.clf");
 }
 
+TEST_F(SolveTest, AnEarlierMap) {
+  const std::vector<std::string> lines = OfficeLines(400);
+  std::vector<std::string> scans;
+  for (const std::string& line : lines) {
+    if (line.substr(0, 6) == "FLASER") scans.push_back(line);
+  }
+  const std::string first =
+      Write("first.clf", Join({scans.begin(), scans.begin() + 250}));
+  const std::string second =
+      Write("second.clf", Join({scans.begin() + 150, scans.end()}));
+  std::string output;
+  ASSERT_EQ(Solve(first, "first", "--outputs=map.json", &output), 0) << output;
+  const std::string flag = "--map=" + (folder_ / "first/map.json").string();
+  const std::string map = Out("first", "map.json");
+
+  // Of the files that are made by default those that say something new.
+  ASSERT_EQ(Solve(second, "found", flag + " --localize", &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("placed in the map"));
+  EXPECT_EQ(Files("found"),
+            (std::set<std::string>{"map.png", "map.svg", "summary.json",
+                                   "trajectory.tum"}));
+  EXPECT_EQ(Lines(Out("found", "trajectory.tum")).size(), 250u);
+  EXPECT_EQ(Out("first", "map.json"), map);
+
+  ASSERT_EQ(Solve(second, "both", flag + " --outputs=map.json,trajectory.tum",
+                  &output),
+            0)
+      << output;
+  EXPECT_EQ(Files("both"),
+            (std::set<std::string>{"map.json", "summary.json", "trajectory.tum",
+                                   "trajectory_1.tum"}));
+  EXPECT_EQ(Lines(Out("both", "trajectory_1.tum")).size(), 250u);
+  // And so on.
+  ASSERT_EQ(Solve(first, "three",
+                  "--localize --map=" + (folder_ / "both/map.json").string(),
+                  &output),
+            0)
+      << output;
+
+  // A start where it is not: another place.
+  EXPECT_EQ(Solve(second, "none", flag + " --start_pose=1:30,40,180", &output),
+            4);
+  EXPECT_THAT(output, HasSubstr("second.clf fits nowhere in"));
+  EXPECT_FALSE(fs::exists(folder_ / "none/summary.json"));
+
+  const auto refuses = [&](const std::string& flags, const char* why,
+                           const std::string& out = "none") {
+    EXPECT_EQ(Solve(second, out, flags, &output), 2) << flags;
+    EXPECT_THAT(output, HasSubstr(why));
+  };
+  refuses("--localize", "--map=map.json");
+  refuses(flag, "another folder", "first");
+  refuses(flag + " --refine=map", "full refinement");
+  refuses(flag + " --start_pose=2:0,0,0", "1:3.5,-1,90");
+  refuses("--map=/nowhere.json", "/nowhere.json");
+  refuses(
+      "--map=" + Write("old.json", R"({"features": [], "constraints": []})"),
+      "has no key scans");
+  refuses("--map=" + Write("cut.json", map.substr(0, map.size() / 2)),
+          "is not JSON");
+  EXPECT_EQ(
+      Solve(Write("graph.g2o", "VERTEX_SE2 0 0 0 0\n"), "none", flag, &output),
+      2);
+  EXPECT_THAT(output, HasSubstr("is a graph"));
+}
+
 TEST_F(SolveTest, FlagsOfTheOtherInput) {
   const std::string log = Write("office.log", Join(OfficeLines(30)));
   std::string output;

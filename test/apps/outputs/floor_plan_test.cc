@@ -436,7 +436,7 @@ TEST_F(FloorPlanTest, MapJsonOfRooms) {
   FloorPlan plan = PlanWithRooms();
   plan.building.rooms[1].outline.holes = {{{1, 1}, {1, 2}, {2, 2}}};
   std::ostringstream text;
-  WriteMapJson(graph_, nullptr, &plan.building, text);
+  WriteMapJson(graph_, nullptr, &plan.building, nullptr, text);
   const auto json = nlohmann::json::parse(text.str());
   ASSERT_EQ(json["rooms"].size(), 2u);
   const auto& corridor = json["rooms"][0];
@@ -466,12 +466,12 @@ TEST_F(FloorPlanTest, MapJsonOfRooms) {
   EXPECT_EQ(again.Features()[0]->parameters[2], 0.5);
   std::ostringstream plain, without;
   WriteGraphJson(graph_, plain);
-  WriteMapJson(graph_, nullptr, nullptr, without);
+  WriteMapJson(graph_, nullptr, nullptr, nullptr, without);
   EXPECT_EQ(without.str(), plain.str());
   // Looked for in vain.
   const BuildingPlan none;
   std::ostringstream empty;
-  WriteMapJson(graph_, nullptr, &none, empty);
+  WriteMapJson(graph_, nullptr, &none, nullptr, empty);
   EXPECT_EQ(nlohmann::json::parse(empty.str())["rooms"],
             nlohmann::json::array());
 }

@@ -3,6 +3,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/key_scan_archive.h>
 #include <plumbline/pipeline/several_logs.h>
 
 #include <algorithm>
@@ -172,6 +173,94 @@ TEST_F(SeveralLogsTest, AWrongStartKeepsALogApart) {
       Between(TruthOf(first.scans.front()), TruthOf(second.scans.front()));
   EXPECT_EQ(solve(Compose(truth, Pose2(0.5, -0.5, 0.2))).maps.size(), 1u);
   EXPECT_EQ(solve(Compose(truth, Pose2(20.0, 5.0, 3.0))).maps.size(), 2u);
+}
+
+// Of a log by itself, as map.json keeps it.
+KeyScanArchive Archived(const Registry& registry, const Log& log) {
+  LogSolver solver(registry, {});
+  const LogSolverResult result = solver.Run(log);
+  std::string text = "{";
+  AppendKeyScans(MakeKeyScanArchive(log.scans, result.refined, result.records,
+                                    result.trajectory),
+                 &text);
+  return ReadKeyScans(text + "}", "map.json");
+}
+
+// The second half of the drive is found in the map of the first.
+TEST_F(SeveralLogsTest, ALogIsFoundInAnEarlierMap) {
+  const Log office = Office();
+  const std::size_t n = office.scans.size();
+  const KeyScanArchive earlier = Archived(registry_, Piece(office, 0, n / 2));
+  LogSolver alone(registry_, {});
+  const LogSolverResult whole = alone.Run(office);
+  SeveralLogsOptions options;
+  options.earlier = &earlier;
+  options.localize_only = true;
+  const SeveralLogsResult result =
+      SolveSeveralLogs(registry_, {Piece(office, n / 2, n)}, options);
+  EXPECT_FALSE(result.is_elsewhere);
+  ASSERT_EQ(result.maps.size(), 1u);
+  const MapOfLogs& map = result.maps.front();
+  EXPECT_EQ(map.solver, nullptr);
+  ASSERT_EQ(result.logs[0].begin, earlier.scans.size());
+  ASSERT_EQ(result.logs[0].end, map.result.trajectory.size());
+  ASSERT_EQ(result.logs[0].end - result.logs[0].begin, n - n / 2);
+  // The map stays as it was.
+  for (std::size_t k = 0; k < earlier.trajectory.size(); ++k) {
+    EXPECT_LT((map.result.trajectory[k] - earlier.trajectory[k]).norm(), 1e-9);
+  }
+  double sum = 0.0;
+  for (std::size_t i = n / 2; i < n; ++i) {
+    const Pose2& found =
+        map.result.trajectory[result.logs[0].begin + i - n / 2];
+    const Pose2 error = Between(whole.trajectory[i], found);
+    EXPECT_LT(error.head<2>().norm(), 0.1);
+    EXPECT_LT(std::abs(error[2]), DegToRad(0.5));
+    sum += error.head<2>().norm();
+  }
+  EXPECT_LT(sum / static_cast<double>(n - n / 2), 0.03);
+}
+
+TEST_F(SeveralLogsTest, ALogContinuesAnEarlierMap) {
+  const Log office = Office();
+  const std::size_t n = office.scans.size();
+  const KeyScanArchive earlier = Archived(registry_, Piece(office, 0, n / 2));
+  SeveralLogsOptions options;
+  options.earlier = &earlier;
+  const SeveralLogsResult result =
+      SolveSeveralLogs(registry_, {Piece(office, n / 2, n)}, options);
+  ASSERT_EQ(result.maps.size(), 1u);
+  const MapOfLogs& map = result.maps.front();
+  ASSERT_EQ(map.scans.size(), earlier.scans.size() + n - n / 2);
+  ASSERT_EQ(map.result.trajectory.size(), map.scans.size());
+  EXPECT_EQ(map.scans[result.logs[0].begin].timestamp,
+            office.scans[n / 2].timestamp);
+  EXPECT_LT(LargestError(map), 0.25);
+  EXPECT_GT(LengthOfWalls(map.solver->graph()), 100.0);
+  // In the frame of the earlier map.
+  EXPECT_LT((map.result.trajectory[0] - earlier.trajectory[0]).norm(), 1e-9);
+}
+
+TEST_F(SeveralLogsTest, AnotherBuildingIsNotPutIntoAnEarlierMap) {
+  const Log office = Office();
+  const KeyScanArchive earlier = Archived(registry_, Piece(office, 0, 500));
+  SeveralLogsOptions options;
+  options.earlier = &earlier;
+  for (const bool localize_only : {false, true}) {
+    options.localize_only = localize_only;
+    // One that would fit does not help.
+    const SeveralLogsResult result = SolveSeveralLogs(
+        registry_, {Piece(office, 100, 400), Enlarged(Piece(office, 0, 300))},
+        options);
+    EXPECT_TRUE(result.is_elsewhere);
+    EXPECT_TRUE(result.maps.empty());
+    EXPECT_TRUE(result.logs[0].placement.found);
+    EXPECT_FALSE(result.logs[1].placement.found);
+    EXPECT_FALSE(result.logs[1].placement.why_not.empty());
+  }
+  options.earlier = nullptr;
+  EXPECT_THROW(SolveSeveralLogs(registry_, {Piece(office, 0, 50)}, options),
+               Error);
 }
 
 TEST_F(SeveralLogsTest, AnInterruptLeavesNoHalfMap) {

@@ -547,7 +547,9 @@ class SolvingProgress {
 LogSolverResult RunWithCheckpoints(const Log& log, RunClock* clock,
                                    CheckpointFile* checkpoint,
                                    LogSolver* solver) {
-  bool may_write = FLAGS_checkpoint_every > 0.0;
+  // An interrupt that cuts the reading off leaves another log than that of the
+  // state, which stays for the next run.
+  bool may_write = FLAGS_checkpoint_every > 0.0 && !InterruptRequested();
   std::optional<std::string> state;
   if (may_write) state = checkpoint->Read();
   if (state) {

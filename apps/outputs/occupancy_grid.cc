@@ -179,13 +179,7 @@ void OccupancyGrid::AddScan(const Scan& scan, const Pose2& pose) {
   }
 }
 
-std::uint8_t OccupancyGrid::Pixel(int column, int row) const {
-  const std::unique_ptr<Tile>& tile =
-      tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
-             (column >> kTileBits)];
-  if (tile == nullptr) return kUnknown;
-  const Cell& cell = (*tile)[((row & (kTileSize - 1)) << kTileBits) +
-                             (column & (kTileSize - 1))];
+inline std::uint8_t OccupancyGrid::Shade(const Cell& cell) const {
   const int seen = cell.hits + cell.misses;
   if (seen == 0) return kUnknown;
   if (cell.hits >= options_.occupied_share * seen) {
@@ -193,6 +187,32 @@ std::uint8_t OccupancyGrid::Pixel(int column, int row) const {
     return cell.hits >= options_.min_hits ? kOccupied : kUnknown;
   }
   return kFree;
+}
+
+std::uint8_t OccupancyGrid::Pixel(int column, int row) const {
+  const std::unique_ptr<Tile>& tile =
+      tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
+             (column >> kTileBits)];
+  if (tile == nullptr) return kUnknown;
+  return Shade((*tile)[((row & (kTileSize - 1)) << kTileBits) +
+                       (column & (kTileSize - 1))]);
+}
+
+void OccupancyGrid::Row(int row, std::string* pixels) const {
+  pixels->assign(static_cast<std::size_t>(width_), static_cast<char>(kUnknown));
+  for (int begin = 0; begin < width_; begin += kTileSize) {
+    const std::unique_ptr<Tile>& tile =
+        tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
+               (begin >> kTileBits)];
+    if (tile == nullptr) continue;
+    const Cell* const cells =
+        tile->data() + ((row & (kTileSize - 1)) << kTileBits);
+    const int end = std::min(width_ - begin, kTileSize);
+    for (int i = 0; i < end; ++i) {
+      (*pixels)[static_cast<std::size_t>(begin + i)] =
+          static_cast<char>(Shade(cells[i]));
+    }
+  }
 }
 
 OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
@@ -236,11 +256,9 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
 void WriteOccupancyPgm(const OccupancyGrid& grid, std::ostream& output) {
   output << "P5\n# plumbline: " << Number(grid.resolution()) << " m a pixel\n"
          << grid.width() << ' ' << grid.height() << "\n255\n";
-  std::string line(static_cast<std::size_t>(grid.width()), '\0');
+  std::string line;
   for (int row = grid.height() - 1; row >= 0; --row) {
-    for (int column = 0; column < grid.width(); ++column) {
-      line[column] = static_cast<char>(grid.Pixel(column, row));
-    }
+    grid.Row(row, &line);
     output.write(line.data(), static_cast<std::streamsize>(line.size()));
   }
 }

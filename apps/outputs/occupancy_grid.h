@@ -60,6 +60,8 @@ class OccupancyGrid {
   /// kOccupied, kFree or kUnknown; column from the left (x), row from the
   /// bottom (y).
   std::uint8_t Pixel(int column, int row) const;
+  /// The same of a whole row, a byte each from the left.
+  void Row(int row, std::string* pixels) const;
 
   /// Columns, rows, and the side of a cell, m.
   int width() const { return width_; }
@@ -80,6 +82,7 @@ class OccupancyGrid {
   using Tile = std::array<Cell, kTileSize * kTileSize>;
 
   Tile* TileAt(int column, int row);
+  std::uint8_t Shade(const Cell& cell) const;
   void Count(std::uint16_t Cell::*counter, Cell* cell);
   void Clear(int column0, int row0, int column1, int row1, bool with_last);
 

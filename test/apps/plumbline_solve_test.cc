@@ -9,6 +9,7 @@
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/tum.h>
+#include <plumbline/outputs/checkpoint_file.h>
 #include <plumbline/outputs/solve_outputs.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -1096,6 +1097,15 @@ TEST_F(SolveTest, InterruptedRunsWriteWhatTheyHave) {
   // Longer than a pipe holds, so the binary is reading once it is written.
   ASSERT_GT(text.size(), 200000u);
   const std::string out = (folder_ / "out").string();
+  // Of the whole log, which what was read of it is not.
+  fs::create_directories(out);
+  CheckpointFile state(
+      folder_ / "out" / CheckpointFile::kName,
+      [] {
+        return CheckpointFile::Identity{{"the input", "whole"}};
+      },
+      1e-9);
+  state.Offer([] { return std::string("state"); });
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
@@ -1129,6 +1139,7 @@ TEST_F(SolveTest, InterruptedRunsWriteWhatTheyHave) {
   const auto summary = SummaryOf("out");
   EXPECT_EQ(summary["counts"]["scans"], 0);
   EXPECT_EQ(summary["partial"], true);
+  EXPECT_EQ(files.count(CheckpointFile::kName), 1u);
 }
 
 // Nothing more comes, and the pipe stays open.

@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -198,17 +199,60 @@ struct ResidentMinimizer::Impl {
 
   // Reads the problem; empty when it can be solved, or why not.
   std::string Read() {
+    ReadBlocks();
+    bool has_same_variables = false;
+    std::vector<double*> order = ActiveBlocks();
+    if (!is_forgotten) has_same_variables = KeepOrder(&order);
+    std::string fault = ReadVariables(order);
+    if (!fault.empty()) return fault;
+    ReadTerms();
+    std::vector<std::pair<int, int>> pairs;
+    if (has_same_variables && FindPlaces(&pairs)) return {};
+    if (has_same_variables) {
+      // What is analysed anew does not depend on what was before.
+      ReadVariables(ActiveBlocks());
+      ReadTerms();
+    }
+    MakePattern(&pairs);
+    needs_analysis = true;
+    is_forgotten = false;
+    return {};
+  }
+
+  // Residual blocks of the problem with the parameter blocks of each. Their
+  // order is that of the calls that made them. (That of the problem's parameter
+  // blocks is the order of their addresses, which differs from run to run.)
+  void ReadBlocks() {
+    problem->GetResidualBlocks(&ids);
+    block_ends.clear();
+    block_ends.reserve(ids.size());
+    all_blocks.clear();
     std::vector<double*> blocks;
-    problem->GetParameterBlocks(&blocks);
-    blocks.erase(
-        std::remove_if(blocks.begin(), blocks.end(),
-                       [this](const double* block) {
-                         return problem->IsParameterBlockConstant(block) ||
-                                problem->ParameterBlockTangentSize(block) == 0;
-                       }),
-        blocks.end());
-    const bool has_same_variables = KeepOrder(&blocks);
-    std::unordered_map<const double*, int> index;
+    for (const ceres::ResidualBlockId id : ids) {
+      problem->GetParameterBlocksForResidualBlock(id, &blocks);
+      all_blocks.insert(all_blocks.end(), blocks.begin(), blocks.end());
+      block_ends.push_back(all_blocks.size());
+    }
+  }
+
+  // Blocks that vary and that residuals depend on, in the order of these.
+  std::vector<double*> ActiveBlocks() const {
+    std::vector<double*> active;
+    std::unordered_set<const double*> seen;
+    seen.reserve(2 * variables.size());
+    for (double* const block : all_blocks) {
+      if (seen.insert(block).second &&
+          !problem->IsParameterBlockConstant(block) &&
+          problem->ParameterBlockTangentSize(block) > 0) {
+        active.push_back(block);
+      }
+    }
+    return active;
+  }
+
+  // Makes the blocks the variables, in their order; why not, if they cannot be.
+  std::string ReadVariables(const std::vector<double*>& blocks) {
+    index.clear();
     index.reserve(2 * blocks.size());
     variables.clear();
     int state_size = 0;
@@ -241,12 +285,6 @@ struct ResidentMinimizer::Impl {
     }
     plus_jacobians.resize(plus_size);
     state.resize(state_size);
-    ReadTerms(index);
-    std::vector<std::pair<int, int>> pairs;
-    if (!has_same_variables || !FindPlaces(&pairs)) {
-      MakePattern(&pairs);
-      needs_analysis = true;
-    }
     return {};
   }
 
@@ -254,14 +292,11 @@ struct ResidentMinimizer::Impl {
   // them, when they are not the same ones.
   bool KeepOrder(std::vector<double*>* blocks) const {
     if (blocks->size() != variables.size()) return false;
-    std::unordered_map<const double*, int> now;
-    now.reserve(2 * blocks->size());
     for (double* const block : *blocks) {
-      now.emplace(block, problem->ParameterBlockTangentSize(block));
-    }
-    for (const Variable& variable : variables) {
-      const auto found = now.find(variable.user);
-      if (found == now.end() || found->second != variable.tangent_size) {
+      const auto found = index.find(block);
+      if (found == index.end() ||
+          variables[found->second].tangent_size !=
+              problem->ParameterBlockTangentSize(block)) {
         return false;
       }
     }
@@ -271,34 +306,30 @@ struct ResidentMinimizer::Impl {
     return true;
   }
 
-  void ReadTerms(const std::unordered_map<const double*, int>& index) {
-    std::vector<ceres::ResidualBlockId> ids;
-    problem->GetResidualBlocks(&ids);
+  void ReadTerms() {
     terms.clear();
     arguments.clear();
     terms.reserve(ids.size());
-    arguments.reserve(2 * ids.size());
-    int jacobians_size = 0;
+    arguments.reserve(all_blocks.size());
     int most_rows = 0;
     int most_values = 0;
     std::size_t most_arguments = 0;
     num_products = 0;
     fixed_terms.clear();
-    std::vector<double*> blocks;
-    for (const ceres::ResidualBlockId id : ids) {
+    std::size_t begin = 0;
+    for (std::size_t k = 0; k < ids.size(); ++k) {
       Term term;
-      term.cost = problem->GetCostFunctionForResidualBlock(id);
-      term.loss = problem->GetLossFunctionForResidualBlock(id);
+      term.cost = problem->GetCostFunctionForResidualBlock(ids[k]);
+      term.loss = problem->GetLossFunctionForResidualBlock(ids[k]);
       term.rows = term.cost->num_residuals();
       term.begin = static_cast<int>(arguments.size());
-      problem->GetParameterBlocksForResidualBlock(id, &blocks);
       int num_variables = 0;
       int jacobian = 0;
-      for (const double* const block : blocks) {
+      for (std::size_t b = begin; b < block_ends[k]; ++b) {
         Argument argument;
-        const auto found = index.find(block);
+        const auto found = index.find(all_blocks[b]);
         if (found == index.end()) {
-          argument.constant = block;
+          argument.constant = all_blocks[b];
         } else {
           argument.variable = found->second;
           argument.size = variables[found->second].size;
@@ -313,13 +344,13 @@ struct ResidentMinimizer::Impl {
       num_products += num_variables * (num_variables + 1) / 2;
       most_rows = std::max(most_rows, term.rows);
       most_values = std::max(most_values, jacobian);
-      most_arguments = std::max(most_arguments, blocks.size());
+      most_arguments = std::max(most_arguments, block_ends[k] - begin);
+      begin = block_ends[k];
       (num_variables > 0 ? terms : fixed_terms).push_back(term);
     }
-    jacobians_size = most_values;
     residual.resize(most_rows);
-    jacobians.resize(jacobians_size);
-    tangent_jacobians.resize(jacobians_size);
+    jacobians.resize(most_values);
+    tangent_jacobians.resize(most_values);
     jacobian_pointers.resize(most_arguments);
     argument_pointers.resize(most_arguments);
   }
@@ -679,7 +710,13 @@ struct ResidentMinimizer::Impl {
   }
 
   ceres::Problem* problem;
+  // Residual blocks, and the parameter blocks of each up to its end.
+  std::vector<ceres::ResidualBlockId> ids;
+  std::vector<double*> all_blocks;
+  std::vector<std::size_t> block_ends;
   std::vector<Variable> variables;
+  // Of the variables, by address.
+  std::unordered_map<const double*, int> index;
   std::vector<Argument> arguments;
   std::vector<Term> terms;
   // Those of which all parameters are constant.
@@ -717,6 +754,7 @@ struct ResidentMinimizer::Impl {
   cholmod_common common = {};
   cholmod_factor* factor = nullptr;
   bool needs_analysis = true;
+  bool is_forgotten = false;
   int num_analyses = 0;
 };
 
@@ -1037,6 +1075,8 @@ ResidentMinimizer::ResidentMinimizer(ceres::Problem* problem)
     : impl_(std::make_unique<Impl>(problem)) {}
 
 ResidentMinimizer::~ResidentMinimizer() = default;
+
+void ResidentMinimizer::Forget() { impl_->is_forgotten = true; }
 
 int ResidentMinimizer::num_analyses() const { return impl_->num_analyses; }
 

@@ -44,6 +44,12 @@ class ResidentMinimizer {
   void Solve(const ceres::Solver::Options& options,
              ceres::Solver::Summary* summary);
 
+  /// Has the next solve analyse the problem anew. To be called when a parameter
+  /// block has been freed: another one may come to lie at its address, and
+  /// would be taken for it. (The minimum would be the same, but its last digits
+  /// would depend on where memory happens to be free.)
+  void Forget();
+
   /// Symbolic analyses so far.
   int num_analyses() const;
 

@@ -681,6 +681,7 @@ void SolverSession::OnFeatureAdded(const Feature& feature) {
 
 void SolverSession::OnFeatureRemoved(const Feature& feature) {
   impl_->blocks[feature.id] = Block();
+  if (impl_->resident != nullptr) impl_->resident->Forget();
 }
 
 void SolverSession::OnConstraintAdded(const Constraint& constraint) {

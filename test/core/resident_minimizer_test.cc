@@ -280,6 +280,60 @@ TEST(ResidentMinimizerTest, KeepsTheAnalysisWhileConstraintsComeAndGo) {
               1e-9 * expected.final_cost);
 }
 
+// Where the parameters lie in memory changes from run to run.
+TEST(ResidentMinimizerTest, TheSameBytesWhereverTheParametersLie) {
+  constexpr int kPoses = 80;
+  const auto solve = [](bool backwards) {
+    std::vector<Pose> memory(kPoses);
+    std::vector<double*> poses;
+    for (int i = 0; i < kPoses; ++i) {
+      poses.push_back(memory[backwards ? kPoses - 1 - i : i].data());
+      poses[i][0] = i + 0.1 * std::sin(7.0 * i);
+      poses[i][1] = 0.1 * std::cos(5.0 * i);
+      poses[i][2] = 0.1 * std::sin(3.0 * i);
+    }
+    ceres::Problem problem;
+    const auto add = [&](int from, int to) {
+      problem.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<Step, 3, 3, 3>(
+              new Step{Pose{1.0 * (to - from), 0.01 * (from % 3), 0.0}}),
+          nullptr, poses[from], poses[to]);
+    };
+    for (int i = 1; i < kPoses; ++i) add(i - 1, i);
+    for (int i = 9; i < kPoses; i += 4) add(i - 9, i);
+    problem.SetParameterBlockConstant(poses[0]);
+    ResidentMinimizer minimizer(&problem);
+    ceres::Solver::Summary summary;
+    minimizer.Solve(Tight(), &summary);
+    // A constraint less moves others in the problem.
+    std::vector<ceres::ResidualBlockId> ids;
+    problem.GetResidualBlocks(&ids);
+    problem.RemoveResidualBlock(ids[85]);
+    minimizer.Solve(Tight(), &summary);
+    EXPECT_EQ(minimizer.num_analyses(), 1);
+    // Another pair that had nothing in common.
+    add(3, 70);
+    minimizer.Solve(Tight(), &summary);
+    std::vector<double> result;
+    for (const double* const pose : poses) {
+      result.insert(result.end(), pose, pose + 3);
+    }
+    return result;
+  };
+  EXPECT_EQ(solve(false), solve(true));
+}
+
+TEST(ResidentMinimizerTest, AnalysesAnewWhatItWasToldToForget) {
+  Ring ring(60);
+  ResidentMinimizer minimizer(&ring.problem);
+  ceres::Solver::Summary summary;
+  minimizer.Solve(Tight(), &summary);
+  minimizer.Forget();
+  minimizer.Solve(Tight(), &summary);
+  minimizer.Solve(Tight(), &summary);
+  EXPECT_EQ(minimizer.num_analyses(), 2);
+}
+
 TEST(ResidentMinimizerTest, UphillStepsEndAtTheBestState) {
   // Along the bottom of a curved valley a bound on the cost of every step is
   // what takes long.

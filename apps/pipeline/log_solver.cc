@@ -1,4 +1,6 @@
 #include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
+#include <plumbline/core/read_ahead.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/pipeline/log_solver.h>
@@ -6,6 +8,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -17,6 +20,9 @@ constexpr char kSameWallDetector[] = "same_wall";
 // An EM step on the way takes in the whole of a small map when it has grown by
 // more than this.
 constexpr std::size_t kSmallMapGrowth = 10;
+
+// Scans that the odometry refinement is ahead of the map at most.
+constexpr std::size_t kScansAhead = 64;
 
 // A second map with less than this share of the first one's length of walls has
 // lost what the scans show, and is no better.
@@ -105,6 +111,16 @@ struct LogSolver::Context {
   }
 };
 
+// What the refiner made of a scan.
+struct LogSolver::Processed {
+  RefinedScan refined;
+  // Scans whose place is settled now.
+  std::vector<SettledScan> settled;
+  // None whose place is not.
+  bool all_settled = false;
+  double seconds = 0.0;
+};
+
 LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
     : registry_(registry),
       profile_(ProfileOf(options.features)),
@@ -158,17 +174,34 @@ void LogSolver::RequireFresh() const {
 Pose2 LogSolver::AddScan(Scan scan) {
   RequireUnfinished();
   scans_.push_back(std::move(scan));
-  TakeScan(scans_);
+  TakeScan(scans_, Process(scans_.back()));
   if (builder_->records().empty()) return refined_.back().pose;
   return refined_.back().is_key
              ? builder_->robot()
              : Compose(builder_->robot(), refined_.back().since_key.mean);
 }
 
-void LogSolver::TakeSettled(const std::vector<Scan>& scans,
-                            double* em_seconds) {
+LogSolver::Processed LogSolver::Process(const Scan& scan) {
+  const Stopwatch watch;
+  Processed processed;
+  processed.refined = refiner_.Process(scan);
+  processed.settled = Settled();
+  processed.all_settled = refiner_.IsSettled();
+  processed.seconds = watch.Seconds();
+  return processed;
+}
+
+std::vector<SettledScan> LogSolver::Settled() {
+  std::vector<SettledScan> all;
   SettledScan settled;
-  while (refiner_.TakeSettled(&settled)) {
+  while (refiner_.TakeSettled(&settled)) all.push_back(std::move(settled));
+  return all;
+}
+
+void LogSolver::TakeSettled(const std::vector<Scan>& scans,
+                            const std::vector<SettledScan>& all,
+                            double* em_seconds) {
+  for (const SettledScan& settled : all) {
     const auto index = static_cast<std::size_t>(settled.index);
     refined_[index] = settled.refined;
     num_settled_ = index + 1;
@@ -216,12 +249,13 @@ void LogSolver::TakeAnew(const std::vector<Scan>& scans, double* em_seconds) {
   }
 }
 
-void LogSolver::TakeScan(const std::vector<Scan>& scans) {
+void LogSolver::TakeScan(const std::vector<Scan>& scans,
+                         const Processed& processed) {
   const Stopwatch watch;
   double em_seconds = 0.0;
-  refined_.push_back(refiner_.Process(scans[refined_.size()]));
+  refined_.push_back(processed.refined);
   ++scans_since_em_;
-  TakeSettled(scans, &em_seconds);
+  TakeSettled(scans, processed.settled, &em_seconds);
   if (num_settled_ < refined_.size()) {
     // The robot is lost: until it is found a guess from the last key scan.
     RefinedScan& guess = refined_.back();
@@ -229,16 +263,51 @@ void LogSolver::TakeScan(const std::vector<Scan>& scans) {
     guess.since_key.mean =
         Between(refined_[builder_->records().back().scan].pose, guess.pose);
   }
-  if (options_.scans_per_stage > 0 &&
-      refined_.size() >=
-          stage_begin_ + static_cast<std::size_t>(options_.scans_per_stage) &&
-      num_settled_ == refined_.size() && refiner_.IsSettled()) {
+  if (EndsStage(stage_begin_, refined_.size(), processed) &&
+      num_settled_ == refined_.size()) {
     stage_begin_ = refined_.size();
     Renew(StructureDetectors());
   }
-  const double seconds = watch.Seconds();
+  const double seconds = watch.Seconds() + processed.seconds;
   scan_seconds_.push_back(static_cast<float>(seconds));
   frontend_seconds_ += seconds - em_seconds;
+}
+
+bool LogSolver::EndsStage(std::size_t begin, std::size_t end,
+                          const Processed& last) const {
+  return options_.scans_per_stage > 0 &&
+         end >= begin + static_cast<std::size_t>(options_.scans_per_stage) &&
+         last.all_settled;
+}
+
+bool LogSolver::TakeStage(const std::vector<Scan>& scans,
+                          const RunControl& control) {
+  // The refiner does not look at the map. It goes as far as the stage: there
+  // its state is written.
+  std::size_t next = refined_.size();
+  bool is_end = false;
+  ReadAhead<Processed> ahead(
+      [&, stage_begin = stage_begin_]() -> std::optional<Processed> {
+        if (is_end || next == scans.size()) return std::nullopt;
+        Processed processed = Process(scans[next++]);
+        is_end = EndsStage(stage_begin, next, processed);
+        return processed;
+      },
+      kScansAhead, ThreadsHere() > 1);
+  bool is_stopped = false;
+  const auto ask_stop = [&] {
+    if (is_stopped || !control.stop || !control.stop()) return;
+    is_stopped = true;
+    ahead.Stop();
+  };
+  ask_stop();
+  while (const std::optional<Processed> processed = ahead.Next()) {
+    TakeScan(scans, *processed);
+    if (control.progress) control.progress(refined_.size(), scans.size());
+    // Also what was begun when it was stopped: the refiner has gone that far.
+    ask_stop();
+  }
+  return !is_stopped;
 }
 
 void LogSolver::TakeScans(const std::vector<Scan>& scans,
@@ -246,10 +315,10 @@ void LogSolver::TakeScans(const std::vector<Scan>& scans,
   refined_.reserve(scans.size());
   scan_seconds_.reserve(scans.size());
   while (refined_.size() < scans.size()) {
-    if (control.stop && control.stop()) break;
-    TakeScan(scans);
-    if (control.progress) control.progress(refined_.size(), scans.size());
-    if (stage_begin_ == refined_.size() && control.checkpoint) {
+    const std::size_t before = refined_.size();
+    const bool goes_on = TakeStage(scans, control);
+    if (refined_.size() > before && stage_begin_ == refined_.size() &&
+        control.checkpoint) {
       control.checkpoint([&] {
         StateWriter writer;
         Stage stage = Stage::kTakeScans;
@@ -261,6 +330,7 @@ void LogSolver::TakeScans(const std::vector<Scan>& scans,
         return writer.bytes();
       });
     }
+    if (!goes_on) break;
   }
 }
 
@@ -386,7 +456,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
     const Stopwatch watch;
     double em_seconds = 0.0;
     refiner_.Finish();
-    TakeSettled(scans, &em_seconds);
+    TakeSettled(scans, Settled(), &em_seconds);
     if (!refiner_.late_ties().empty() && !result.interrupted) {
       TakeAnew(scans, &em_seconds);
     }

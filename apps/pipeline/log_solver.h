@@ -237,13 +237,26 @@ class LogSolver {
 
   void RequireUnfinished() const;
   void RequireFresh() const;
+  struct Processed;
+
+  // Odometry refinement of the next scan, which does not touch the map.
+  Processed Process(const Scan& scan);
+  // Scans that the refiner has settled.
+  std::vector<SettledScan> Settled();
   // A scan by itself: key scans enter the map, now and then with an EM step.
   // Takes the next of the scans.
-  void TakeScan(const std::vector<Scan>& scans);
+  void TakeScan(const std::vector<Scan>& scans, const Processed& processed);
   // Takes those that are left; stages end on the way.
   void TakeScans(const std::vector<Scan>& scans, const RunControl& control);
+  // Those of a stage, refined on a thread of their own ahead of the map where
+  // there is one; false when it is time to stop.
+  bool TakeStage(const std::vector<Scan>& scans, const RunControl& control);
+  // Whether a stage that began with `begin` scans ends after so many.
+  bool EndsStage(std::size_t begin, std::size_t end,
+                 const Processed& last) const;
   // Those whose place is settled go on into the map.
-  void TakeSettled(const std::vector<Scan>& scans, double* em_seconds);
+  void TakeSettled(const std::vector<Scan>& scans,
+                   const std::vector<SettledScan>& all, double* em_seconds);
   void TakeKeyScan(const std::vector<Scan>& scans, const SettledScan& settled,
                    double* em_seconds);
   // Makes the map once more: parts of the track that hung loose were found

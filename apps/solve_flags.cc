@@ -152,7 +152,7 @@ DEFINE_string(delta_mode, "frozen",
               "tukey, geman_mcclure, dcs");
 PLUMBLINE_FLAG_CHOICES(delta_mode, "frozen", "continuous", "huber", "cauchy",
                        "tukey", "geman_mcclure", "dcs");
-DEFINE_string(minimizer, "ceres",
+DEFINE_string(minimizer, "resident",
               "Solves of the whole graph: ceres, resident (keeps the analysis "
               "of the graph between solves)");
 PLUMBLINE_FLAG_CHOICES(minimizer, "ceres", "resident");

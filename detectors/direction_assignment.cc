@@ -505,7 +505,7 @@ class Assigner {
     }
     std::vector<std::size_t> made;
     for (const auto& [old, part] : parts) {
-      for (const std::size_t wall : part) Untie(wall);
+      Untie(part, old);
       const std::size_t k = AddDirection(network_.Angle(nodes_[old]));
       for (const std::size_t wall : part) Tie(wall, k);
       split_off_.insert(k);
@@ -515,12 +515,20 @@ class Assigner {
     return true;
   }
 
-  void Untie(std::size_t wall) {
-    const auto k = static_cast<std::size_t>(result_.direction_of[wall]);
-    std::vector<std::size_t>& tied = result_.directions[k].walls;
-    tied.erase(std::find(tied.begin(), tied.end(), wall));
-    network_.RemoveLinksBetween(walls_[wall].node, nodes_[k]);
-    result_.direction_of[wall] = -1;
+  // Walls of a direction.
+  void Untie(const std::vector<std::size_t>& walls, std::size_t direction) {
+    std::vector<std::size_t> nodes;
+    for (const std::size_t wall : walls) {
+      result_.direction_of[wall] = -1;
+      nodes.push_back(walls_[wall].node);
+    }
+    std::vector<std::size_t>& tied = result_.directions[direction].walls;
+    tied.erase(std::remove_if(tied.begin(), tied.end(),
+                              [this](std::size_t wall) {
+                                return result_.direction_of[wall] < 0;
+                              }),
+               tied.end());
+    network_.RemoveLinksBetween(nodes_[direction], nodes);
   }
 
   // A wall of a family.

@@ -37,9 +37,13 @@ void DirectionNetwork::RemoveLinksOf(std::size_t node) {
   });
 }
 
-void DirectionNetwork::RemoveLinksBetween(std::size_t a, std::size_t b) {
-  RemoveLinks([a, b](const Link& link) {
-    return (link.from == a && link.to == b) || (link.from == b && link.to == a);
+void DirectionNetwork::RemoveLinksBetween(
+    std::size_t node, const std::vector<std::size_t>& others) {
+  std::vector<char> is_other(size(), 0);
+  for (const std::size_t other : others) is_other[other] = 1;
+  RemoveLinks([&](const Link& link) {
+    return (link.from == node && is_other[link.to] != 0) ||
+           (link.to == node && is_other[link.from] != 0);
   });
 }
 

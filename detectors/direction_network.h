@@ -36,9 +36,10 @@ class DirectionNetwork {
   /// (rad^2) at least.
   void ScaleVariances(int group, double factor, double floor);
 
-  /// Takes out every link on a node, or between two nodes.
+  /// Takes out every link on a node, or between a node and any of others.
   void RemoveLinksOf(std::size_t node);
-  void RemoveLinksBetween(std::size_t a, std::size_t b);
+  void RemoveLinksBetween(std::size_t node,
+                          const std::vector<std::size_t>& others);
 
   /// Number of nodes.
   std::size_t size() const { return initial_.size(); }

@@ -936,10 +936,12 @@ class Completion {
         const Block offsets =
             (offset + (along.x() * own_y - along.y() * own_x)).abs() *
             per_reach;
-        if (gaps.max(offsets).minCoeff() > kFloatMargin) continue;
+        const Block farthest = gaps.max(offsets);
+        if (farthest.minCoeff() > kFloatMargin) continue;
         const std::size_t end = std::min<std::size_t>(i + kBlock, count);
         for (std::size_t j = i; j < end; ++j) {
-          if (is_settled[first_slot + j] == 0) {
+          if (is_settled[first_slot + j] == 0 &&
+              farthest[static_cast<Eigen::Index>(j - i)] <= kFloatMargin) {
             look(entries[j], first_slot + j);
           }
         }

@@ -42,7 +42,7 @@ TEST(DirectionNetworkTest, PartsThatNothingConnectsAreFree) {
                 2.0 * network.CovarianceColumn(0)[2],
             0.9 * DirectionNetwork::kUnknownVariance);
   EXPECT_TRUE(network.HasLinks(3));
-  network.RemoveLinksBetween(3, 2);
+  network.RemoveLinksBetween(3, {2});
   EXPECT_FALSE(network.HasLinks(3));
   EXPECT_TRUE(network.HasLinks(0));
   network.RemoveLinksOf(1);

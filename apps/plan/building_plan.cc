@@ -24,6 +24,10 @@ constexpr double kFlaw = 0.3;
 // A wide opening is a door when the wall between the two rooms goes on beside
 // it for so many samples.
 constexpr int kLeastJamb = 6;
+// What stands along a wall leaves less free space behind it than this, m; and
+// how many rays to each side look for it.
+constexpr double kDeeperThanFurniture = 1.0;
+constexpr int kRaysAside = 3;
 // Doors between the same rooms nearer to each other than this are one, m.
 constexpr double kSameDoor = 0.8;
 
@@ -274,6 +278,31 @@ bool Cross(const Vector2d& a, const Vector2d& b, const Vector2d& c,
   return side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b);
 }
 
+// Whether free space was seen deeper than a cupboard behind an opening, from
+// sample `first` to `last` (not included), on its left (`side` 1) or right
+// (-1): gaps between cupboards lead to the wall behind them.
+bool LeadsSomewhere(const DrawnLine& on, int first, int last, int side,
+                    const SpaceGrid& space) {
+  const Vector2d beyond = side * on.line.normal();
+  const double face = side > 0 ? on.line.high : -on.line.low;
+  const double step = 0.5 * space.resolution;
+  for (int i = first; i < last; ++i) {
+    const Vector2d begin =
+        on.line.At(on.profile.MiddleOf(i)) + (face + kBesideWall) * beyond;
+    for (int k = -kRaysAside; k <= kRaysAside; ++k) {
+      const double slope = static_cast<double>(k) / kRaysAside;
+      const Vector2d way = beyond + slope * on.line.along;
+      double depth = 0.0;
+      while (depth < kDeeperThanFurniture &&
+             space.At(Vector2d(begin + depth * way)) == Space::kFree) {
+        depth += step;
+      }
+      if (depth >= kDeeperThanFurniture) return true;
+    }
+  }
+  return false;
+}
+
 // Walls and doors along a line.
 void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
               const BuildingPlanOptions& options, BuildingPlan* plan) {
@@ -338,7 +367,10 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
       i = j;
       continue;
     }
-    if (is_between && door.width() >= options.min_door &&
+    const bool is_door =
+        has_both ||
+        LeadsSomewhere(on, i, j, door.rooms[0] >= 0 ? -1 : 1, space);
+    if (is_between && is_door && door.width() >= options.min_door &&
         door.width() <=
             (has_both ? options.doors.wide : options.doors.narrow)) {
       plan->doors.push_back(door);
@@ -418,13 +450,20 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
   std::vector<WallLine> lines =
       FindWallLines(walls, directions, space, options.lines);
   // The edges of furniture are no walls.
-  lines.erase(std::remove_if(lines.begin(), lines.end(),
-                             [&](const WallLine& line) {
-                               return line.weight < options.min_wall;
-                             }),
-              lines.end());
+  const auto furniture = std::stable_partition(
+      lines.begin(), lines.end(),
+      [&](const WallLine& line) { return line.weight >= options.min_wall; });
+  const std::vector<WallLine> short_lines(furniture, lines.end());
+  lines.erase(furniture, lines.end());
   std::vector<DrawnLine> drawn = DrawLines(lines, options.reach);
   MeasureLines(space, options.doors, &drawn);
+  const std::vector<WallLine> partitions =
+      FindPartitions(short_lines, drawn, space, options.reach);
+  if (!partitions.empty()) {
+    lines.insert(lines.end(), partitions.begin(), partitions.end());
+    drawn = DrawLines(lines, options.reach);
+    MeasureLines(space, options.doors, &drawn);
+  }
   const Arrangement arrangement = Arrange(drawn, space);
   const std::vector<int> region = FindRegions(arrangement, options.regions);
 

@@ -32,6 +32,15 @@ constexpr double kImportantDoor = 0.6;
 constexpr double kBareFlanks = 0.3;
 constexpr double kFullFlanks = 0.6;
 
+// A line is a wall where another one crosses it when so much of it is, within
+// this distance before or after the crossing, m.
+constexpr double kBesideCrossing = 0.3;
+constexpr double kWallThere = 0.6;
+// A wall that is crossed this far within another's end is met there, m.
+constexpr double kAtTheEnd = 0.4;
+// Share of a partition that may look open: laser points go astray.
+constexpr double kMostSeenThrough = 0.05;
+
 // Where two lines meet: along each.
 bool Crossing(const WallLine& a, const WallLine& b, double* t_a, double* t_b) {
   const double sine = a.along[0] * b.along[1] - a.along[1] * b.along[0];
@@ -265,8 +274,10 @@ std::vector<double> WallCrossings(const std::vector<DrawnLine>& drawn,
         t_other > drawn[j].to) {
       continue;
     }
-    if (std::max(WallShare(drawn[j].profile, t_other - 0.3, 0.3),
-                 WallShare(drawn[j].profile, t_other + 0.3, 0.3)) >= 0.6) {
+    if (std::max(WallShare(drawn[j].profile, t_other - kBesideCrossing,
+                           kBesideCrossing),
+                 WallShare(drawn[j].profile, t_other + kBesideCrossing,
+                           kBesideCrossing)) >= kWallThere) {
       crossings.push_back(t);
     }
   }
@@ -348,7 +359,56 @@ void Weigh(const DoorOptions& options, bool is_wall, WallProfile* profile) {
   }
 }
 
+// Where a line meets a wall first on its way from `from` on, along it, within
+// `reach`; `sign` 1: forwards. Negative when it meets none.
+double WayToWall(const WallLine& line, double from, int sign,
+                 const std::vector<DrawnLine>& drawn, double reach) {
+  double nearest = -1.0;
+  for (const DrawnLine& other : drawn) {
+    double t, t_other;
+    if (!other.line.is_wall || !Crossing(line, other.line, &t, &t_other) ||
+        t_other < other.from || t_other > other.to) {
+      continue;
+    }
+    const double way = sign * (t - from);
+    if (way < -kAtTheEnd || way > reach || (nearest >= 0.0 && way >= nearest)) {
+      continue;
+    }
+    if (std::max(WallShare(other.profile, t_other - kBesideCrossing,
+                           kBesideCrossing),
+                 WallShare(other.profile, t_other + kBesideCrossing,
+                           kBesideCrossing)) >= kWallThere) {
+      nearest = std::max(0.0, way);
+    }
+  }
+  return nearest;
+}
+
 }  // namespace
+
+std::vector<WallLine> FindPartitions(const std::vector<WallLine>& lines,
+                                     const std::vector<DrawnLine>& drawn,
+                                     const SpaceGrid& space, double reach) {
+  std::vector<WallLine> found;
+  for (const WallLine& line : lines) {
+    if (!line.is_aligned) continue;
+    const double before = WayToWall(line, line.begin, -1, drawn, reach);
+    const double after = WayToWall(line, line.end, 1, drawn, reach);
+    if (before < 0.0 || after < 0.0) continue;
+    DrawnLine whole;
+    whole.line = line;
+    whole.from = line.begin - before;
+    whole.to = line.end + after;
+    Measure(space, &whole);
+    const auto& marks = whole.profile.marks;
+    const auto open = std::count(marks.begin(), marks.end(), Mark::kOpen);
+    if (static_cast<double>(open) <=
+        kMostSeenThrough * static_cast<double>(marks.size())) {
+      found.push_back(line);
+    }
+  }
+  return found;
+}
 
 std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
                                  double reach) {

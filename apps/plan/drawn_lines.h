@@ -64,6 +64,15 @@ constexpr double kBesideWall = 0.1;
 std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
                                  double reach);
 
+/// Those of `lines` in a direction of the building that reach from wall to wall
+/// without a place that was seen through: a partition of which little was seen,
+/// at grazing angles or behind furniture, while furniture itself leaves gaps to
+/// the walls beside it. `drawn` has the profiles of the lines that are known to
+/// be walls.
+std::vector<WallLine> FindPartitions(const std::vector<WallLine>& lines,
+                                     const std::vector<DrawnLine>& drawn,
+                                     const SpaceGrid& space, double reach);
+
 /// Fills the profiles of all lines.
 ///
 /// A sample is wall where a row of occupied cells runs along the line (legs of

@@ -20,6 +20,10 @@ constexpr double kMaxPocket = 4.0;
 // what is no room.
 constexpr double kLeastPocketBorder = 0.2;
 constexpr double kMaxExposed = 0.2;
+// What was seen of a space, m^2, and the share of doors on its border from
+// which on it lies behind a door.
+constexpr double kSeenThroughDoor = 1.0;
+constexpr double kDoorBorder = 0.5;
 // An opening, m, and its share of a region's width.
 constexpr double kLeastOpening = 0.5;
 constexpr double kWholeWidth = 0.6;
@@ -72,8 +76,8 @@ struct Extent {
   }
 };
 
-// Over 0: nothing but an opening as wide as the space itself, while a door has
-// a wall beside it.
+// Over 0: nothing but an opening as wide as the spaces themselves, while a door
+// has a wall beside it.
 double Through(const BorderLengths& border, double width,
                const RegionOptions& options) {
   const double open = border.Of(Mark::kOpen) + border.Of(Mark::kDoor);
@@ -134,7 +138,8 @@ class Regions {
     }
   }
 
-  // Joins across openings as wide as the space itself.
+  // Joins across openings as wide as the wider space: a narrow one may be the
+  // part of a room that was seen through its door.
   void JoinThrough(const RegionOptions& options) {
     for (;;) {
       double best = 0.0;
@@ -143,7 +148,7 @@ class Regions {
       for (std::size_t a = 0; a < borders_.size(); ++a) {
         for (const auto& [b, border] : borders_[a]) {
           const double width =
-              std::min(extents_[a].Width(),
+              std::max(extents_[a].Width(),
                        extents_[static_cast<std::size_t>(b)].Width());
           const double through = Through(border, width, options);
           if (through <= best) continue;
@@ -253,8 +258,9 @@ std::vector<bool> WideFaces(const Arrangement& arrangement,
   return is_wide;
 }
 
-// Length of the longest part of `pieces` that hangs together, m.
-double LongestChain(const std::vector<StraightPiece>& pieces) {
+// Largest distance between two points of a part of `pieces` that hangs
+// together, m: how wide a mouth is, with its corners cut.
+double WidestChain(const std::vector<StraightPiece>& pieces) {
   DisjointSets chains(pieces.size());
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -267,14 +273,19 @@ double LongestChain(const std::vector<StraightPiece>& pieces) {
       }
     }
   }
-  std::map<int, double> lengths;
-  double longest = 0.0;
+  double widest = 0.0;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    double& length = lengths[chains.Find(static_cast<int>(i))];
-    length += (pieces[i].second - pieces[i].first).norm();
-    longest = std::max(longest, length);
+    for (std::size_t j = 0; j <= i; ++j) {
+      if (chains.Find(static_cast<int>(i)) != chains.Find(static_cast<int>(j)))
+        continue;
+      for (const Vector2d& a : {pieces[i].first, pieces[i].second}) {
+        for (const Vector2d& b : {pieces[j].first, pieces[j].second}) {
+          widest = std::max(widest, (a - b).norm());
+        }
+      }
+    }
   }
-  return longest;
+  return widest;
 }
 
 // Makes regions of their own of corridors that open into wide spaces.
@@ -322,7 +333,7 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
                              extent.area >= kLeastCorridor &&
                              width >= options.min_width;
     for (const auto& [wide, border] : wides) {
-      const double least = 0.5 * options.widening * LongestChain(border);
+      const double least = 0.5 * options.widening * WidestChain(border);
       const std::vector<Polygon> spaces = UnionOf(faces[wide]);
       const bool is_space = std::any_of(
           spaces.begin(), spaces.end(),
@@ -357,6 +368,7 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
   }
   // Pockets have numbers of their own: the region's, or that of the face.
   std::vector<int> pocket(size, -1);
+  std::map<int, double> seen;
   for (std::size_t i = 0; i < size; ++i) {
     if ((*region)[i] >= 0) {
       if (rooms.count((*region)[i]) == 0) pocket[i] = (*region)[i];
@@ -364,6 +376,7 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
                IsNarrow(arrangement.faces[i], options.pocket_width)) {
       pocket[i] = static_cast<int>(i);
     }
+    if (pocket[i] >= 0) seen[pocket[i]] += arrangement.free[i];
   }
   for (;;) {
     // Borders of pockets with rooms.
@@ -397,6 +410,11 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
       // Long and open borders before short and closed ones.
       const double length = border.length();
       if (length < kLeastPocketBorder * around[pair.first]) continue;
+      // A room of which little was seen through its door is no niche.
+      if (seen[pair.first] >= kSeenThroughDoor &&
+          border.Of(Mark::kDoor) > kDoorBorder * length) {
+        continue;
+      }
       // Space beyond a wall is no part of what lies before it.
       if (exposed[pair.first] > kMaxExposed * around[pair.first]) continue;
       const double score = (2.0 * length - border.holds) / around[pair.first];

@@ -317,6 +317,7 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
       Group group;
       group.direction = face.direction;
       group.line.origin = face.begin;
+      group.line.is_aligned = face.direction >= 0;
       group.line.along = face.direction >= 0
                              ? all[static_cast<std::size_t>(face.direction)]
                              : (face.end - face.begin).normalized();

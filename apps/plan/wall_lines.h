@@ -49,6 +49,8 @@ struct WallLine {
   /// False: drawn from the end of another line to close a space, without
   /// anything that speaks for a wall.
   bool is_wall = true;
+  /// It has exactly one of the building's directions.
+  bool is_aligned = false;
 
   /// Unit vector to the left of `along`.
   Eigen::Vector2d normal() const { return {-along[1], along[0]}; }

@@ -182,6 +182,37 @@ TEST(BuildingPlanTest, DoorsInThickWallsKeepRoomsApart) {
   }
 }
 
+// Behind a gap between cupboards is the wall, half a metre away: no door.
+TEST(BuildingPlanTest, GapsBetweenCupboardsAreNoDoors) {
+  const auto doors = [](double depth) {
+    Drawing drawing(10.0, 12.0);
+    drawing.Room(1.0, 1.0, 8.0, 7.0);
+    drawing.Fill(1.0, 7.0 - depth, 8.0, 7.05, Space::kUnknown);
+    drawing.Fill(1.0, 6.95 - depth, 8.0, 7.0 - depth, Space::kOccupied);
+    drawing.Free(4.0, 6.9 - depth, 4.8, 7.0)
+        .Fill(4.0, 7.0, 4.8, 7.05, Space::kOccupied);
+    return PlanOf(drawing).doors.size();
+  };
+  EXPECT_EQ(doors(0.5), 0u);
+  EXPECT_EQ(doors(2.0), 1u);
+}
+
+// Two rooms of which each was seen through its own door: little is seen of the
+// wall between them, but nobody looked through it.
+TEST(BuildingPlanTest, AShortPieceOfAnUnseenWallKeepsRoomsApart) {
+  const auto rooms = [](bool is_seen_through) {
+    Drawing drawing(14.0, 10.0);
+    drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 13.0, 8.0);
+    drawing.Free(2.0, 2.9, 2.9, 3.3).Free(10.0, 2.9, 10.9, 3.3);
+    drawing.Fill(6.0, 3.2, 7.0, 8.0,
+                 is_seen_through ? Space::kFree : Space::kUnknown);
+    drawing.Fill(6.0, 4.0, 6.05, 5.5, Space::kOccupied);
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms(false), 3u);
+  EXPECT_EQ(rooms(true), 2u);
+}
+
 TEST(BuildingPlanTest, OneRoomAndOneCorridor) {
   const BuildingPlan room = PlanOf(Drawing(8.0, 8.0).Room(1, 1, 6, 5));
   ASSERT_EQ(room.rooms.size(), 1u);

@@ -23,7 +23,7 @@ namespace {
 using Eigen::Vector2d;
 
 // A straight piece of a building, seen from its left.
-struct Face {
+struct WallFace {
   double x1, y1, x2, y2;
 };
 
@@ -35,7 +35,7 @@ class SameWallTest : public ::testing::Test {
 
   // `face` stands at its true place moved by `drift` (m, m, rad about the
   // origin).
-  FeatureId See(const Face& face, const Pose2& drift) {
+  FeatureId See(const WallFace& face, const Pose2& drift) {
     const Pose2 place(face.x1, face.y1,
                       std::atan2(face.y2 - face.y1, face.x2 - face.x1));
     const Pose2 pose = Compose(drift, place);
@@ -68,7 +68,7 @@ class SameWallTest : public ::testing::Test {
   }
 
   // Sees faces one after the other while the drift grows evenly.
-  void Walk(const std::vector<Face>& faces, const Pose2& from,
+  void Walk(const std::vector<WallFace>& faces, const Pose2& from,
             const Pose2& to) {
     for (std::size_t i = 0; i < faces.size(); ++i) {
       See(faces[i], from + (to - from) * (static_cast<double>(i + 1) /
@@ -106,8 +106,8 @@ class SameWallTest : public ::testing::Test {
 
   // True when both are pieces of one line, seen from one side.
   bool IsOneWall(FeatureId a, FeatureId b) const {
-    const Face& f = truth_.at(a);
-    const Face& g = truth_.at(b);
+    const WallFace& f = truth_.at(a);
+    const WallFace& g = truth_.at(b);
     const Vector2d along = Vector2d(f.x2 - f.x1, f.y2 - f.y1).normalized();
     const Vector2d other = Vector2d(g.x2 - g.x1, g.y2 - g.y1).normalized();
     const Vector2d between(g.x1 - f.x1, g.y1 - f.y1);
@@ -149,14 +149,14 @@ class SameWallTest : public ::testing::Test {
   Registry registry_;
   Graph graph_;
   std::vector<FeatureId> seen_;
-  std::map<FeatureId, Face> truth_;
+  std::map<FeatureId, WallFace> truth_;
 };
 
 // One side of a ring of corridors, 2 m wide, with a niche: outer and inner wall
 // in pieces, as met on the way from (0, 0) to (length, 0), turned by quarter
 // turns about the middle of a square of that length.
-std::vector<Face> Side(double length, int quarter) {
-  std::vector<Face> faces;
+std::vector<WallFace> Side(double length, int quarter) {
+  std::vector<WallFace> faces;
   for (double x = -1.0; x < length - 1.0; x += 4.0) {
     faces.push_back({x, -1.0, x + 3.5, -1.0});
     faces.push_back({x + 6.0, 1.0, x + 2.5, 1.0});
@@ -166,7 +166,7 @@ std::vector<Face> Side(double length, int quarter) {
       faces.push_back({x + 4.0, -1.8, x + 4.0, -1.0});
     }
   }
-  for (Face& face : faces) {
+  for (WallFace& face : faces) {
     for (int q = 0; q < quarter; ++q) {
       const auto turn = [length](double* x, double* y) {
         const double from_x = *x - length / 2;
@@ -182,10 +182,10 @@ std::vector<Face> Side(double length, int quarter) {
 }
 
 // Three quarters and the last side of a ring, then the first two sides again.
-std::vector<Face> Round(double length, int sides) {
-  std::vector<Face> faces;
+std::vector<WallFace> Round(double length, int sides) {
+  std::vector<WallFace> faces;
   for (int side = 0; side < sides; ++side) {
-    const std::vector<Face> next = Side(length, side % 4);
+    const std::vector<WallFace> next = Side(length, side % 4);
     faces.insert(faces.end(), next.begin(), next.end());
   }
   return faces;
@@ -302,8 +302,8 @@ TEST_F(SameWallTest, AScopeOfFeaturesGivesNothing) {
 }
 
 // Two corridors side by side, 2.8 m apart, and the way from one to the other.
-std::vector<Face> ParallelCorridors() {
-  std::vector<Face> faces;
+std::vector<WallFace> ParallelCorridors() {
+  std::vector<WallFace> faces;
   for (double x = 0.0; x < 40.0; x += 4.0) {
     faces.push_back({x, -1.0, x + 3.5, -1.0});
     faces.push_back({x + 3.5, 1.0, x, 1.0});
@@ -402,7 +402,7 @@ TEST_F(SameWallTest, AClosedLoopIsNoLongWay) {
 
 TEST_F(SameWallTest, TheFacesOfAWallAreNotOne) {
   // Round a thin wall and back on its other side.
-  std::vector<Face> faces;
+  std::vector<WallFace> faces;
   for (double x = 0.0; x < 40.0; x += 4.0)
     faces.push_back({x, 0.0, x + 4.0, 0.0});
   faces.push_back({42.0, 5.0, 42.0, -5.0});

@@ -32,6 +32,21 @@ class Random {
   std::mt19937_64 engine_;
 };
 
+/// Square roots of information without symmetries that could hide an error.
+inline Eigen::Matrix2d Weight2() {
+  Eigen::Matrix2d weight;
+  weight << 2.0, 1.0,  //
+      0.0, 3.0;
+  return weight;
+}
+inline Eigen::Matrix3d Weight3() {
+  Eigen::Matrix3d weight;
+  weight << 2.0, 1.0, 0.5,  //
+      0.0, 3.0, -1.0,       //
+      0.0, 0.0, 4.0;
+  return weight;
+}
+
 using Block = std::vector<double>;
 
 /// Residuals and Jacobians (rows x block size) of a cost function.

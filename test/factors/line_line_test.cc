@@ -10,20 +10,14 @@ namespace {
 
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix2d Weight() {
-  Eigen::Matrix2d weight;
-  weight << 2.0, 1.0,  //
-      0.0, 3.0;
-  return weight;
-}
+using testing::Weight2;
 
 TEST(LineLineTest, ByHand) {
   // y = 1 against the line x = 1 upwards, which is 2 m to the left of its
   // anchor (3, 4) and so at -1 from the origin.
   const std::unique_ptr<ceres::CostFunction> cost(LineLine::Create(
       Eigen::Vector2d(-2.5, kPi / 2 - 0.25), Eigen::Vector2d::Zero(),
-      Eigen::Vector2d(3.0, 4.0), Weight()));
+      Eigen::Vector2d(3.0, 4.0), Weight2()));
   const auto result = Evaluate(*cost, {{1.0, 0.0}, {2.0, kPi / 2}});
   EXPECT_NEAR(result.residual[0], 2 * 0.5 + 0.25, 1e-14);
   EXPECT_NEAR(result.residual[1], 3 * 0.25, 1e-14);
@@ -59,7 +53,7 @@ TEST(LineLineTest, JacobiansMatchDifferences) {
         Eigen::Vector2d(random.Uniform(-3, 3), 0.1),
         Eigen::Vector2d(random.Uniform(-9, 9), random.Uniform(-9, 9)),
         Eigen::Vector2d(random.Uniform(-9, 9), random.Uniform(-9, 9)),
-        Weight()));
+        Weight2()));
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-9, 9), alpha},
                 {random.Uniform(-9, 9), alpha + turn}});
@@ -73,12 +67,12 @@ TEST(LineLineTest, UnchangedWhenTheWorldIsTurned) {
   const testing::Block line2 = {-2.0, 2.0};
   const Eigen::Vector2d expected(0.5, -1.0);
   const std::unique_ptr<ceres::CostFunction> near(
-      LineLine::Create(expected, anchor1, anchor2, Weight()));
+      LineLine::Create(expected, anchor1, anchor2, Weight2()));
   const auto reference = Evaluate(*near, {line1, line2});
   const Pose2 turn(0.0, 0.0, 2.0);
   const std::unique_ptr<ceres::CostFunction> cost(
       LineLine::Create(expected, TransformPoint(turn, anchor1),
-                       TransformPoint(turn, anchor2), Weight()));
+                       TransformPoint(turn, anchor2), Weight2()));
   const auto result = Evaluate(
       *cost, {testing::MoveLine(turn, line1), testing::MoveLine(turn, line2)});
   EXPECT_LT((result.residual - reference.residual).norm(), 1e-12);
@@ -90,12 +84,12 @@ TEST(LineLineTest, ParallelLinesMayBeMovedAndTurned) {
   const testing::Block line1 = {1.0, 0.3};
   const testing::Block line2 = {-2.0, 0.3};
   const std::unique_ptr<ceres::CostFunction> near(
-      LineLine::Create(Eigen::Vector2d::Zero(), anchor1, anchor2, Weight()));
+      LineLine::Create(Eigen::Vector2d::Zero(), anchor1, anchor2, Weight2()));
   const auto reference = Evaluate(*near, {line1, line2});
   for (const Pose2& motion : testing::WorldMotions()) {
     const std::unique_ptr<ceres::CostFunction> cost(LineLine::Create(
         Eigen::Vector2d::Zero(), TransformPoint(motion, anchor1),
-        TransformPoint(motion, anchor2), Weight()));
+        TransformPoint(motion, anchor2), Weight2()));
     const auto result = Evaluate(*cost, {testing::MoveLine(motion, line1),
                                          testing::MoveLine(motion, line2)});
     EXPECT_LT((result.residual - reference.residual).norm(), 1e-10);

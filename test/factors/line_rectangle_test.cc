@@ -13,12 +13,7 @@ namespace {
 using testing::Block;
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix2d Weight() {
-  Eigen::Matrix2d weight;
-  weight << 2.0, 1.0, 0.0, 3.0;
-  return weight;
-}
+using testing::Weight2;
 
 Eigen::Vector2d Error(const Block& line, const Eigen::Vector2d& anchor,
                       const Block& rectangle, double phi) {
@@ -33,7 +28,7 @@ TEST(LineRectangleTest, ByHand) {
   // (10, 2) + 0.5 (-sin(0.1), cos(0.1)) and is turned by 0.1: the middle lies
   // cos(0.1) - 0.5 from it.
   const std::unique_ptr<ceres::CostFunction> cost(LineRectangle::Create(
-      Eigen::Vector2d(0.25, 0.0), Eigen::Vector2d(10.0, 2.0), Weight()));
+      Eigen::Vector2d(0.25, 0.0), Eigen::Vector2d(10.0, 2.0), Weight2()));
   const auto result = Evaluate(*cost, {{0.5, 0.1}, {10.0, 5.0, 0.0, 4.0, 2.0}});
   const double past = 0.49500416527802577;
   EXPECT_NEAR(result.residual[0], 2 * (past - 0.25) + 0.1, 1e-14);
@@ -109,7 +104,7 @@ TEST(LineRectangleTest, JacobiansMatchDifferences) {
     const std::unique_ptr<ceres::CostFunction> cost(LineRectangle::Create(
         Eigen::Vector2d(0.5, phi),
         Eigen::Vector2d(random.Uniform(-9, 9), random.Uniform(-9, 9)),
-        Weight()));
+        Weight2()));
     const double theta = random.Uniform(-kPi, kPi);
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-9, 9),
@@ -122,10 +117,10 @@ TEST(LineRectangleTest, JacobiansMatchDifferences) {
         *cost, {{0.0, kPi}, {1.0, 2.0, -kPi - phi, 0.0, 0.0}});
   }
   // Across the side, where the residual jumps, the value is still a number.
-  const auto across =
-      Evaluate(*std::unique_ptr<ceres::CostFunction>(LineRectangle::Create(
-                   Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), Weight())),
-               {{1.0, kPi / 2}, {0.0, 0.0, 0.0, 1.0, 1.0}});
+  const auto across = Evaluate(
+      *std::unique_ptr<ceres::CostFunction>(LineRectangle::Create(
+          Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), Weight2())),
+      {{1.0, kPi / 2}, {0.0, 0.0, 0.0, 1.0, 1.0}});
   EXPECT_TRUE(across.residual.allFinite());
   EXPECT_TRUE(across.jacobians[0].allFinite());
   EXPECT_TRUE(across.jacobians[1].allFinite());
@@ -139,7 +134,7 @@ TEST(LineRectangleTest, UnchangedWhenTheWorldMoves) {
     const Block moved = testing::MovePoint(motion, anchor);
     const std::unique_ptr<ceres::CostFunction> cost(
         LineRectangle::Create(Eigen::Vector2d(0.5, kPi / 2),
-                              Eigen::Vector2d(moved[0], moved[1]), Weight()));
+                              Eigen::Vector2d(moved[0], moved[1]), Weight2()));
     return Evaluate(*cost, {testing::MoveLine(motion, line),
                             testing::MoveRectangle(motion, rectangle)})
         .residual;

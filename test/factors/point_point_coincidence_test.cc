@@ -10,28 +10,24 @@ namespace {
 
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix2d Weight() {
-  Eigen::Matrix2d weight;
-  weight << 2.0, 1.0, 0.0, 3.0;
-  return weight;
-}
+using testing::Weight2;
 
 TEST(PointPointCoincidenceTest, ByHand) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PointPointCoincidence::Create(Eigen::Vector2d(1.0, -1.0), Weight()));
+      PointPointCoincidence::Create(Eigen::Vector2d(1.0, -1.0), Weight2()));
   // Displacement (3, 4), error (2, 5): L error = (4 + 5, 15).
   const auto result = Evaluate(*cost, {{1.0, 2.0}, {4.0, 6.0}});
   EXPECT_DOUBLE_EQ(result.residual[0], 9.0);
   EXPECT_DOUBLE_EQ(result.residual[1], 15.0);
-  EXPECT_LT((result.jacobians[1] - Weight()).norm(), 1e-15);
-  EXPECT_LT((result.jacobians[0] + Weight()).norm(), 1e-15);
+  EXPECT_LT((result.jacobians[1] - Weight2()).norm(), 1e-15);
+  EXPECT_LT((result.jacobians[0] + Weight2()).norm(), 1e-15);
 }
 
 TEST(PointPointCoincidenceTest, JacobiansMatchDifferences) {
   Random random(4);
   const std::unique_ptr<ceres::CostFunction> cost(
-      PointPointCoincidence::Create<3, 3>(Eigen::Vector2d(0.5, 0.0), Weight()));
+      PointPointCoincidence::Create<3, 3>(Eigen::Vector2d(0.5, 0.0),
+                                          Weight2()));
   for (int i = 0; i < 20; ++i) {
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-5, 5), random.Uniform(-5, 5), 1.0},

@@ -11,20 +11,14 @@ namespace {
 
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix2d Weight() {
-  Eigen::Matrix2d weight;
-  weight << 2.0, 1.0,  //
-      0.0, 3.0;
-  return weight;
-}
+using testing::Weight2;
 
 TEST(PoseLineTest, ByHand) {
   // Anchor (10, 20), d = 1, alpha = 0: the line y = 21, 2.5 m to the left of
   // (13, 18.5) for one who looks along it, and turned by -0.5 against one whose
   // heading is 0.5.
   const std::unique_ptr<ceres::CostFunction> cost(PoseLine::Create(
-      Eigen::Vector2d(2.0, -0.75), Eigen::Vector2d(10.0, 20.0), Weight()));
+      Eigen::Vector2d(2.0, -0.75), Eigen::Vector2d(10.0, 20.0), Weight2()));
   const auto result = Evaluate(*cost, {{13.0, 18.5, 0.5}, {1.0, 0.0}});
   EXPECT_NEAR(result.residual[0], 2 * 0.5 + 0.25, 1e-14);
   EXPECT_NEAR(result.residual[1], 3 * 0.25, 1e-14);
@@ -52,7 +46,7 @@ TEST(PoseLineTest, NormalForm) {
         rho - std::cos(theta) * pose[0] - std::sin(theta) * pose[1];
     double residual[2];
     PoseLine(Eigen::Vector2d(seen_rho, seen_theta - kPi / 2),
-             Eigen::Vector2d::Zero(), Weight())(pose, line, residual);
+             Eigen::Vector2d::Zero(), Weight2())(pose, line, residual);
     for (double row : residual) EXPECT_NEAR(row, 0.0, 1e-13);
   }
 }
@@ -92,7 +86,7 @@ TEST(PoseLineTest, JacobiansMatchDifferences) {
         Eigen::Vector2d(random.Uniform(-3, 3),
                         NormalizeAngle(alpha - theta + random.Uniform(-3, 3))),
         Eigen::Vector2d(random.Uniform(-9, 9), random.Uniform(-9, 9)),
-        Weight()));
+        Weight2()));
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-9, 9), random.Uniform(-9, 9), theta},
                 {random.Uniform(-9, 9), alpha}});
@@ -105,11 +99,11 @@ TEST(PoseLineTest, UnchangedWhenTheWorldMoves) {
   const testing::Block line = {1.0, 0.3};
   const Eigen::Vector2d expected(0.5, -1.0);
   const std::unique_ptr<ceres::CostFunction> near(
-      PoseLine::Create(expected, anchor, Weight()));
+      PoseLine::Create(expected, anchor, Weight2()));
   const auto reference = Evaluate(*near, {pose, line});
   for (const Pose2& motion : testing::WorldMotions()) {
     const std::unique_ptr<ceres::CostFunction> cost(
-        PoseLine::Create(expected, TransformPoint(motion, anchor), Weight()));
+        PoseLine::Create(expected, TransformPoint(motion, anchor), Weight2()));
     const auto result = Evaluate(*cost, {testing::MovePose(motion, pose),
                                          testing::MoveLine(motion, line)});
     EXPECT_LT((result.residual - reference.residual).norm(), 1e-10);

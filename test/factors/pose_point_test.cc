@@ -10,18 +10,12 @@ namespace {
 
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix2d Weight() {
-  Eigen::Matrix2d weight;
-  weight << 2.0, 1.0,  //
-      0.0, 3.0;
-  return weight;
-}
+using testing::Weight2;
 
 TEST(PosePointTest, ByHand) {
   // Looking up from (1, 2), the point (4, 6) is 4 m ahead and 3 m to the right.
   const std::unique_ptr<ceres::CostFunction> cost(
-      PosePoint::Create(Eigen::Vector2d(3.5, -3.25), Weight()));
+      PosePoint::Create(Eigen::Vector2d(3.5, -3.25), Weight2()));
   const auto result = Evaluate(*cost, {{1.0, 2.0, kPi / 2}, {4.0, 6.0}});
   EXPECT_NEAR(result.residual[0], 2 * 0.5 + 0.25, 1e-14);
   EXPECT_NEAR(result.residual[1], 3 * 0.25, 1e-14);
@@ -43,13 +37,13 @@ TEST(PosePointTest, InverseOfTransformPoint) {
     const Eigen::Vector2d seen(random.Uniform(-9, 9), random.Uniform(-9, 9));
     const Eigen::Vector2d point = TransformPoint(pose, seen);
     double residual[2];
-    PosePoint(seen, Weight())(pose.data(), point.data(), residual);
+    PosePoint(seen, Weight2())(pose.data(), point.data(), residual);
     for (double row : residual) EXPECT_NEAR(row, 0.0, 1e-13);
   }
 }
 
 TEST(PosePointTest, WholeTurnsDoNotMatter) {
-  const PosePoint relation(Eigen::Vector2d(1.0, 2.0), Weight());
+  const PosePoint relation(Eigen::Vector2d(1.0, 2.0), Weight2());
   const double point[2] = {3.0, 1.0};
   const double pose[3] = {0.5, 0.25, 3.0};
   const double turned[3] = {0.5, 0.25, 3.0 - 2 * kPi};
@@ -64,7 +58,7 @@ TEST(PosePointTest, WholeTurnsDoNotMatter) {
 TEST(PosePointTest, JacobiansMatchDifferences) {
   Random random(32);
   const std::unique_ptr<ceres::CostFunction> cost(
-      PosePoint::Create(Eigen::Vector2d(1.0, -0.5), Weight()));
+      PosePoint::Create(Eigen::Vector2d(1.0, -0.5), Weight2()));
   for (int i = 0; i < 100; ++i) {
     testing::ExpectJacobiansMatchDifferences(
         *cost,
@@ -78,7 +72,7 @@ TEST(PosePointTest, JacobiansMatchDifferences) {
 
 TEST(PosePointTest, UnchangedWhenTheWorldMoves) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PosePoint::Create(Eigen::Vector2d(1.0, -0.5), Weight()));
+      PosePoint::Create(Eigen::Vector2d(1.0, -0.5), Weight2()));
   const testing::Block pose = {1.0, 2.0, 3.0};
   const testing::Block point = {-4.0, 0.5};
   const auto reference = Evaluate(*cost, {pose, point});

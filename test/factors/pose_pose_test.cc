@@ -11,19 +11,12 @@ namespace {
 using testing::Block;
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix3d Weight() {
-  Eigen::Matrix3d weight;
-  weight << 2.0, 1.0, 0.5,  //
-      0.0, 3.0, -1.0,       //
-      0.0, 0.0, 4.0;
-  return weight;
-}
+using testing::Weight3;
 
 TEST(PosePoseTest, ByHand) {
   // p2 seen from p1 is (2, 1, pi/2); the error is (0.5, 0.25, -0.125).
   const std::unique_ptr<ceres::CostFunction> cost(
-      PosePose::Create(Pose2(1.5, 0.75, kPi / 2 + 0.125), Weight()));
+      PosePose::Create(Pose2(1.5, 0.75, kPi / 2 + 0.125), Weight3()));
   const auto result = Evaluate(*cost, {{1.0, 2.0, kPi / 2}, {0.0, 4.0, kPi}});
   EXPECT_NEAR(result.residual[0], 2 * 0.5 + 0.25 - 0.5 * 0.125, 1e-14);
   EXPECT_NEAR(result.residual[1], 3 * 0.25 + 0.125, 1e-14);
@@ -31,7 +24,7 @@ TEST(PosePoseTest, ByHand) {
   // d e / d p2 is a turn by -theta1.
   Eigen::Matrix3d turn;
   turn << 0, 1, 0, -1, 0, 0, 0, 0, 1;
-  EXPECT_LT((result.jacobians[1] - Weight() * turn).norm(), 1e-14);
+  EXPECT_LT((result.jacobians[1] - Weight3() * turn).norm(), 1e-14);
 }
 
 TEST(PosePoseTest, AgreesWithBetween) {
@@ -66,7 +59,7 @@ TEST(PosePoseTest, JacobiansMatchDifferences) {
   for (int i = 0; i < 100; ++i) {
     const Pose2 relative(random.Uniform(-3, 3), random.Uniform(-3, 3), 0.0);
     const std::unique_ptr<ceres::CostFunction> cost(
-        PosePose::Create(relative, Weight()));
+        PosePose::Create(relative, Weight3()));
     const double heading = random.Uniform(-kPi, kPi);
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-9, 9), random.Uniform(-9, 9), heading},
@@ -74,13 +67,13 @@ TEST(PosePoseTest, JacobiansMatchDifferences) {
                  NormalizeAngle(heading + random.Uniform(-3.0, 3.0))}});
   }
   const std::unique_ptr<ceres::CostFunction> cost(
-      PosePose::Create(Pose2::Zero(), Weight()));
+      PosePose::Create(Pose2::Zero(), Weight3()));
   testing::ExpectJacobiansMatchDifferences(*cost, {{0, 0, kPi}, {0, 0, -kPi}});
 }
 
 TEST(PosePoseTest, UnchangedWhenTheWorldMoves) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PosePose::Create(Pose2(1.5, 0.75, -2.0), Weight()));
+      PosePose::Create(Pose2(1.5, 0.75, -2.0), Weight3()));
   const Block a = {1.0, 2.0, 3.0};
   const Block b = {0.0, 4.0, 1.2};
   const auto reference = Evaluate(*cost, {a, b});

@@ -10,26 +10,19 @@ namespace {
 
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix3d Weight() {
-  Eigen::Matrix3d weight;
-  weight << 2.0, 1.0, 0.5,  //
-      0.0, 3.0, -1.0,       //
-      0.0, 0.0, 4.0;
-  return weight;
-}
+using testing::Weight3;
 
 TEST(PosePriorTest, ByHand) {
   // Looking up from (1, 2), the pose at (4, 6) is 4 m ahead, 3 m to the right.
   const std::unique_ptr<ceres::CostFunction> cost(
-      PosePrior::Create(Pose2(1.0, 2.0, kPi / 2), Weight()));
+      PosePrior::Create(Pose2(1.0, 2.0, kPi / 2), Weight3()));
   const auto result = Evaluate(*cost, {{4.0, 6.0, kPi / 2 + 0.25}});
   EXPECT_NEAR(result.residual[0], 8.0 - 3.0 + 0.125, 1e-14);
   EXPECT_NEAR(result.residual[1], -9.0 - 0.25, 1e-14);
   EXPECT_NEAR(result.residual[2], 1.0, 1e-14);
   Eigen::Matrix3d turn;
   turn << 0, 1, 0, -1, 0, 0, 0, 0, 1;
-  EXPECT_LT((result.jacobians[0] - Weight() * turn).norm(), 1e-14);
+  EXPECT_LT((result.jacobians[0] - Weight3() * turn).norm(), 1e-14);
 }
 
 TEST(PosePriorTest, AgreesWithBetween) {
@@ -40,8 +33,8 @@ TEST(PosePriorTest, AgreesWithBetween) {
     const Pose2 pose(random.Uniform(-9, 9), random.Uniform(-9, 9),
                      random.Uniform(-4, 4));
     Eigen::Vector3d residual;
-    PosePrior(expected, Weight())(pose.data(), residual.data());
-    EXPECT_LT((residual - Weight() * Between(expected, pose)).norm(), 1e-12);
+    PosePrior(expected, Weight3())(pose.data(), residual.data());
+    EXPECT_LT((residual - Weight3() * Between(expected, pose)).norm(), 1e-12);
   }
 }
 
@@ -59,7 +52,7 @@ TEST(PosePriorTest, JacobiansMatchDifferences) {
     const double heading = random.Uniform(-kPi, kPi);
     const std::unique_ptr<ceres::CostFunction> cost(PosePrior::Create(
         Pose2(random.Uniform(-9, 9), random.Uniform(-9, 9), heading),
-        Weight()));
+        Weight3()));
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-9, 9), random.Uniform(-9, 9),
                  NormalizeAngle(heading + random.Uniform(-3.0, 3.0))}});
@@ -70,12 +63,12 @@ TEST(PosePriorTest, UnchangedWhenTheWorldMoves) {
   const testing::Block expected = {1.0, 2.0, 3.0};
   const testing::Block pose = {0.0, 4.0, 1.2};
   const std::unique_ptr<ceres::CostFunction> near(
-      PosePrior::Create(Pose2(1.0, 2.0, 3.0), Weight()));
+      PosePrior::Create(Pose2(1.0, 2.0, 3.0), Weight3()));
   const auto reference = Evaluate(*near, {pose});
   for (const Pose2& motion : testing::WorldMotions()) {
     const testing::Block moved = testing::MovePose(motion, expected);
     const std::unique_ptr<ceres::CostFunction> cost(
-        PosePrior::Create(Pose2(moved[0], moved[1], moved[2]), Weight()));
+        PosePrior::Create(Pose2(moved[0], moved[1], moved[2]), Weight3()));
     const auto result = Evaluate(*cost, {testing::MovePose(motion, pose)});
     EXPECT_LT((result.residual - reference.residual).norm(), 1e-10);
   }

@@ -14,12 +14,7 @@ namespace {
 using testing::Block;
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix2d Weight() {
-  Eigen::Matrix2d weight;
-  weight << 2.0, 1.0, 0.0, 3.0;
-  return weight;
-}
+using testing::Weight2;
 
 TEST(PoseSegmentCollinearityTest, ByHand) {
   // The segment points up at x = 2, the pose is 1 to its left and turned by 0.5
@@ -28,9 +23,9 @@ TEST(PoseSegmentCollinearityTest, ByHand) {
   const std::vector<Block> blocks = {{1.0, 5.0, kPi / 2 + 0.5},
                                      {2.0, 1.0, kPi / 2}};
   const std::unique_ptr<ceres::CostFunction> free(
-      PoseSegmentCollinearity::Create(expected, Weight()));
+      PoseSegmentCollinearity::Create(expected, Weight2()));
   const std::unique_ptr<ceres::CostFunction> clamped(
-      PoseSegmentCollinearityClamped::Create(expected, Weight()));
+      PoseSegmentCollinearityClamped::Create(expected, Weight2()));
   for (const auto* cost : {free.get(), clamped.get()}) {
     const auto result = Evaluate(*cost, blocks);
     EXPECT_NEAR(result.residual[0], 0.75, 1e-14);  // 2 * 0.25 + 0.25
@@ -77,7 +72,7 @@ TEST(PoseSegmentCollinearityTest, HeadingErrorIsWrappedModuloTwoPi) {
 TEST(PoseSegmentCollinearityTest, JacobiansMatchDifferences) {
   Random random(11);
   const std::unique_ptr<ceres::CostFunction> cost(
-      PoseSegmentCollinearity::Create(Eigen::Vector2d(0.5, 0.0), Weight()));
+      PoseSegmentCollinearity::Create(Eigen::Vector2d(0.5, 0.0), Weight2()));
   for (int i = 0; i < 100; ++i) {
     const double heading = random.Uniform(-kPi, kPi);
     testing::ExpectJacobiansMatchDifferences(
@@ -92,9 +87,9 @@ TEST(PoseSegmentCollinearityTest, ClampedSegmentHasNoDerivative) {
   Random random(12);
   const Eigen::Vector2d expected(0.5, -0.25);
   const std::unique_ptr<ceres::CostFunction> free(
-      PoseSegmentCollinearity::Create(expected, Weight()));
+      PoseSegmentCollinearity::Create(expected, Weight2()));
   const std::unique_ptr<ceres::CostFunction> clamped(
-      PoseSegmentCollinearityClamped::Create(expected, Weight()));
+      PoseSegmentCollinearityClamped::Create(expected, Weight2()));
   for (int i = 0; i < 20; ++i) {
     std::vector<Block> blocks(2);
     for (Block& block : blocks) {
@@ -136,7 +131,7 @@ TEST(PoseSegmentCollinearityTest, ClampedMovesThePoseOnly) {
 
 TEST(PoseSegmentCollinearityTest, UnchangedWhenTheWorldMoves) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PoseSegmentCollinearity::Create(Eigen::Vector2d(0.5, -0.25), Weight()));
+      PoseSegmentCollinearity::Create(Eigen::Vector2d(0.5, -0.25), Weight2()));
   const Block pose = {1.0, 2.0, 3.0};
   const Block segment = {0.0, 4.0, 1.2};
   const auto reference = Evaluate(*cost, {pose, segment});

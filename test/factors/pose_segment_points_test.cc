@@ -15,7 +15,7 @@ using testing::Block;
 using testing::Evaluate;
 using testing::Random;
 
-Eigen::Matrix3d Weight() {
+Eigen::Matrix3d VoteWeight() {
   Eigen::Matrix3d weight;
   weight << 2.0, 1.0, 0.0, 0.0, 3.0, 0.5, 0.0, 0.0, 4.0;
   return weight;
@@ -32,7 +32,7 @@ TEST(PoseSegmentPointsTest, ByHand) {
   EXPECT_NEAR(result.residual[1], 1.0, 1e-15);
   EXPECT_NEAR(result.residual[2], 1.0, 1e-15);
   const std::unique_ptr<ceres::CostFunction> weighted(
-      PoseSegmentPoints::Create(Eigen::Vector3d(0.5, 0.0, 0.25), Weight()));
+      PoseSegmentPoints::Create(Eigen::Vector3d(0.5, 0.0, 0.25), VoteWeight()));
   result = Evaluate(*weighted, blocks);
   EXPECT_NEAR(result.residual[0], 0.0, 1e-14);    // 2 * -0.5 + 1
   EXPECT_NEAR(result.residual[1], 3.375, 1e-14);  // 3 * 1 + 0.5 * 0.75
@@ -75,7 +75,7 @@ TEST(PoseSegmentPointsTest, SumOfSquaredDistancesOfItsPoints) {
 TEST(PoseSegmentPointsTest, JacobiansMatchDifferences) {
   Random random(21);
   const std::unique_ptr<ceres::CostFunction> cost(
-      PoseSegmentPoints::Create(Eigen::Vector3d(0.1, -0.2, 0.3), Weight()));
+      PoseSegmentPoints::Create(Eigen::Vector3d(0.1, -0.2, 0.3), VoteWeight()));
   for (int i = 0; i < 100; ++i) {
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-9, 9), random.Uniform(-9, 9),
@@ -88,7 +88,7 @@ TEST(PoseSegmentPointsTest, JacobiansMatchDifferences) {
 
 TEST(PoseSegmentPointsTest, NoJumpAtPi) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PoseSegmentPoints::Create(Eigen::Vector3d::Zero(), Weight()));
+      PoseSegmentPoints::Create(Eigen::Vector3d::Zero(), VoteWeight()));
   const auto below =
       Evaluate(*cost, {{1.0, 2.0, kPi - 1e-12}, {0.0, 0.0, 0.3}});
   const auto above =
@@ -98,7 +98,7 @@ TEST(PoseSegmentPointsTest, NoJumpAtPi) {
 
 TEST(PoseSegmentPointsTest, NothingAlongTheSegment) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PoseSegmentPoints::Create(Eigen::Vector3d::Zero(), Weight()));
+      PoseSegmentPoints::Create(Eigen::Vector3d::Zero(), VoteWeight()));
   const Block pose = {1.0, 2.0, 0.4};
   const double direction = 0.7;
   const auto here = Evaluate(*cost, {pose, {0.5, -1.0, direction}});
@@ -111,7 +111,7 @@ TEST(PoseSegmentPointsTest, NothingAlongTheSegment) {
 
 TEST(PoseSegmentPointsTest, UnchangedWhenTheWorldMoves) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PoseSegmentPoints::Create(Eigen::Vector3d::Zero(), Weight()));
+      PoseSegmentPoints::Create(Eigen::Vector3d::Zero(), VoteWeight()));
   const Block pose = {1.0, 2.0, 3.0};
   const Block segment = {0.0, 4.0, 1.2};
   const auto reference = Evaluate(*cost, {pose, segment});

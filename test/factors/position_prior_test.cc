@@ -10,26 +10,20 @@ namespace {
 
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix2d Weight() {
-  Eigen::Matrix2d weight;
-  weight << 2.0, 1.0,  //
-      0.0, 3.0;
-  return weight;
-}
+using testing::Weight2;
 
 TEST(PositionPriorTest, ByHand) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PositionPrior::Create(Eigen::Vector2d(1.0, 2.0), Weight()));
+      PositionPrior::Create(Eigen::Vector2d(1.0, 2.0), Weight2()));
   const auto result = Evaluate(*cost, {{1.5, 2.25}});
   EXPECT_DOUBLE_EQ(result.residual[0], 1.25);
   EXPECT_DOUBLE_EQ(result.residual[1], 0.75);
-  EXPECT_LT((result.jacobians[0] - Weight()).norm(), 1e-15);
+  EXPECT_LT((result.jacobians[0] - Weight2()).norm(), 1e-15);
 }
 
 TEST(PositionPriorTest, HeadingDoesNotCount) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      PositionPrior::Create<3>(Eigen::Vector2d(1.0, 2.0), Weight()));
+      PositionPrior::Create<3>(Eigen::Vector2d(1.0, 2.0), Weight2()));
   for (const double heading : {0.0, 3.0, -kPi}) {
     const auto result = Evaluate(*cost, {{1.5, 2.25, heading}});
     EXPECT_DOUBLE_EQ(result.residual[0], 1.25);
@@ -43,7 +37,7 @@ TEST(PositionPriorTest, JacobiansMatchDifferences) {
   for (int i = 0; i < 20; ++i) {
     const std::unique_ptr<ceres::CostFunction> cost(PositionPrior::Create<3>(
         Eigen::Vector2d(random.Uniform(-9, 9), random.Uniform(-9, 9)),
-        Weight()));
+        Weight2()));
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-9, 9), random.Uniform(-9, 9),
                  random.Uniform(-4, 4)}});

@@ -15,12 +15,7 @@ namespace {
 using testing::Block;
 using testing::Evaluate;
 using testing::Random;
-
-Eigen::Matrix2d Weight() {
-  Eigen::Matrix2d weight;
-  weight << 2.0, 1.0, 0.0, 3.0;
-  return weight;
-}
+using testing::Weight2;
 
 Eigen::Vector2d Error(const Block& segment, const Block& rectangle,
                       double phi) {
@@ -34,7 +29,7 @@ TEST(SegmentRectangleTest, ByHand) {
   // The side below is at y = 3; the segment 0.5 past it, turned by 0.1. Error
   // (0.5 - 0.25, 0.1).
   const std::unique_ptr<ceres::CostFunction> cost(
-      SegmentRectangle::Create(Eigen::Vector2d(0.25, 0.0), Weight()));
+      SegmentRectangle::Create(Eigen::Vector2d(0.25, 0.0), Weight2()));
   const auto result =
       Evaluate(*cost, {{11.0, 2.5, 0.1}, {10.0, 5.0, 0.0, 4.0, 2.0}});
   EXPECT_NEAR(result.residual[0], 0.6, 1e-14);  // 2 * 0.25 + 0.1
@@ -111,7 +106,7 @@ TEST(SegmentRectangleTest, JacobiansMatchDifferences) {
   for (int i = 0; i < 100; ++i) {
     const double phi = (i % 4) * kPi / 2;
     const std::unique_ptr<ceres::CostFunction> cost(
-        SegmentRectangle::Create(Eigen::Vector2d(0.5, phi), Weight()));
+        SegmentRectangle::Create(Eigen::Vector2d(0.5, phi), Weight2()));
     const double theta = random.Uniform(-kPi, kPi);
     testing::ExpectJacobiansMatchDifferences(
         *cost, {{random.Uniform(-9, 9), random.Uniform(-9, 9),
@@ -127,7 +122,7 @@ TEST(SegmentRectangleTest, JacobiansMatchDifferences) {
 
 TEST(SegmentRectangleTest, UnchangedWhenTheWorldMoves) {
   const std::unique_ptr<ceres::CostFunction> cost(
-      SegmentRectangle::Create(Eigen::Vector2d(0.5, kPi / 2), Weight()));
+      SegmentRectangle::Create(Eigen::Vector2d(0.5, kPi / 2), Weight2()));
   const Block segment = {3.0, 4.0, 2.9};
   const Block rectangle = {1.0, 2.0, 1.2, 3.0, 2.0};
   const auto reference = Evaluate(*cost, {segment, rectangle});
@@ -150,7 +145,8 @@ TEST(SegmentRectangleTest, BareProblem) {
     for (int k = 0; k < 4; ++k) {
       walls[k] = testing::MovePose(motion, walls[k]);
       problem.AddResidualBlock(
-          SegmentRectangle::Create(Eigen::Vector2d(0.0, k * kPi / 2), Weight()),
+          SegmentRectangle::Create(Eigen::Vector2d(0.0, k * kPi / 2),
+                                   Weight2()),
           nullptr, walls[k].data(), rectangle.data());
       problem.SetParameterBlockConstant(walls[k].data());
     }

@@ -1,4 +1,5 @@
 #include <plumbline/frontend/bags/chunk_unpacker.h>
+#include <plumbline/frontend/bags/chunked_bag.h>
 #include <plumbline/frontend/bags/little_endian.h>
 #include <plumbline/frontend/bags/mcap.h>
 #include <zlib.h>
@@ -86,20 +87,20 @@ bool ParseChunkHead(std::string_view content, ChunkHead* head) {
   return fields.ok();
 }
 
-class Mcap : public BagSource {
+class Mcap : public ChunkedBag {
  public:
-  explicit Mcap(InputStream* input) : BagSource("MCAP file"), input_(input) {
+  explicit Mcap(InputStream* input) : ChunkedBag("MCAP file", input) {
     input->Consume(kMagic.size());
   }
 
   bool Next(BagMessage* message) override {
     while (true) {
-      if (!chunk_.empty()) {
-        if (Step(&chunk_, message)) return true;
+      if (!chunk()->empty()) {
+        if (Step(chunk(), message)) return true;
         continue;
       }
       if (at_end_) return false;
-      if (Step(input_, message)) return true;
+      if (Step(input(), message)) return true;
     }
   }
 
@@ -108,10 +109,7 @@ class Mcap : public BagSource {
   template <typename Bytes>
   bool Step(Bytes* bytes, BagMessage* message) {
     constexpr bool kInChunk = std::is_same_v<Bytes, MemoryBytes>;
-    if (pending_ > 0) {
-      bytes->Consume(pending_);
-      pending_ = 0;
-    }
+    PassOverLast(bytes);
     const std::string_view head = bytes->Peek(kRecordHeader);
     if (head.size() < kRecordHeader) {
       bytes->Consume(kRecordHeader);
@@ -166,9 +164,9 @@ class Mcap : public BagSource {
   // The data ended without the record that says so.
   void BreakOff() {
     at_end_ = true;
-    Skip(input_->damage().empty()
+    Skip(input()->damage().empty()
              ? std::string("the file breaks off before its end")
-             : input_->damage() + ": what was unpacked before it is used");
+             : input()->damage() + ": what was unpacked before it is used");
   }
 
   // A record cannot be believed: on to the next chunk, which says its size
@@ -259,52 +257,37 @@ class Mcap : public BagSource {
     message->topic = channel->second;
     message->time =
         static_cast<std::int64_t>(LittleEndian(head, kRecordHeader + 2 + 4, 8));
-    message->data = {};
-    const std::size_t whole = kRecordHeader + static_cast<std::size_t>(size);
-    if (!IsWanted(topics()[channel->second])) {
-      if (bytes->Consume(whole) < whole) {
-        Skip("message that breaks off");
-        return false;
-      }
-      return true;
-    }
-    const std::string_view view = bytes->Peek(whole);
-    if (view.size() < whole) {
-      Skip("message that breaks off");
-      bytes->Consume(whole);
-      return false;
-    }
-    message->data = view.substr(kRecordHeader + kMessageHeader);
-    pending_ = whole;
-    return true;
+    return TakeData(kRecordHeader + kMessageHeader,
+                    kRecordHeader + static_cast<std::size_t>(size),
+                    "message that breaks off", bytes, message);
   }
 
   void TakeChunk(std::uint64_t size) {
     ChunkHead head;
     const std::string_view start =
-        input_->Peek(kRecordHeader + kChunkHeader + 64);
+        input()->Peek(kRecordHeader + kChunkHeader + 64);
     if (!ParseChunkHead(start.substr(kRecordHeader), &head)) {
       Skip("chunk that is damaged or breaks off");
-      Recover(input_);
+      Recover(input());
       return;
     }
     if (!head.compression.empty() &&
         (!IsKnownCompression(head.compression) || head.compression == "bz2")) {
       Skip("chunk with the unknown compression '" +
            head.compression.substr(0, 20) + "': none, lz4 and zstd are known");
-      PassOver(size, input_);
+      PassOver(size, input());
       return;
     }
     // The record's size and that of its content have to agree.
     const bool agrees = head.begin + head.stored_size == size;
     if (head.stored_size > kLargestRecord) {
       Skip("chunk that says it has more than 256 MiB");
-      Recover(input_);
+      Recover(input());
       return;
     }
     const std::size_t begin = kRecordHeader + head.begin;
     const std::string_view view =
-        input_->Peek(begin + static_cast<std::size_t>(head.stored_size));
+        input()->Peek(begin + static_cast<std::size_t>(head.stored_size));
     const std::string_view stored = view.substr(std::min(begin, view.size()));
     const bool is_short = stored.size() < head.stored_size;
     UnpackedChunk unpacked;
@@ -316,10 +299,7 @@ class Mcap : public BagSource {
       unpacked = UnpackChunk(head.compression, stored, kLargestRecord);
     }
     if (!unpacked.is_whole) {
-      Skip(unpacked.damage.empty()
-               ? "chunk that breaks off: what was unpacked before is used"
-               : "chunk whose " + unpacked.damage +
-                     ": what was unpacked before is used");
+      SkipDamagedChunk(unpacked);
     } else if (head.checksum != 0 &&
                crc32(0, reinterpret_cast<const Bytef*>(unpacked.bytes.data()),
                      static_cast<uInt>(unpacked.bytes.size())) !=
@@ -328,22 +308,17 @@ class Mcap : public BagSource {
       unpacked.bytes.clear();
     }
     if (agrees) {
-      input_->Consume(kRecordHeader + size);
+      input()->Consume(kRecordHeader + size);
     } else {
       Skip("chunk that states another size than it has");
-      input_->Consume(begin + unpacked.consumed - 1);
-      Recover(input_);
+      input()->Consume(begin + unpacked.consumed - 1);
+      Recover(input());
     }
-    unpacked_ = std::move(unpacked.bytes);
-    chunk_ = MemoryBytes(unpacked_);
+    SetChunk(std::move(unpacked));
   }
 
-  InputStream* input_;
   std::map<std::uint64_t, std::string> schemas_;
   std::map<std::uint64_t, std::size_t> channels_;
-  std::string unpacked_;
-  MemoryBytes chunk_;
-  std::size_t pending_ = 0;
   bool at_end_ = false;
 };
 

@@ -1,5 +1,6 @@
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/bags/chunk_unpacker.h>
+#include <plumbline/frontend/bags/chunked_bag.h>
 #include <plumbline/frontend/bags/little_endian.h>
 #include <plumbline/frontend/bags/rosbag1.h>
 
@@ -121,9 +122,9 @@ Parsed ParseRecord(std::string_view bytes, Record* record) {
   return is_one ? Parsed::kRecord : Parsed::kDamaged;
 }
 
-class Rosbag1 : public BagSource {
+class Rosbag1 : public ChunkedBag {
  public:
-  explicit Rosbag1(InputStream* input) : BagSource("ROS 1 bag"), input_(input) {
+  explicit Rosbag1(InputStream* input) : ChunkedBag("ROS 1 bag", input) {
     const std::string_view start = input->Peek(kVersion.size());
     if (start != kVersion) {
       const std::size_t end = std::min(start.find('\n'), start.size());
@@ -139,15 +140,15 @@ class Rosbag1 : public BagSource {
 
   bool Next(BagMessage* message) override {
     while (true) {
-      if (!chunk_.empty()) {
-        if (Step(&chunk_, message)) return true;
+      if (!chunk()->empty()) {
+        if (Step(chunk(), message)) return true;
         continue;
       }
       if (at_end_) {
         Close();
         return false;
       }
-      if (Step(input_, message)) return true;
+      if (Step(input(), message)) return true;
     }
   }
 
@@ -156,14 +157,9 @@ class Rosbag1 : public BagSource {
   template <typename Bytes>
   bool Step(Bytes* bytes, BagMessage* message) {
     constexpr bool kInChunk = std::is_same_v<Bytes, MemoryBytes>;
-    // The data of the message before, which were in use until now.
-    if (pending_ > 0) {
-      bytes->Consume(pending_);
-      pending_ = 0;
-      if (bytes->Peek(1).empty()) {
-        if (!kInChunk) at_end_ = true;
-        return false;
-      }
+    if (PassOverLast(bytes) && bytes->Peek(1).empty()) {
+      if (!kInChunk) at_end_ = true;
+      return false;
     }
     Record record;
     Parsed parsed = ParseRecord(bytes->Peek(kUsualHeader), &record);
@@ -276,26 +272,8 @@ class Rosbag1 : public BagSource {
     message->topic = topic->second;
     message->time = static_cast<std::int64_t>(time & 0xffffffffu) * 1000000000 +
                     static_cast<std::int64_t>(time >> 32);
-    message->data = {};
-    const std::size_t size = record.header_size + record.data_size;
-    if (!IsWanted(topics()[topic->second])) {
-      if (bytes->Consume(size) < size) {
-        Skip("record that breaks off");
-        return false;
-      }
-      return true;
-    }
-    // `record` points into what Peek may move.
-    const std::size_t header_size = record.header_size;
-    const std::string_view view = bytes->Peek(size);
-    if (view.size() < size) {
-      Skip("record that breaks off");
-      bytes->Consume(size);
-      return false;
-    }
-    message->data = view.substr(header_size);
-    pending_ = size;
-    return true;
+    return TakeData(record.header_size, record.header_size + record.data_size,
+                    "record that breaks off", bytes, message);
   }
 
   template <typename Bytes>
@@ -356,7 +334,7 @@ class Rosbag1 : public BagSource {
 
   void TakeBagHeader(const Record& record) {
     if (!Text(record.fields, "encryptor").empty()) {
-      throw Error(input_->name(), 0,
+      throw Error(input()->name(), 0,
                   "is encrypted by " + Text(record.fields, "encryptor"),
                   "a bag that is not");
     }
@@ -375,18 +353,18 @@ class Rosbag1 : public BagSource {
     // The records of a plain chunk follow like all others; its size need not be
     // believed.
     if (compression == "none") {
-      input_->Consume(record.header_size);
+      input()->Consume(record.header_size);
       return;
     }
     if (!IsKnownCompression(compression) || compression == "zstd") {
       Skip("chunk with the unknown compression '" + compression.substr(0, 20) +
            "': none, bz2 and lz4 are known");
-      PassOver(record, input_);
+      PassOver(record, input());
       return;
     }
-    input_->Consume(record.header_size);
+    input()->Consume(record.header_size);
     std::size_t shown = std::min(stored_size, kLargestRecord);
-    std::string_view stored = input_->Peek(shown);
+    std::string_view stored = input()->Peek(shown);
     UnpackedChunk unpacked = UnpackChunk(compression, stored, kLargestRecord);
     if (!unpacked.is_whole && unpacked.damage.empty() &&
         stored.size() == shown) {
@@ -394,37 +372,33 @@ class Rosbag1 : public BagSource {
       shown = std::min<std::size_t>(
           kLargestRecord,
           shown + static_cast<std::size_t>(size) + kLargestHeader);
-      stored = input_->Peek(shown);
+      stored = input()->Peek(shown);
       unpacked = UnpackChunk(compression, stored, kLargestRecord);
     }
     if (unpacked.is_whole) {
-      input_->Consume(unpacked.consumed);
+      input()->Consume(unpacked.consumed);
       if (unpacked.consumed != stored_size) {
         Skip("chunk that states another size than it has");
-        FindRecord(input_);
+        FindRecord(input());
       }
     } else {
-      Skip(unpacked.damage.empty()
-               ? "chunk that breaks off: what was unpacked before is used"
-               : "chunk whose " + unpacked.damage +
-                     ": what was unpacked before is used");
+      SkipDamagedChunk(unpacked);
       Record next;
-      const std::string_view after = input_->Peek(stored_size + kUsualHeader);
+      const std::string_view after = input()->Peek(stored_size + kUsualHeader);
       if (after.size() > stored_size &&
           ParseRecord(after.substr(stored_size), &next) == Parsed::kRecord) {
-        input_->Consume(stored_size);
+        input()->Consume(stored_size);
       } else {
-        FindRecord(input_);
+        FindRecord(input());
       }
     }
-    unpacked_ = std::move(unpacked.bytes);
-    chunk_ = MemoryBytes(unpacked_);
+    SetChunk(std::move(unpacked));
   }
 
   // What the bag says it has and has not.
   void Close() {
-    if (!input_->damage().empty()) {
-      Skip(input_->damage() + ": what was unpacked before it is used");
+    if (!input()->damage().empty()) {
+      Skip(input()->damage() + ": what was unpacked before it is used");
     } else if (chunks_stated_ > chunks_found_) {
       Skip("chunk that the bag says it has and that is not there",
            chunks_stated_ - chunks_found_);
@@ -435,13 +409,7 @@ class Rosbag1 : public BagSource {
   // Headers are seldom longer.
   static constexpr std::size_t kUsualHeader = 512;
 
-  InputStream* input_;
   std::map<std::uint64_t, std::size_t> connections_;
-  // The chunk at hand, what of it is left, and how much of that, or of the
-  // input, the last message takes.
-  std::string unpacked_;
-  MemoryBytes chunk_;
-  std::size_t pending_ = 0;
   std::int64_t chunks_stated_ = 0;
   std::int64_t chunks_found_ = 0;
   bool at_end_ = false;

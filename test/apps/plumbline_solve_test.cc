@@ -164,7 +164,8 @@ class SolveTest : public ::testing::Test {
     office_ = std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/office.clf.gz";
     folder_ = fs::path(::testing::TempDir()) /
               (std::string("solve_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+               ::testing::UnitTest::GetInstance()->current_test_info()->name() +
+               "_" + std::to_string(getpid()));
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }

@@ -34,7 +34,8 @@ class SweepBinaryTest : public ::testing::Test {
     binary_ = std::string(PLUMBLINE_BIN_DIR) + "/plumbline_sweep";
     if (!std::ifstream(binary_)) GTEST_SKIP() << binary_ << " is not built";
     folder_ = ::testing::TempDir() + "sweep_binary_" +
-              ::testing::UnitTest::GetInstance()->current_test_info()->name();
+              ::testing::UnitTest::GetInstance()->current_test_info()->name() +
+              "_" + std::to_string(getpid());
     fs::remove_all(folder_);
     fs::create_directories(folder_);
     // Its figure is x^2 + seed / 10; it notes every run.

@@ -99,6 +99,17 @@ class JointAdjustmentTest : public ::testing::Test {
     unseen_link_ = result.constraints[3];
   }
 
+  // These walls, each free to move.
+  Transaction FreeWalls(const std::vector<FeatureId>& ids) const {
+    Transaction walls;
+    for (const FeatureId id : ids) {
+      Feature wall = graph_.GetFeature(id);
+      wall.fixed = false;
+      walls.AddFeature(wall);
+    }
+    return walls;
+  }
+
   double WorstKey(const std::vector<Pose2>& keys) const {
     double worst = 0.0;
     for (std::size_t i = 0; i < keys.size(); ++i) {
@@ -195,13 +206,7 @@ TEST_F(JointAdjustmentTest, PosesFirstThenWalls) {
   adjustment.MatchAnew();
   adjustment.Adjust();
   EXPECT_LT(WorstKey(adjustment.KeyPoses()), 0.02);
-  Transaction walls;
-  for (const FeatureId id : {walls_[0], walls_[1], walls_[2], unseen_}) {
-    Feature wall = std::as_const(graph_).GetFeature(id);
-    wall.fixed = false;
-    walls.AddFeature(wall);
-  }
-  adjustment.AddWalls(std::move(walls));
+  adjustment.AddWalls(FreeWalls({walls_[0], walls_[1], walls_[2], unseen_}));
   EXPECT_EQ(graph.num_features(), 43u);
   adjustment.Adjust();
   EXPECT_GT(adjustment.num_votes(), 60);
@@ -218,13 +223,7 @@ TEST_F(JointAdjustmentTest, AWallThatLosesItsReturnsGoes) {
   JointAdjustment adjustment(&graph, &session, registry_, scans_, refined_,
                              records_, keys_, kNoId, options_);
   adjustment.Adjust();
-  Transaction walls;
-  for (const FeatureId id : walls_) {
-    Feature wall = std::as_const(graph_).GetFeature(id);
-    wall.fixed = false;
-    walls.AddFeature(wall);
-  }
-  adjustment.AddWalls(std::move(walls));
+  adjustment.AddWalls(FreeWalls(walls_));
   std::vector<FeatureId> found;
   for (const Feature* feature : std::as_const(graph).Features()) {
     if (feature->type->Is(FeatureRole::kWall)) found.push_back(feature->id);
@@ -293,13 +292,7 @@ TEST_F(JointAdjustmentTest, VariancesOfVotesComeFromResiduals) {
     JointAdjustment adjustment(&graph, &session, registry_, scans_, refined_,
                                records_, keys_, kNoId, options);
     adjustment.Adjust();
-    Transaction walls;
-    for (const FeatureId id : walls_) {
-      Feature wall = std::as_const(graph_).GetFeature(id);
-      wall.fixed = false;
-      walls.AddFeature(wall);
-    }
-    adjustment.AddWalls(std::move(walls));
+    adjustment.AddWalls(FreeWalls(walls_));
     adjustment.Adjust();
     const auto information = [&graph] {
       for (const Constraint* constraint : std::as_const(graph).Constraints()) {

@@ -21,7 +21,7 @@ constexpr char kMagic[] = "plumbline checkpoint 1";
 // Time is spent on writing at most in this relation.
 constexpr double kLargestShare = 0.02;
 
-std::string Digest(const std::string& bytes) {
+std::string Digest(std::string_view bytes) {
   Sha256 sha;
   sha.Update(bytes);
   return sha.HexDigest();
@@ -32,9 +32,9 @@ bool IsThere(const fs::path& path) {
   return fs::exists(fs::symlink_status(path, error));
 }
 
-// The file's lines: magic, digest of all that follows, identity, and then the
-// state.
-std::string ReadWhole(const fs::path& path) {
+// Opens the file and reads the first of its lines: magic, digest of all that
+// follows, identity, and then the state.
+std::ifstream Open(const fs::path& path) {
   std::error_code error;
   if (!fs::is_regular_file(fs::symlink_status(path, error))) {
     throw Error(path.string(), 0, "is no checkpoint of plumbline",
@@ -49,9 +49,21 @@ std::string ReadWhole(const fs::path& path) {
     throw Error(path.string(), 0, "is no checkpoint of plumbline",
                 "another --output_dir, or the file in another place");
   }
+  return file;
+}
+
+// What follows the first line.
+std::string ReadRest(const fs::path& path) {
   std::ostringstream rest;
-  rest << file.rdbuf();
-  return magic + rest.str();
+  rest << Open(path).rdbuf();
+  return rest.str();
+}
+
+// Whether the digest is that of what follows it.
+bool IsWhole(const std::string& rest) {
+  const std::size_t end = rest.find('\n');
+  return end != std::string::npos &&
+         Digest(std::string_view(rest).substr(end + 1)) == rest.substr(0, end);
 }
 
 Error Damaged(const fs::path& path) {
@@ -80,18 +92,13 @@ const CheckpointFile::Identity& CheckpointFile::MyIdentity() {
 
 std::optional<std::string> CheckpointFile::Read() {
   if (!IsThere(path_)) return std::nullopt;
-  std::string content = ReadWhole(path_);
+  const std::string content = ReadRest(path_);
   std::istringstream lines(content);
-  std::string magic, digest, identity_text;
-  std::getline(lines, magic);
+  std::string digest, identity_text;
   std::getline(lines, digest);
-  const std::streamoff covered = lines.tellg();
   std::getline(lines, identity_text);
   const std::streamoff begin = lines.tellg();
-  if (covered < 0 || begin < 0 ||
-      Digest(content.substr(static_cast<std::size_t>(covered))) != digest) {
-    throw Damaged(path_);
-  }
+  if (begin < 0 || !IsWhole(content)) throw Damaged(path_);
   const Json json = Json::parse(identity_text, nullptr, false);
   if (!json.is_object()) throw Damaged(path_);
   Identity there;
@@ -115,7 +122,7 @@ std::optional<std::string> CheckpointFile::Read() {
                 "the same command as then, another --output_dir, or the file "
                 "removed, to start from the beginning");
   }
-  digest_ = Digest(content);
+  digest_ = digest;
   return content.substr(static_cast<std::size_t>(begin));
 }
 
@@ -124,24 +131,33 @@ void CheckpointFile::Offer(const std::function<std::string()>& state) {
   if (seconds < std::max(every_, last_cost_ / kLargestShare)) return;
   const Stopwatch watch;
   // Whatever came there in the meantime, it is no matter for this program.
-  if (IsThere(path_)) ReadWhole(path_);
+  if (IsThere(path_)) Open(path_);
   Json identity = Json::object();
   for (const auto& [name, value] : MyIdentity()) identity[name] = value;
   const std::string body =
       identity.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n" +
       state();
-  const std::string content =
-      std::string(kMagic) + "\n" + Digest(body) + "\n" + body;
+  const std::string digest = Digest(body);
   WriteFileAtomically(path_.string(), [&](std::ostream& output) {
-    output.write(content.data(), static_cast<std::streamsize>(content.size()));
+    output << kMagic << '\n' << digest << '\n';
+    output.write(body.data(), static_cast<std::streamsize>(body.size()));
   });
-  digest_ = Digest(content);
+  digest_ = digest;
   last_cost_ = watch.Seconds();
   since_last_ = Stopwatch();
 }
 
 void CheckpointFile::Remove() {
-  if (digest_.empty() || Sha256OfFile(path_.string()) != digest_) return;
+  if (digest_.empty()) return;
+  try {
+    const std::string content = ReadRest(path_);
+    if (content.compare(0, digest_.size(), digest_) != 0 || !IsWhole(content)) {
+      return;
+    }
+  } catch (const Error&) {
+    // Gone, or no longer this file.
+    return;
+  }
   std::error_code ignored;
   fs::remove(path_, ignored);
 }

@@ -52,7 +52,7 @@ class CheckpointFile {
   double every_;
   double last_cost_ = 0.0;
   Stopwatch since_last_;
-  // Digest of the whole file; empty before.
+  // Digest of what was read or written last; empty before.
   std::string digest_;
 };
 

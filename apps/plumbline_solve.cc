@@ -604,6 +604,7 @@ void SummarizeLog(const std::vector<Scan>& scans, const LogSolverResult& result,
       result.frontend_seconds + result.relocalization_seconds;
   summary->scan_seconds.assign(result.scan_seconds.begin(),
                                result.scan_seconds.end());
+  summary->range_noise = result.range_sigma;
   EmReport em = result.em;
   em.detect_seconds = result.detect_seconds;
   em.solve_seconds = result.solve_seconds;

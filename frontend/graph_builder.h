@@ -42,6 +42,8 @@ struct KeyScan {
   Eigen::Vector2d laser = Eigen::Vector2d::Zero();
   /// Angle between beams, rad.
   double angle_step = 0.0;
+  /// Times that the laser is noisier than usual (RangeNoiseScale).
+  double noise_scale = 1.0;
 };
 
 /// One observation that was recognized as a segment of the map.

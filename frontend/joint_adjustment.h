@@ -48,6 +48,13 @@ struct JointAdjustmentOptions {
   std::size_t num_held_records = 0;
   /// The result does not depend on it.
   int num_threads = 1;
+
+  /// For a laser that is so many times noisier (RangeNoiseScale).
+  void ScaleToNoise(double scale) {
+    points.ScaleToNoise(scale);
+    relations.matcher.ScaleToNoise(scale);
+    votes.ScaleToNoise(scale);
+  }
 };
 
 /// The poses of all key scans (map frame, one per record) where these places

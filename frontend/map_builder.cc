@@ -256,10 +256,12 @@ MapBuilder::MapBuilder(Graph* graph, const Registry& registry,
 
 void MapBuilder::AddScan(const KeyScan& scan) {
   Place(scan);
-  AddKeyScan(scan.index, scan.motion,
-             ExtractSegments(scan.returns, scan.laser, scan.angle_step,
-                             options_.extraction),
-             scan.start);
+  SegmentExtractionOptions extraction = options_.extraction;
+  extraction.ScaleToNoise(scan.noise_scale);
+  AddKeyScan(
+      scan.index, scan.motion,
+      ExtractSegments(scan.returns, scan.laser, scan.angle_step, extraction),
+      scan.start);
 }
 
 void MapBuilder::AddKeyScan(int scan, const UncertainPose2& motion,

@@ -35,6 +35,12 @@ struct MapCheckOptions {
   /// said.
   int min_scans = 3;
   int num_threads = 0;
+
+  /// For a laser that is so many times noisier (RangeNoiseScale).
+  void ScaleToNoise(double scale) {
+    points.ScaleToNoise(scale);
+    matcher.ScaleToNoise(scale);
+  }
 };
 
 /// Scans that contradict what was seen on other visits.

@@ -43,6 +43,8 @@ constexpr double kLeastScore = 0.25;
 constexpr double kPeakShare = 0.6;
 // The usual time between scans follows with this share.
 constexpr double kUsualShare = 0.05;
+// Share by which the noise of the laser has to change before it is followed.
+constexpr double kNoiseStep = 0.05;
 // Counted returns from which on a share of them says something.
 constexpr int kLeastIntruders = 5;
 constexpr int kLeastSeenThrough = 20;
@@ -131,7 +133,9 @@ struct OdometryRefiner::Outcome {
 };
 
 OdometryRefiner::OdometryRefiner(const OdometryRefinementOptions& options)
-    : options_(options), track_(options.matcher) {}
+    : usual_options_(options), options_(options), track_(options.matcher) {
+  SetNoiseScale(RangeNoiseScale(options.range_sigma));
+}
 
 void OdometryRefiner::RebuildReference(Track* track) {
   std::vector<ScanPoint> reference;
@@ -357,6 +361,27 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   return outcome;
 }
 
+double OdometryRefiner::range_sigma() const {
+  return usual_options_.range_sigma > 0.0 ? usual_options_.range_sigma
+                                          : noise_.sigma();
+}
+
+void OdometryRefiner::AllowForNoise(const Scan& scan) {
+  noise_.Add(scan);
+  const double scale = RangeNoiseScale(range_sigma());
+  if (std::abs(scale / noise_scale_ - 1.0) > kNoiseStep) SetNoiseScale(scale);
+}
+
+void OdometryRefiner::SetNoiseScale(double scale) {
+  noise_scale_ = scale;
+  options_ = usual_options_;
+  options_.ScaleToNoise(scale);
+  track_.matcher.set_point_sigma(options_.matcher.point_sigma);
+  if (open_ != nullptr) {
+    open_->before.matcher.set_point_sigma(options_.matcher.point_sigma);
+  }
+}
+
 void OdometryRefiner::NoteGap(double seconds) {
   if (seconds > options_.tracking.gap_seconds &&
       seconds > options_.tracking.gap_factor * usual_step_) {
@@ -478,6 +503,7 @@ void OdometryRefiner::ContinueTrack(const Scan& scan, SettledScan* next) {
 }
 
 RefinedScan OdometryRefiner::Process(const Scan& scan) {
+  AllowForNoise(scan);
   ExtractScanPoints(scan, options_.points, &points_);
   SettledScan done;
   done.index = count_++;
@@ -1056,7 +1082,8 @@ template <typename StateArchive>
 void OdometryRefiner::ExchangeState(StateArchive& archive) {
   ExchangeAll(archive, track_, points_, started_, count_, last_odometry_,
               last_time_, usual_step_, archive_, part_, num_parts_, loose_of_,
-              wide_searches_, refusals_, losses_, loose_, guessed_);
+              wide_searches_, refusals_, losses_, loose_, guessed_, noise_,
+              noise_scale_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {
@@ -1068,6 +1095,7 @@ void OdometryRefiner::WriteState(StateWriter* state) {
 
 void OdometryRefiner::ReadState(StateReader* state) {
   ExchangeState(*state);
+  SetNoiseScale(noise_scale_);
   if (started_) RebuildReference(&track_);
 }
 

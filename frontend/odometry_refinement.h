@@ -3,6 +3,7 @@
 
 #include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/scan_points.h>
@@ -154,6 +155,15 @@ struct OdometryRefinementOptions {
   /// A turn between scans from which on the wide search is always made, rad.
   double search_turn = DegToRad(4.0);
   TrackingOptions tracking;
+  /// Noise of the laser's ranges (standard deviation, m); 0: as the scans so
+  /// far show it.
+  double range_sigma = 0.0;
+
+  /// For a laser that is so many times noisier (RangeNoiseScale).
+  void ScaleToNoise(double scale) {
+    points.ScaleToNoise(scale);
+    matcher.ScaleToNoise(scale);
+  }
 };
 
 /// How a track of scans hangs on what was before it.
@@ -268,6 +278,12 @@ class OdometryRefiner {
   /// guess ends where the next such part begins.
   const std::vector<LooseTrack>& loose() const { return loose_; }
 
+  /// Noise of the laser's ranges (standard deviation, m): what the options say,
+  /// or what the scans so far show, 0 while they are too few.
+  double range_sigma() const;
+  /// Times that the laser is noisier than usual, as it is allowed for now.
+  double noise_scale() const { return noise_scale_; }
+
   /// Calls `trace` with a line on each decision that was not plain.
   void SetTrace(std::function<void(const std::string&)> trace) {
     trace_ = std::move(trace);
@@ -336,6 +352,9 @@ class OdometryRefiner {
   // What matching says of a scan.
   struct Outcome;
 
+  // Allows for the noise that the scans show, this one among them.
+  void AllowForNoise(const Scan& scan);
+  void SetNoiseScale(double scale);
   template <typename Archive>
   void ExchangeState(Archive& archive);
   void RebuildReference(Track* track);
@@ -449,7 +468,11 @@ class OdometryRefiner {
   void Settle(const Pose2& shift, const RefinedScan& first);
   void Archive(const KeyScan& key);
 
+  const OdometryRefinementOptions usual_options_;
+  // For the laser's noise.
   OdometryRefinementOptions options_;
+  RangeNoise noise_;
+  double noise_scale_ = 1.0;
   std::function<void(const std::string&)> trace_;
   Track track_;
   std::vector<ScanPoint> points_;

@@ -93,10 +93,12 @@ PointMapBuilder::PointMapBuilder(Graph* graph, const Registry& registry,
 
 void PointMapBuilder::AddScan(const KeyScan& scan) {
   Place(scan);
-  AddKeyScan(scan.index, scan.motion,
-             ExtractSegments(scan.returns, scan.laser, scan.angle_step,
-                             options_.extraction),
-             scan.laser, scan.start);
+  SegmentExtractionOptions extraction = options_.extraction;
+  extraction.ScaleToNoise(scan.noise_scale);
+  AddKeyScan(
+      scan.index, scan.motion,
+      ExtractSegments(scan.returns, scan.laser, scan.angle_step, extraction),
+      scan.laser, scan.start);
 }
 
 std::vector<PointCandidate> PointMapBuilder::Candidates() const {

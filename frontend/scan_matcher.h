@@ -32,6 +32,9 @@ struct ScanMatcherOptions {
   double grid_resolution = 0.1;
   double search_step = 0.15;
   double rotation_step = DegToRad(1.0);
+
+  /// For a laser that is so many times noisier (RangeNoiseScale).
+  void ScaleToNoise(double scale) { point_sigma *= scale; }
 };
 
 /// Prior of the matcher: the motion model's pose and its information.
@@ -104,6 +107,9 @@ class ScanMatcher {
   void SetReference(std::vector<ScanPoint> points,
                     std::vector<Viewpoint> viewpoints);
   bool empty() const { return reference_.empty(); }
+
+  /// ScanMatcherOptions::point_sigma from now on.
+  void set_point_sigma(double sigma) { options_.point_sigma = sigma; }
 
   /// Point to line refinement of a pose near the truth.
   MatchResult Refine(const std::vector<ScanPoint>& scan, const Pose2& guess,

@@ -25,6 +25,9 @@ struct ScanPointsOptions {
   /// Standard deviation of a fitted surface's points, m, above which the
   /// point has no normal.
   double normal_tolerance = 0.04;
+
+  /// For a laser that is so many times noisier (RangeNoiseScale).
+  void ScaleToNoise(double scale) { normal_tolerance *= scale; }
 };
 
 /// One return of a scan.

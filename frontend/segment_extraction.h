@@ -40,6 +40,13 @@ struct SegmentExtractionOptions {
   double bias_sigma = 0.008;
   /// rad.
   double angle_bias_sigma = DegToRad(0.4);
+
+  /// For a laser that is so many times noisier (RangeNoiseScale).
+  void ScaleToNoise(double scale) {
+    split_distance *= scale;
+    max_end_sigma *= scale;
+    point_sigma *= scale;
+  }
 };
 
 /// A straight piece of wall as one scan sees it, in the robot's frame. Its

@@ -1,5 +1,6 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/wall.h>
+#include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/wall_completion.h>
 
 #include <Eigen/LU>
@@ -30,6 +31,8 @@ constexpr std::size_t kScansAtOnce = 256;
 constexpr std::size_t kSeedsAtOnce = 64;
 constexpr std::size_t kMostSeedsAtOnce = 1024;
 constexpr std::size_t kWordBits = 64;
+// Standard deviations of a range at which a return is no longer one of a wall.
+constexpr double kExplainedSigmas = 5.0;
 
 std::int64_t CellKey(std::int64_t column, std::int64_t row) {
   // Unsigned, since a negative column cannot be shifted.
@@ -961,6 +964,15 @@ class Completion {
 };
 
 }  // namespace
+
+void WallCompletionOptions::ScaleToNoise(double scale) {
+  points.ScaleToNoise(scale);
+  // Farther off a wall than this no noise of the laser takes its returns.
+  explained_offset =
+      std::max(explained_offset, kExplainedSigmas * scale * kUsualRangeNoise);
+  max_scatter *= scale;
+  max_end_sigma *= scale;
+}
 
 Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
                               const std::vector<Scan>& scans,

@@ -59,6 +59,9 @@ struct WallCompletionOptions {
   /// Threads that look at scans and grow walls; what is found does not depend
   /// on their number.
   int num_threads = 1;
+
+  /// For a laser that is so many times noisier (RangeNoiseScale).
+  void ScaleToNoise(double scale);
 };
 
 /// Finds walls that no single scan saw well enough: glimpsed through doors, a

@@ -33,6 +33,12 @@ struct WallVoteOptions {
   int min_points = 3;
   /// The result does not depend on it.
   int num_threads = 1;
+
+  /// For a laser that is so many times noisier (RangeNoiseScale).
+  void ScaleToNoise(double scale) {
+    max_offset *= scale;
+    point_sigma *= scale;
+  }
 };
 
 /// Vote of the returns of one place on one wall: the information of a

@@ -157,6 +157,7 @@ Json FrontendToJson(const Summary& summary) {
   json["scan_seconds_last_tenth"] = OptionalToJson(late);
   json["scan_seconds_growth"] =
       early && late && *early > 0.0 ? Json(*late / *early) : Json(nullptr);
+  json["range_noise_m"] = summary.range_noise;
   return json;
 }
 

@@ -173,6 +173,8 @@ struct Summary {
   /// scan took, s, in the order of scans; may be empty.
   std::vector<SkipReport> skipped;
   std::vector<double> scan_seconds;
+  /// Of a log: noise of the laser's ranges (standard deviation, m).
+  double range_noise = 0.0;
   /// Of a log only: its format, what gave the scans and the odometry, and what
   /// was taken for granted, for people. Empty: not written.
   std::string log_format;
@@ -199,12 +201,12 @@ std::string CountsAsJson(const Summary& summary);
 /// evaluation_s, linear_solver_s, setup_s, start {poses, landmarks, kept,
 /// seconds}}; for a log also frontend {skipped [{reason, count, first_lines}],
 /// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
-/// (their quotient), format, scans, odometry (names; of logs that tell), notes
-/// [text]}, tracking {pieces, loose [{begin, end, why}]}, where the outputs
-/// were moved alignment {kind, x, y, theta_deg} (m and degrees), and where
-/// there were several logs [{input, trajectory, scans, map, parts, agreeing,
-/// contradicting, why_apart (or null)}]. Numbers that are not finite become
-/// null.
+/// (their quotient), range_noise_m (of the laser, as the scans show it),
+/// format, scans, odometry (names; of logs that tell), notes [text]}, tracking
+/// {pieces, loose [{begin, end, why}]}, where the outputs were moved alignment
+/// {kind, x, y, theta_deg} (m and degrees), and where there were several logs
+/// [{input, trajectory, scans, map, parts, agreeing, contradicting, why_apart
+/// (or null)}]. Numbers that are not finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// Writes it to a file, whole or not at all. Throws Error when it cannot be

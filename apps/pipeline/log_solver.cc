@@ -66,7 +66,7 @@ PoseRecoveryOptions RecoveryOptions(const LogSolverOptions& options) {
 }
 
 KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
-                    const std::vector<ScanPoint>& returns) {
+                    const std::vector<ScanPoint>& returns, double noise_scale) {
   KeyScan key;
   key.index = index;
   key.motion = refined.since_key;
@@ -78,6 +78,7 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
   key.returns = returns;
   key.laser = scan.laser_offset.head<2>();
   key.angle_step = scan.angle_step;
+  key.noise_scale = noise_scale;
   return key;
 }
 
@@ -214,7 +215,7 @@ void LogSolver::TakeKeyScan(const std::vector<Scan>& scans,
   if (!settled.refined.is_key) return;
   const auto index = static_cast<std::size_t>(settled.index);
   builder_->AddScan(MakeKeyScan(settled.index, scans[index], settled.refined,
-                                settled.points));
+                                settled.points, refiner_.noise_scale()));
   if (options_.em_every > 0 && scans_since_em_ >= options_.em_every) {
     scans_since_em_ = 0;
     const ScopedTimer timer(em_seconds);
@@ -237,13 +238,15 @@ void LogSolver::TakeAnew(const std::vector<Scan>& scans, double* em_seconds) {
   Renew(StructureDetectors());
   scans_since_em_ = 0;
   features_at_last_global_ = 0;
+  ScanPointsOptions points = options_.odometry.points;
+  points.ScaleToNoise(refiner_.noise_scale());
   SettledScan settled;
   for (std::size_t i = 0; i < refined_.size(); ++i) {
     ++scans_since_em_;
     settled.index = static_cast<int>(i);
     settled.refined = refined_[i];
     if (settled.refined.is_key) {
-      ExtractScanPoints(scans[i], options_.odometry.points, &settled.points);
+      ExtractScanPoints(scans[i], points, &settled.points);
     }
     TakeKeyScan(scans, settled, em_seconds);
   }
@@ -429,6 +432,7 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
   }
   is_finished_ = true;
   builder_.reset();
+  ScaleToNoise(context.result.noise_scale);
   if (context.result.refined.size() != log.scans.size()) {
     throw PLUMBLINE_ERROR("the state is of a log with " +
                               std::to_string(context.result.refined.size()) +
@@ -444,6 +448,12 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
   }
   if (control.progress) control.progress(log.scans.size(), log.scans.size());
   return FinishFrom(stage, Stage::kEnd, &context);
+}
+
+void LogSolver::ScaleToNoise(double scale) {
+  options_.completion.ScaleToNoise(scale);
+  options_.adjustment.ScaleToNoise(scale);
+  options_.check.ScaleToNoise(scale);
 }
 
 LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
@@ -469,6 +479,9 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
   result.wide_searches = refiner_.wide_searches();
   result.refused_matches = refiner_.refusals();
   result.lost_tracks = refiner_.losses();
+  result.range_sigma = refiner_.range_sigma();
+  result.noise_scale = refiner_.noise_scale();
+  ScaleToNoise(result.noise_scale);
   result.loose = refiner_.loose();
   result.feature_matches = builder_->num_matches();
   result.features_created = builder_->num_created();

@@ -137,6 +137,10 @@ struct LogSolverResult {
   std::vector<KeyScanRecord> records;
   /// How what is broken in the map was broken.
   BreakRecords breaks;
+  /// Noise of the laser's ranges (standard deviation, m), and the factor by
+  /// which the options' distances were larger for it.
+  double range_sigma = 0.0;
+  double noise_scale = 1.0;
 };
 
 /// Whether poses are recovered once all scans are in (pose_recovery.h): the map
@@ -147,9 +151,10 @@ bool RecoversPoses(const LogSolverOptions& options);
 PoseRecoveryOptions RecoveryOptions(const LogSolverOptions& options);
 
 /// A scan as a GraphBuilder takes it: `refined` and `returns` are what odometry
-/// refinement made of the scan with this index.
+/// refinement made of the scan with this index, `noise_scale` is what it
+/// allowed for (OdometryRefiner::noise_scale).
 KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
-                    const std::vector<ScanPoint>& returns);
+                    const std::vector<ScanPoint>& returns, double noise_scale);
 
 /// Turns the scans of a log into a map: front-end and EM steps near the robot
 /// scan by scan, then, once all are in, EM on the whole map, closing of loops,
@@ -264,6 +269,8 @@ class LogSolver {
   void TakeAnew(const std::vector<Scan>& scans, double* em_seconds);
   void RunEmNearRobot();
 
+  // Allows for the laser's noise in what follows once all scans are in.
+  void ScaleToNoise(double scale);
   // The stages once all scans are in, in order.
   LogSolverResult FinishWith(const std::vector<Scan>& scans, Stage end,
                              const RunControl& control);

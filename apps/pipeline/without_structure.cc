@@ -71,14 +71,17 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
   }
   const std::unique_ptr<GraphBuilder> builder =
       ProfileOf(options.features).make_builder(front_end, &graph, registry);
+  ScanPointsOptions points_options = options.odometry.points;
+  points_options.ScaleToNoise(result.noise_scale);
   std::vector<ScanPoint> points;
   for (const KeyScanRecord& record : result.records) {
     if (is_stopped()) return map;
     const Scan& scan = scans[static_cast<std::size_t>(record.scan)];
     const RefinedScan& refined =
         result.refined[static_cast<std::size_t>(record.scan)];
-    ExtractScanPoints(scan, options.odometry.points, &points);
-    builder->AddScan(MakeKeyScan(record.scan, scan, refined, points));
+    ExtractScanPoints(scan, points_options, &points);
+    builder->AddScan(
+        MakeKeyScan(record.scan, scan, refined, points, result.noise_scale));
   }
   builder->WriteRobot();
   std::vector<FeatureId> places;

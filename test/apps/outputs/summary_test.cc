@@ -165,6 +165,7 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
                    {"seed", "18446744073709551615", "1", "uint64"},
                    {"hierarchy", "7", "", "string"}};
   summary.scans = 20;
+  summary.range_noise = 0.012;
   summary.features["segment"][0] = 4;
   summary.constraints["pose_pose"].measurement = 5;
   summary.initial_cost = 9.0;
@@ -217,7 +218,8 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   EXPECT_EQ(json["frontend"].dump(),
             R"({"skipped":[{"reason":"too short","count":2,)"
             R"("first_lines":[7,9]}],"scan_seconds_second_tenth":2.5,)"
-            R"("scan_seconds_last_tenth":18.5,"scan_seconds_growth":7.4})");
+            R"("scan_seconds_last_tenth":18.5,"scan_seconds_growth":7.4,)"
+            R"("range_noise_m":0.012})");
 }
 
 TEST(SummaryTest, APartOfARunSaysSo) {

@@ -39,7 +39,9 @@ class BreakLog final : public GraphListener {
   /// What is broken from now on is broken in this iteration.
   void SetIteration(int iteration) { iteration_ = iteration; }
 
+  /// Of all constraints that were broken, by id.
   const BreakRecords& records() const { return records_; }
+  /// The same, to be restored from a state.
   BreakRecords& records() { return records_; }
 
   void OnFeatureAdded(const Feature& /*feature*/) override {}

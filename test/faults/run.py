@@ -17,7 +17,7 @@ anything is found:
 - a run that was killed and gone on with, and ends with other bytes than one
   that never was;
 - more than 2 s from an interrupt to the end, as processor time of the process;
-- N copies of a log, one after the other, that take more than 1.25 N times the
+- 20 copies of a log, one after the other, that take more than 25 times the
   processor time or memory of one;
 - an exit status other than 0, 1, 2 and 130, or an error without a message that
   says what was expected.
@@ -598,7 +598,7 @@ def copies_of_a_log(solve, numbers):
                   (copies, "with jumps" if has_jump else "without jumps",
                    seconds, seconds / one[0], memory, memory / one[1],
                    relations), flush=True)
-            if copies > 1 and max(seconds / one[0],
+            if copies >= 20 and max(seconds / one[0],
                                   memory / one[1]) > 1.25 * copies:
                 finding("%d copies cost too much" % copies)
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -102,6 +103,73 @@ TEST(BuildingTrialTest, ARingOfCorridors) {
   EXPECT_EQ(trial.closures.wrong, 0);
   EXPECT_EQ(trial.closures.closed_revisits, trial.closures.revisits);
   EXPECT_FALSE(trial.drawing.walls.empty());
+}
+
+// Small worlds from the log to the plan: what is there, and no invented room.
+PlanEvaluation PlanOfWorld(const std::string& text) {
+  Registry registry;
+  RegisterBuiltins(&registry);
+  std::istringstream input(text);
+  return RunBuildingTrial(ReadWorld(input, "small.world"), SimulatorOptions(),
+                          1, registry, {})
+      .plan;
+}
+
+TEST(BuildingTrialTest, PlanOfOneRoom) {
+  const PlanEvaluation plan = PlanOfWorld(
+      "wall -0.1 0 8.1 0 0.2\n"
+      "wall -0.1 5 8.1 5 0.2\n"
+      "wall 0 0 0 5 0.2\n"
+      "wall 8 0 8 5 0.2\n"
+      "box 6.5 0.6 1.6 0.8 0\n"
+      "path 1.5 2 5 1.5 6.5 3.5 2 4\n");
+  EXPECT_EQ(plan.rooms.asked, 1);
+  EXPECT_EQ(plan.rooms.drawn, 1);
+  EXPECT_GT(plan.rooms.mean_iou, 0.9);
+  EXPECT_EQ(plan.doors_drawn, 0);
+  EXPECT_EQ(plan.double_walls, 0);
+}
+
+TEST(BuildingTrialTest, PlanOfOneCorridor) {
+  const PlanEvaluation plan = PlanOfWorld(
+      "wall -0.1 0 24.1 0 0.2\n"
+      "wall -0.1 2.2 24.1 2.2 0.2\n"
+      "wall 0 0 0 2.2 0.2\n"
+      "wall 24 0 24 2.2 0.2\n"
+      "path 1.2 1.1 22.8 1.1\n");
+  EXPECT_EQ(plan.rooms.asked, 1);
+  EXPECT_EQ(plan.rooms.drawn, 1);
+  EXPECT_GT(plan.rooms.mean_iou, 0.9);
+  EXPECT_EQ(plan.doors_drawn, 0);
+}
+
+// Columns, and walls farther than the laser sees.
+TEST(BuildingTrialTest, PlanOfAHallWithoutWalls) {
+  std::string text = "path 0 0 20 0 20 8 0 8\n";
+  for (double x = -6.0; x <= 26.0; x += 4.0) {
+    for (double y = -6.0; y <= 14.0; y += 4.0) {
+      text += "circle " + std::to_string(x) + " " + std::to_string(y + 0.5) +
+              " 0.25\n";
+    }
+  }
+  const PlanEvaluation plan = PlanOfWorld(text);
+  EXPECT_EQ(plan.rooms.drawn, 0);
+  EXPECT_EQ(plan.doors_drawn, 0);
+}
+
+// A front of a building, cars and trees.
+TEST(BuildingTrialTest, PlanOfAYard) {
+  const PlanEvaluation plan = PlanOfWorld(
+      "wall -5 -4 30 -4 0.3\n"
+      "box 2 4 4.2 1.8 0\n"
+      "box 9 4.5 4.4 1.8 8\n"
+      "box 16 6 4.2 1.8 80\n"
+      "circle 5 8 0.2\n"
+      "circle 12 9 0.3\n"
+      "circle 24.5 3 0.2\n"
+      "path 0 0 12 1 20 0 22 6\n");
+  EXPECT_EQ(plan.rooms.drawn, 0);
+  EXPECT_EQ(plan.doors_drawn, 0);
 }
 
 TEST(BuildingTrialTest, Stopped) {

@@ -22,6 +22,7 @@ class ChunkedBag : public BagSource {
   ChunkedBag(std::string format, InputStream* input)
       : BagSource(std::move(format)), input_(input) {}
 
+  /// The file.
   InputStream* input() const { return input_; }
   /// The chunk at hand, what of it is left; empty when there is none.
   MemoryBytes* chunk() { return &chunk_; }
@@ -40,10 +41,10 @@ class ChunkedBag : public BagSource {
                    ": what was unpacked before is used");
   }
 
-  /// Passes over a message's record of `size` bytes that its data, from
-  /// `header_size` on, end; sets the message's data when its topic is wanted.
-  /// They stay until PassOverLast. False, and counted as `broken`, when bytes
-  /// are missing.
+  /// Takes a message's record of `size` bytes, of which those from
+  /// `header_size` on are its data: they are set when its topic is wanted, and
+  /// stay until PassOverLast. False, and counted as `broken`, when bytes are
+  /// missing.
   template <typename Bytes>
   bool TakeData(std::size_t header_size, std::size_t size, const char* broken,
                 Bytes* bytes, BagMessage* message) {

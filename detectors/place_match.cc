@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -132,10 +133,17 @@ class Matcher {
     result.outcome = candidates_.empty() ? PlaceMatch::Outcome::kNothingFits
                                          : PlaceMatch::Outcome::kNoNews;
     if (!has_news_) return result;
+    if (covariance_(2, 2) > options_.max_turn * options_.max_turn) {
+      result.outcome = PlaceMatch::Outcome::kTurnUnknown;
+      return result;
+    }
+    const std::vector<bool> is_paired = WallsToPair();
     Try(Vector3d::Zero());
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       Try(Solve({candidates_[i]}));
+      if (!is_paired[candidates_[i].second]) continue;
       for (std::size_t j = 0; j < i; ++j) {
+        if (!is_paired[candidates_[j].second]) continue;
         const double cross =
             std::abs(std::sin(first_[candidates_[i].first].angle -
                               first_[candidates_[j].first].angle));
@@ -233,6 +241,29 @@ class Matcher {
       }
       rivals_[j] = std::max(1, lines);
     }
+  }
+
+  // Walls of the second place whose candidates are tried two at a time: all, or
+  // the longest where that would be too many. What explains such a wall and
+  // rivals of it are tried alike.
+  std::vector<bool> WallsToPair() const {
+    std::vector<std::size_t> order(second_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [this](std::size_t a, std::size_t b) {
+                       return second_[a].end - second_[a].begin >
+                              second_[b].end - second_[b].begin;
+                     });
+    const auto most = static_cast<std::size_t>(options_.max_tried_pairs);
+    std::vector<bool> is_paired(second_.size(), false);
+    std::size_t candidates = 0;
+    for (const std::size_t j : order) {
+      const std::size_t with = candidates + by_second_[j].size();
+      if (with * with / 2 > most) continue;
+      candidates = with;
+      is_paired[j] = true;
+    }
+    return is_paired;
   }
 
   // Most probable displacement when these pairs are one wall each.

@@ -49,6 +49,13 @@ struct PlaceMatchOptions {
   /// elsewhere by more than rival_offset (m) makes the wall's match ambiguous.
   double rival_margin = 2.0;
   double rival_offset = 0.15;
+  /// A place whose turn is known worse than this (standard deviation, rad) is
+  /// not looked for: any wall could be any other.
+  double max_turn = DegToRad(12.0);
+  /// Displacements from two pairs of walls each that are tried at most: the
+  /// longest walls of the second place are paired until there are so many.
+  /// Places of logs that hang together need some hundred.
+  int max_tried_pairs = 2000;
 };
 
 /// Two walls that are one, if the places are.
@@ -79,6 +86,8 @@ struct PlaceMatch {
     kAmbiguous,
     /// In a wide search chance would give as much.
     kTooLittleEvidence,
+    /// The turn is hardly known.
+    kTurnUnknown,
   };
   /// Of this comparison.
   Outcome outcome = Outcome::kMatched;

@@ -64,6 +64,7 @@ class PlaceSearch {
     scope_.Count("place pairs refused: nothing fits", totals_.nothing_fits);
     scope_.Count("place pairs refused: ambiguous", totals_.ambiguous);
     scope_.Count("place pairs refused: too little evidence", totals_.weak);
+    scope_.Count("place pairs refused: turn not known", totals_.turn_unknown);
     scope_.Count("wall matches", matches_);
     scope_.Count("wall matches refused: contradicted", contradicted_);
     scope_.Count("wall matches refused: one already", one_already_);
@@ -86,6 +87,7 @@ class PlaceSearch {
     std::int64_t nothing_fits = 0;
     std::int64_t ambiguous = 0;
     std::int64_t weak = 0;
+    std::int64_t turn_unknown = 0;
 
     Tally& operator+=(const Tally& o) {
       pairs += o.pairs;
@@ -96,6 +98,7 @@ class PlaceSearch {
       nothing_fits += o.nothing_fits;
       ambiguous += o.ambiguous;
       weak += o.weak;
+      turn_unknown += o.turn_unknown;
       return *this;
     }
     void Count(PlaceMatch::Outcome outcome) {
@@ -103,6 +106,7 @@ class PlaceSearch {
       nothing_fits += outcome == PlaceMatch::Outcome::kNothingFits;
       ambiguous += outcome == PlaceMatch::Outcome::kAmbiguous;
       weak += outcome == PlaceMatch::Outcome::kTooLittleEvidence;
+      turn_unknown += outcome == PlaceMatch::Outcome::kTurnUnknown;
     }
   };
 

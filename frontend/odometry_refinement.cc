@@ -60,6 +60,8 @@ constexpr double kOpenSigma = 2.0;
 constexpr double kLooseSigma = 3.0;
 constexpr double kLooseAngle = DegToRad(20.0);
 
+// Parts that are looked for in the rest when all scans are in, at most.
+constexpr int kMostLateParts = 24;
 // A tie that is known worse than this is no better than a loose one, m and rad.
 constexpr double kLateSigma = 0.5;
 constexpr double kLateAngle = DegToRad(5.0);
@@ -926,6 +928,7 @@ void OdometryRefiner::Archive(const KeyScan& key) {
     values << point.position.cast<float>(), point.normal.cast<float>();
     kept.points.push_back(values);
   }
+  kept.points.shrink_to_fit();
   archive_.push_back(std::move(kept));
 }
 
@@ -941,6 +944,7 @@ std::vector<std::vector<std::size_t>> OdometryRefiner::Parts() const {
 void OdometryRefiner::JoinParts() {
   // The largest part takes in others, largest first, until none is found.
   bool is_joined = num_parts_ > 1;
+  int looked_for = 0;
   while (is_joined) {
     is_joined = false;
     std::vector<std::vector<std::size_t>> parts = Parts();
@@ -948,6 +952,8 @@ void OdometryRefiner::JoinParts() {
         parts.begin(), parts.end(),
         [](const auto& a, const auto& b) { return a.size() > b.size(); });
     for (std::size_t p = 1; p < parts.size() && !is_joined; ++p) {
+      // A log of many parts comes to an end, too.
+      if (++looked_for > kMostLateParts) break;
       is_joined = JoinPart(parts[0], parts[p]);
     }
   }
@@ -1076,6 +1082,8 @@ void OdometryRefiner::Finish() {
   if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
   guessed_ = -1;
   JoinParts();
+  // No scan follows.
+  std::vector<ArchivedKey>().swap(archive_);
 }
 
 template <typename StateArchive>

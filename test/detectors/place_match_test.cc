@@ -202,6 +202,30 @@ TEST(PlaceMatchTest, WallsOfOneGroupAreNoNews) {
   EXPECT_EQ(Match(first, second, Prior(0.1, 0.1)).matches.size(), 8u);
 }
 
+TEST(PlaceMatchTest, APlaceOfWhichNothingIsKnownIsNotLookedFor) {
+  const PlaceMatch match =
+      Match(Room(), MovedBack(Room(), Vector3d(0.2, 0.1, 0.0)),
+            Prior(6.0, 6.0, 40.0));
+  EXPECT_EQ(match.outcome, PlaceMatch::Outcome::kTurnUnknown);
+  EXPECT_TRUE(match.matches.empty());
+}
+
+TEST(PlaceMatchTest, WhereTooManyWallsMayBeOneTheLongestArePaired) {
+  const Vector3d displacement(3.1, -2.3, DegToRad(4.0));
+  const std::vector<PlaceWall> second = MovedBack(Room(), displacement);
+  PlaceMatchOptions options;
+  const auto match = [&] {
+    return MatchPlaces(Room(), second, Vector2d::Zero(), Prior(2.0, 2.0, 3.0),
+                       options);
+  };
+  options.max_tried_pairs = 60;
+  EXPECT_EQ(Pairs(match()), Pairs(Match(Room(), second, Prior(2.0, 2.0, 3.0))));
+  EXPECT_EQ(match().matches.size(), 8u);
+  // One wall at a time does not lead there.
+  options.max_tried_pairs = 0;
+  EXPECT_NE(match().matches.size(), 8u);
+}
+
 TEST(PlaceMatchTest, DegenerateInput) {
   EXPECT_TRUE(Match({}, {}, Prior(1.0, 1.0)).matches.empty());
   EXPECT_TRUE(Match(Room(), {}, Prior(1.0, 1.0)).matches.empty());

@@ -278,6 +278,41 @@ TEST_F(LogSolverTest, ASecondMapWithoutWallsIsRefused) {
   EXPECT_EQ(result.trajectory, without.trajectory);
 }
 
+// Odometry that turns away by degrees and that nothing corrects draws the
+// office several times over: what the robot sees contradicts itself.
+TEST_F(LogSolverTest, AMapThatContradictsItselfIsReported) {
+  Log log = Office(1408);
+  Pose2 before = log.scans.front().odometry;
+  Pose2 pose = before;
+  LogSolverOptions options;
+  options.odometry.match_scans = false;
+  options.structure = false;
+  options.refine = Refinement::kMap;
+  {
+    LogSolver solver(registry_, options);
+    EXPECT_TRUE(solver.Run(log).loose.empty());
+  }
+  for (Scan& scan : log.scans) {
+    Pose2 step = Between(before, scan.odometry);
+    before = scan.odometry;
+    step[2] += DegToRad(1.5) * step.head<2>().norm();
+    pose = Compose(pose, step);
+    scan.odometry = pose;
+  }
+  LogSolver solver(registry_, options);
+  const LogSolverResult result = solver.Run(log);
+  ASSERT_FALSE(result.loose.empty());
+  for (const LooseTrack& part : result.loose) {
+    EXPECT_LT(part.begin, part.end);
+    EXPECT_LT(part.end, 1408);
+    EXPECT_NE(part.why.find("contradicts what it saw on other visits"),
+              std::string::npos);
+  }
+  options.check_map = false;
+  LogSolver unchecked(registry_, options);
+  EXPECT_TRUE(unchecked.Run(log).loose.empty());
+}
+
 TEST_F(LogSolverTest, TellsOfATrackThatHangsByAGuess) {
   Log log = Office(400);
   // From here on another building, which nothing that was seen before fits.

@@ -32,43 +32,101 @@ double AcrossFrom(const Eigen::Vector2d& begin, const Eigen::Vector2d& along,
   return along.x() * from_begin.y() - along.y() * from_begin.x();
 }
 
-// Whether both ends are beside the wall.
-bool LiesOn(const TruthWall& wall, const Eigen::Vector2d& begin,
-            const Eigen::Vector2d& end, const ConsistencyOptions& options) {
-  const Eigen::Vector2d along = wall.end - wall.begin;
-  const double length = along.norm();
-  if (!(length > 0.0)) return false;
-  const Eigen::Vector2d direction = along / length;
-  for (const Eigen::Vector2d& point : {begin, end}) {
-    const Eigen::Vector2d from_begin = point - wall.begin;
-    const double t = from_begin.dot(direction);
-    const double offset = std::abs(direction.x() * from_begin.y() -
-                                   direction.y() * from_begin.x());
-    if (t < -options.end_slack || t > length + options.end_slack ||
-        offset > options.maximum_offset) {
-      return false;
-    }
-  }
-  return true;
+// How a wall of the map lies along a true one.
+struct Beside {
+  // Some of it does, all of it does.
+  bool overlaps = false;
+  bool lies_on = false;
+  // How far the middle of what does lies to the left, m.
+  double offset = 0.0;
+};
+
+Beside LieBeside(const TruthWall& wall, const Eigen::Vector2d& begin,
+                 const Eigen::Vector2d& end,
+                 const ConsistencyOptions& options) {
+  Beside result;
+  const double length = (wall.end - wall.begin).norm();
+  if (!(length > 0.0)) return result;
+  const Eigen::Vector2d along = (wall.end - wall.begin) / length;
+  const auto [first, last] = std::minmax(
+      {(begin - wall.begin).dot(along), (end - wall.begin).dot(along)});
+  const double from = std::max(first, 0.0);
+  const double to = std::min(last, length);
+  result.overlaps = to - from > options.end_slack;
+  if (!result.overlaps) return result;
+  const double share = (0.5 * (from + to) - first) / (last - first);
+  const bool is_forward = (end - begin).dot(along) > 0.0;
+  result.offset =
+      AcrossFrom(wall.begin, along,
+                 begin + (is_forward ? share : 1.0 - share) * (end - begin));
+  result.lies_on =
+      first >= -options.end_slack && last <= length + options.end_slack &&
+      std::abs(AcrossFrom(wall.begin, along, begin)) <=
+          options.maximum_offset &&
+      std::abs(AcrossFrom(wall.begin, along, end)) <= options.maximum_offset;
+  return result;
 }
 
-// World pose of the map frame as it is around a place: by the pose of the
-// trajectory that is nearest.
-Pose2 LocalAlignment(const std::vector<std::pair<Pose2, Pose2>>& poses,
-                     const Eigen::Vector2d& place) {
-  const auto nearest = std::min_element(
-      poses.begin(), poses.end(), [&place](const auto& a, const auto& b) {
-        return (a.first.template head<2>() - place).squaredNorm() <
-               (b.first.template head<2>() - place).squaredNorm();
-      });
-  return Compose(nearest->second, Inverse(nearest->first));
+// Poses of the trajectory, and the true ones.
+using PosePairs = std::vector<std::pair<Pose2, Pose2>>;
+
+// A pose of the graph is one of the trajectory's when it is so near, m (and m
+// for a radian).
+constexpr double kSamePose = 0.02;
+
+// World pose of the map frame as it is around a wall: by the nearest pose of
+// the graph that saw it, or, where there is none, the pose of the trajectory
+// that is nearest to its middle on the side from which it was seen. Others may
+// be of another visit, for which the map lies elsewhere.
+Pose2 LocalAlignment(const Graph& graph, const PosePairs& poses,
+                     const Feature& wall, const Eigen::Vector2d& middle) {
+  const Feature* seen_from = nullptr;
+  const auto distance = [&middle](const Feature& pose) {
+    return (pose.type->frame(pose).head<2>() - middle).squaredNorm();
+  };
+  for (const ConstraintId id : graph.ConstraintsOf(wall.id)) {
+    const Constraint& constraint = graph.GetConstraint(id);
+    if (constraint.kind != ConstraintClass::kMeasurement) continue;
+    for (const FeatureId other : constraint.features) {
+      const Feature& feature = graph.GetFeature(other);
+      if (feature.type->Is(FeatureRole::kPose) &&
+          (seen_from == nullptr || distance(feature) < distance(*seen_from))) {
+        seen_from = &feature;
+      }
+    }
+  }
+  const auto nearest = [&poses](const auto& rank) {
+    return std::min_element(poses.begin(), poses.end(),
+                            [&rank](const auto& a, const auto& b) {
+                              return rank(a.first) < rank(b.first);
+                            });
+  };
+  const auto alignment = [](const auto& pair) {
+    return Compose(pair->second, Inverse(pair->first));
+  };
+  if (seen_from != nullptr) {
+    const Pose2 from = seen_from->type->frame(*seen_from);
+    const auto apart = [&from](const Pose2& pose) {
+      return (pose - from).head<2>().norm() +
+             std::abs(NormalizeAngle(pose[2] - from[2]));
+    };
+    const auto same = nearest(apart);
+    if (apart(same->first) < kSamePose) return alignment(same);
+  }
+  const double direction = wall.type->frame(wall)[2];
+  const Eigen::Vector2d normal(-std::sin(direction), std::cos(direction));
+  return alignment(nearest([&](const Pose2& pose) {
+    const Eigen::Vector2d from_middle = pose.head<2>() - middle;
+    return std::make_pair(from_middle.dot(normal) <= 0.0,
+                          from_middle.squaredNorm());
+  }));
 }
 
 std::vector<Pairing> PairWalls(const Graph& graph, const MapTruth& truth,
                                const std::vector<TimedPose>& trajectory,
                                const ConsistencyOptions& options) {
   const Pose2 alignment = AlignTrajectory(trajectory, truth);
-  std::vector<std::pair<Pose2, Pose2>> poses;
+  PosePairs poses;
   const TrajectoryIndex index(trajectory);
   for (const TimedPose& timed : truth.poses) {
     const int match = index.Find(timed.timestamp, 1e-3);
@@ -85,7 +143,8 @@ std::vector<Pairing> PairWalls(const Graph& graph, const MapTruth& truth,
     const Eigen::Vector2d middle = TransformPoint(
         pose, Eigen::Vector2d(
                   0.5 * (feature->extent_begin + feature->extent_end), 0.0));
-    const Pose2 moved = Compose(LocalAlignment(poses, middle), pose);
+    const Pose2 moved =
+        Compose(LocalAlignment(graph, poses, *feature, middle), pose);
     const Pose2 global = Compose(alignment, pose);
     const auto at = [&moved](double along) {
       return TransformPoint(moved, Eigen::Vector2d(along, 0.0));
@@ -97,22 +156,27 @@ std::vector<Pairing> PairWalls(const Graph& graph, const MapTruth& truth,
     pair.direction = pose[2];
     double nearest = options.maximum_offset;
     double second = options.maximum_offset;
+    bool lies_on = false;
     for (const TruthWall& wall : truth.walls) {
       const Eigen::Vector2d along = (wall.end - wall.begin).normalized();
       const double direction = std::atan2(along.y(), along.x());
       if (std::abs(RadToDeg(NormalizeAxial(moved[2] - direction))) >
-              options.maximum_angle_deg ||
-          !LiesOn(wall, at(feature->extent_begin), at(feature->extent_end),
-                  options)) {
+          options.maximum_angle_deg) {
         continue;
       }
-      const double offset = AcrossFrom(wall.begin, along, at(pair.along));
-      if (std::abs(offset) >= nearest) {
-        second = std::min(second, std::abs(offset));
+      const Beside beside = LieBeside(wall, at(feature->extent_begin),
+                                      at(feature->extent_end), options);
+      if (!beside.overlaps) continue;
+      const double offset = std::abs(beside.offset);
+      if (offset >= nearest) {
+        second = std::min(second, offset);
         continue;
       }
       second = nearest;
-      nearest = std::abs(offset);
+      nearest = offset;
+      // What reaches beyond the face that it is must not be taken for the one
+      // behind it.
+      lies_on = beside.lies_on;
       const double turn = NormalizeAxial(global[2] - direction);
       const Eigen::Vector2d middle_in_world =
           TransformPoint(global, Eigen::Vector2d(pair.along, 0.0));
@@ -122,8 +186,7 @@ std::vector<Pairing> PairWalls(const Graph& graph, const MapTruth& truth,
                     turn};
     }
     // Two faces alike near: which one it is cannot be said.
-    if (nearest < options.maximum_offset &&
-        second - nearest >= options.least_margin) {
+    if (lies_on && second - nearest >= options.least_margin) {
       pairs.push_back(pair);
     }
   }

@@ -14,9 +14,10 @@ namespace plumbline {
 struct ConsistencyOptions {
   /// Shorter walls of the map are left out, m.
   double minimum_length = 1.0;
-  /// A wall counts when all of it lies on one true wall: at most this far
-  /// beside it (m), this far beyond its ends (m), and turned by this many
-  /// degrees. What else it may be is a question of association.
+  /// A wall counts when all of it lies on one true wall, the nearest that it
+  /// lies beside with any part: at most this far beside it (m), this far beyond
+  /// its ends (m), and turned by this many degrees. What else it may be is a
+  /// question of association.
   double maximum_offset = 0.25;
   double end_slack = 0.1;
   double maximum_angle_deg = 4.0;
@@ -53,8 +54,8 @@ struct Consistency {
 /// Tests the covariances of the walls of a map (features of type segment, level
 /// 0) on the truth of a simulated building: Bar-Shalom, Li, Kirubarajan 2001,
 /// "Estimation with applications to tracking and navigation", section 5.4.
-/// Which wall is which is told by the nearest pose of the trajectory, so that
-/// the map may be as far off as it is. Throws Error as Marginals and
+/// Which wall is which is told by the nearest pose that saw it, or the nearest of
+/// the trajectory in front of it, so that the map may be as far off as it is. Throws Error as Marginals and
 /// AlignTrajectory do.
 Consistency EvaluateConsistency(
     const Graph& graph, const SolverSession& session, const MapTruth& truth,

@@ -24,7 +24,11 @@ class ConsistencyTest : public ::testing::Test {
     return sum / trials;
   }
 
-  Consistency Trial(double factor, unsigned seed) {
+  // `behind`: there is a face of the same length this far behind that of one
+  // wall, m; 0: none. `half`: the wall's own face ends half way. `stray`: the
+  // robot was behind the wall, too, where the map is off by as much.
+  Consistency Trial(double factor, unsigned seed, double behind = 0.0,
+                    bool half = false, bool stray = false) {
     std::mt19937 engine(seed);
     std::normal_distribution<double> normal;
     MapTruth truth;
@@ -80,6 +84,25 @@ class ConsistencyTest : public ::testing::Test {
       timed.pose = Compose(map, timed.pose);
       truth.poses.push_back(timed);
     }
+    if (behind != 0.0) {
+      TruthWall back = truth.walls[2];
+      const Eigen::Vector2d along = (back.end - back.begin).normalized();
+      if (half) truth.walls[2].end = 0.5 * (back.begin + back.end);
+      back.begin += behind * Eigen::Vector2d(along.y(), -along.x());
+      back.end += behind * Eigen::Vector2d(along.y(), -along.x());
+      truth.walls.push_back(back);
+    }
+    if (stray) {
+      trajectory.emplace_back();
+      trajectory[2].timestamp = 2.0;
+      trajectory[2].pose = Pose2(poses[2][0], poses[2][1], 0.0);
+      const Eigen::Vector2d side(std::sin(poses[2][2]), -std::cos(poses[2][2]));
+      trajectory[2].pose.head<2>() += 0.5 * side;
+      TimedPose timed = trajectory[2];
+      timed.pose.head<2>() += behind * side;
+      timed.pose = Compose(map, timed.pose);
+      truth.poses.push_back(timed);
+    }
     for (TruthWall& wall : truth.walls) {
       wall.begin = TransformPoint(map, wall.begin);
       wall.end = TransformPoint(map, wall.end);
@@ -101,6 +124,25 @@ TEST_F(ConsistencyTest, RatioIsOneWhereCovariancesAreRight) {
 TEST_F(ConsistencyTest, RatioTellsCovariancesThatAreTooSmallOrTooWide) {
   EXPECT_NEAR(MeanRatio(2.0, 200), 4.0, 0.8);
   EXPECT_NEAR(MeanRatio(0.5, 200), 0.25, 0.05);
+}
+
+// A wall of the map that is longer than the face that it is lies as a whole on
+// the face behind it only.
+TEST_F(ConsistencyTest, TheFaceBehindIsNoOther) {
+  for (const double behind : {0.15, -0.15}) {
+    const Consistency result = Trial(0.0, 1, behind, true);
+    EXPECT_EQ(result.walls, 3);
+    EXPECT_NEAR(result.nees, 0.0, 1e-9);
+  }
+  // Too far away to matter.
+  EXPECT_EQ(Trial(0.0, 1, 1.0, true).walls, 3);
+}
+
+// What the robot saw of a wall it saw from in front of it.
+TEST_F(ConsistencyTest, PosesBehindAWallDoNotTellWhichItIs) {
+  const Consistency result = Trial(0.0, 1, 0.15, false, true);
+  EXPECT_EQ(result.walls, 4);
+  EXPECT_LT(result.nees, 1.0);
 }
 
 TEST_F(ConsistencyTest, APerfectMapHasNoError) {

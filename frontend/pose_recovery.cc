@@ -31,9 +31,12 @@ constexpr double kRounding = 1e-10;
 // Random vectors by which traces are estimated (Hutchinson 1990).
 constexpr int kProbes = 10;
 
-// Parts of covariances. The factors of kMatch and kSighting are estimated; the
-// others say what errors do over ways that residuals do not show.
-enum Part { kMatch, kOpen, kDrift, kSighting, kNumParts };
+// Parts of covariances: what matches tell, what they leave open, the drift of
+// matching over the way and over turns, and sightings. The factors of all but
+// what is left open are estimated: hardly anything shows an error there.
+enum Part { kMatch, kOpen, kWay, kTurn, kSighting, kNumParts };
+constexpr int kMotionParts = 4;
+constexpr Part kEstimated[] = {kMatch, kWay, kTurn, kSighting};
 
 using Parts = std::array<Eigen::MatrixXd, kNumParts>;
 
@@ -48,7 +51,7 @@ Pose2 PoseOf(const Feature& feature) {
 
 // Parts of the covariance of a refined motion: what the returns tell, odometry
 // along what they leave open, and the drift of matching.
-std::array<Eigen::Matrix3d, 3> PartsOfMotion(
+std::array<Eigen::Matrix3d, kMotionParts> PartsOfMotion(
     const UncertainPose2& motion, const PoseRecoveryOptions& options) {
   const double way = motion.mean.head<2>().norm();
   const double turned = std::abs(motion.mean[2]);
@@ -56,14 +59,17 @@ std::array<Eigen::Matrix3d, 3> PartsOfMotion(
   const double position =
       drift.translation_per_root_metre * drift.translation_per_root_metre * way;
   const double heading =
-      drift.rotation_per_root_metre * drift.rotation_per_root_metre * way +
-      drift.rotation_per_root_radian * drift.rotation_per_root_radian * turned;
-  const Eigen::Matrix3d of_drift =
-      (Eigen::Vector3d(position, position, heading).array() + kRounding)
-          .matrix()
-          .asDiagonal();
+      drift.rotation_per_root_metre * drift.rotation_per_root_metre * way;
+  std::array<Eigen::Matrix3d, kMotionParts> parts;
+  parts[kMatch].setZero();
+  parts[kOpen].setZero();
+  parts[kWay] = Eigen::Vector3d(position, position, heading).asDiagonal();
+  parts[kTurn] = Eigen::Vector3d(0.0, 0.0,
+                                 drift.rotation_per_root_radian *
+                                     drift.rotation_per_root_radian * turned)
+                     .asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
-      Eigen::Matrix3d(motion.covariance - of_drift));
+      Eigen::Matrix3d(motion.covariance - parts[kWay] - parts[kTurn]));
   const Eigen::Matrix3d rest =
       solver.eigenvectors() *
       solver.eigenvalues().cwiseMax(kRounding).asDiagonal() *
@@ -74,10 +80,6 @@ std::array<Eigen::Matrix3d, 3> PartsOfMotion(
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> against(
       rest, odometry);
   const Eigen::Matrix3d basis = odometry * against.eigenvectors();
-  std::array<Eigen::Matrix3d, 3> parts;
-  parts[kMatch].setZero();
-  parts[kOpen].setZero();
-  parts[kDrift] = of_drift;
   for (int i = 0; i < 3; ++i) {
     const double ratio = against.eigenvalues()[i];
     const double open = std::min(1.0, ratio);
@@ -106,6 +108,7 @@ struct Link {
     for (int p = 0; p < kNumParts; ++p) {
       if (parts[p].size() > 0) covariance += factors[p] * parts[p];
     }
+    covariance.diagonal().array() += kRounding;
     return weight * Symmetric(covariance.inverse());
   }
 };
@@ -151,7 +154,7 @@ class Recovery {
         registry_(registry),
         pose_pose_(registry.GetRelation("pose_pose")),
         begins_(PlaceBegins(records, options.place_stride)),
-        factors_{1.0, 1.0, 1.0, 1.0} {
+        factors_{1.0, 1.0, 1.0, 1.0, 1.0} {
     for (const std::size_t begin : begins_) {
       Feature place;
       place.type = &registry_.GetFeature("pose");
@@ -224,6 +227,8 @@ class Recovery {
     RecoveredPoses result;
     result.places = graph->Apply(std::move(transaction_)).features;
     result.match_variance_factor = factors_[kMatch];
+    result.way_variance_factor = factors_[kWay];
+    result.turn_variance_factor = factors_[kTurn];
     result.sighting_variance_factor = factors_[kSighting];
     return result;
   }
@@ -233,15 +238,15 @@ class Recovery {
   void AddMotion(std::size_t place) {
     const PlaceArrival arrival = ArrivalAt(records_, begins_, place);
     Pose2 mean = Pose2::Zero();
-    std::array<Eigen::Matrix3d, 3> sums;
+    std::array<Eigen::Matrix3d, kMotionParts> sums;
     for (Eigen::Matrix3d& sum : sums) sum.setZero();
     for (const std::size_t k : arrival.steps) {
       const UncertainPose2& step = records_[k].motion;
       const Eigen::Matrix3d j1 = ComposeJacobianFirst(mean, step.mean);
       const Eigen::Matrix3d j2 = ComposeJacobianSecond(mean);
-      const std::array<Eigen::Matrix3d, 3> parts =
+      const std::array<Eigen::Matrix3d, kMotionParts> parts =
           PartsOfMotion(step, options_);
-      for (int p = 0; p < 3; ++p) {
+      for (int p = 0; p < kMotionParts; ++p) {
         sums[p] =
             j1 * sums[p] * j1.transpose() + j2 * parts[p] * j2.transpose();
       }
@@ -252,7 +257,7 @@ class Recovery {
     link.from = provisional_[arrival.from];
     link.to = provisional_[place];
     link.expected = mean;
-    for (int p = 0; p < 3; ++p) link.parts[p] = sums[p];
+    for (int p = 0; p < kMotionParts; ++p) link.parts[p] = sums[p];
     links_.push_back(std::move(link));
   }
 
@@ -382,7 +387,7 @@ class Recovery {
     }
     for (std::size_t i = 0; i < links_.size(); ++i) {
       const Eigen::Index length = residuals[i].size();
-      for (const Part part : {kMatch, kSighting}) {
+      for (const Part part : kEstimated) {
         if (links_[i].parts[part].size() == 0) continue;
         squares[part] += share(i, part, residuals[i], residuals[i]);
         for (int t = 0; t < kProbes; ++t) {
@@ -397,11 +402,14 @@ class Recovery {
             std::min(1.0, options_.outlier_chi_square / chi_square);
       }
     }
-    for (const Part part : {kMatch, kSighting}) {
-      if (redundancies[part] < 1.0) continue;
-      factors_[part] = std::clamp(
-          factors_[part] * squares[part] / redundancies[part],
-          options_.min_variance_factor, options_.max_variance_factor);
+    for (const Part part : kEstimated) {
+      const double prior =
+          part == kWay || part == kTurn ? options_.prior_redundancy : 0.0;
+      if (redundancies[part] + prior < 1.0) continue;
+      factors_[part] = std::clamp((factors_[part] * squares[part] + prior) /
+                                      (redundancies[part] + prior),
+                                  options_.min_variance_factor,
+                                  options_.max_variance_factor);
     }
     return true;
   }

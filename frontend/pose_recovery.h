@@ -23,10 +23,13 @@ struct PoseRecoveryOptions {
   /// it counts for no more than one at this.
   double outlier_chi_square = 9.21;
   /// Solves, each followed by taking variances and weights anew.
-  int rounds = 6;
+  int rounds = 10;
+  /// What is stated of the drift of matching counts as much as so many
+  /// residuals when its factors are estimated.
+  double prior_redundancy = 3.0;
   /// Bounds of the factors of variances.
   double min_variance_factor = 1e-4;
-  double max_variance_factor = 4.0;
+  double max_variance_factor = 25.0;
 };
 
 /// The poses that were brought back.
@@ -34,8 +37,11 @@ struct RecoveredPoses {
   /// The features of the places, in the order of the log; none when nothing was
   /// done.
   std::vector<FeatureId> places;
-  /// Factors of the variances of what matches tell, and of sightings.
+  /// Factors of the variances of what matches tell, of their drift over the way
+  /// and over turns (MatchDrift), and of sightings.
   double match_variance_factor = 1.0;
+  double way_variance_factor = 1.0;
+  double turn_variance_factor = 1.0;
   double sighting_variance_factor = 1.0;
 };
 

@@ -3,6 +3,8 @@
 #include <plumbline/core/read_ahead.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/detectors/default_hierarchy.h>
+#include <plumbline/frontend/place_chain.h>
+#include <plumbline/frontend/wall_views.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/log_solver_state.h>
 
@@ -28,8 +30,8 @@ constexpr std::size_t kScansAhead = 64;
 // lost what the scans show, and is no better.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
 
-// How well a wall of glimpses is known relative to a place beside it, m and
-// rad.
+// How well a wall of glimpses is known relative to the place that saw it, m
+// and rad.
 constexpr double kGlimpsedPosition = 0.03;
 constexpr double kGlimpsedDirection = DegToRad(0.3);
 
@@ -656,10 +658,10 @@ void LogSolver::CompleteWalls(Context* context) {
         FindGlimpsedWalls(*graph_, registry_, context->scans, result.trajectory,
                           options_.completion, context->control.stop);
   }
+  if (!context->places.empty()) walls = BindToPlaces(walls, *context);
   result.glimpsed_walls =
       static_cast<std::int64_t>(walls.added_features().size());
   if (walls.empty()) return;
-  if (!context->places.empty()) walls = BindToPlaces(walls, *context);
   graph_->Apply(std::move(walls));
   RunEm(context);
   FindScansAgain(context);
@@ -672,23 +674,29 @@ Transaction LogSolver::BindToPlaces(const Transaction& walls,
                               kGlimpsedDirection);
   const Eigen::Matrix3d information =
       sigma.array().square().inverse().matrix().asDiagonal();
-  for (const Feature& wall : walls.added_features()) {
-    const Pose2 pose = wall.type->frame(wall);
-    const Feature* nearest = nullptr;
-    double smallest = std::numeric_limits<double>::infinity();
-    for (const FeatureId id : context.places) {
-      const Feature& place = graph_->GetFeature(id);
-      const double distance =
-          (place.type->frame(place) - pose).head<2>().norm();
-      if (distance >= smallest) continue;
-      smallest = distance;
-      nearest = &place;
-    }
-    bound.AddConstraint(
-        MakeMeasurement(registry_.GetRelation("pose_pose"),
-                        {nearest->id, bound.AddFeature(wall)},
-                        Between(nearest->type->frame(*nearest), pose),
-                        information, wall.source));
+  const std::vector<std::size_t> begins =
+      PlaceBegins(context.result.records, options_.adjustment.place_stride);
+  std::vector<int> place_of_scan;
+  for (std::size_t p = 0; p < begins.size(); ++p) {
+    const auto first =
+        static_cast<std::size_t>(context.result.records[begins[p]].scan);
+    place_of_scan.resize(std::max(first, place_of_scan.size()),
+                         std::max(0, static_cast<int>(p) - 1));
+  }
+  place_of_scan.resize(context.scans.size(),
+                       static_cast<int>(begins.size()) - 1);
+  const std::vector<int> seen_from = GroupsThatSaw(
+      walls.added_features(), context.scans, context.result.trajectory,
+      place_of_scan, options_.completion.points,
+      options_.completion.explained_offset);
+  for (std::size_t w = 0; w < seen_from.size(); ++w) {
+    if (seen_from[w] < 0) continue;
+    const Feature& wall = walls.added_features()[w];
+    const Feature& place = graph_->GetFeature(context.places[seen_from[w]]);
+    bound.AddConstraint(MakeMeasurement(
+        registry_.GetRelation("pose_pose"), {place.id, bound.AddFeature(wall)},
+        Between(place.type->frame(place), wall.type->frame(wall)), information,
+        wall.source));
   }
   return bound;
 }

@@ -29,8 +29,8 @@ class PoseRecoveryTest : public ::testing::Test {
   // A robot that goes round in a room of four walls and sees all of them from
   // each key scan, in a graph as the front-end leaves it: walls bound to each
   // other, and the robot bound to one. Covariances are stated `claim` times
-  // larger in sigma than they are, but for the drift.
-  void Simulate(unsigned seed, double claim) {
+  // larger in sigma than they are, the drift `drift_claim` times.
+  void Simulate(unsigned seed, double claim, double drift_claim = 1.0) {
     std::mt19937 engine(seed);
     std::normal_distribution<double> normal;
     graph_ = std::make_unique<Graph>();
@@ -86,7 +86,7 @@ class PoseRecoveryTest : public ::testing::Test {
       for (int row = 0; row < 3; ++row) {
         const double sigma = kMatchSigma[row];
         record.motion.mean[row] +=
-            std::hypot(sigma, of_drift[row]) * normal(engine);
+            std::hypot(sigma, of_drift[row] / drift_claim) * normal(engine);
         record.motion.covariance(row, row) =
             claim * claim * sigma * sigma + of_drift[row] * of_drift[row];
       }
@@ -165,6 +165,27 @@ TEST_F(PoseRecoveryTest, CovariancesHoldWhateverWasStated) {
     EXPECT_GT(sum, 0.6) << claim;
     EXPECT_LT(sum, 1.5) << claim;
   }
+}
+
+// In a building where matching drifts by far less than it may, the map knows.
+TEST_F(PoseRecoveryTest, DriftIsEstimated) {
+  PoseRecoveryOptions options;
+  options.place_stride = 1;
+  double ratio = 0.0;
+  double way = 0.0;
+  double turn = 0.0;
+  constexpr int kTrials = 8;
+  for (unsigned trial = 0; trial < kTrials; ++trial) {
+    Simulate(trial, 1.0, 8.0);
+    const RecoveredPoses recovered = Recover(options);
+    way += recovered.way_variance_factor / kTrials;
+    turn += recovered.turn_variance_factor / kTrials;
+    ratio += MeanRatio() / kTrials;
+  }
+  EXPECT_LT(way, 0.5);
+  EXPECT_LT(turn, 0.2);
+  EXPECT_GT(ratio, 0.6);
+  EXPECT_LT(ratio, 1.5);
 }
 
 TEST_F(PoseRecoveryTest, ReplacesWhatStoodForThePoses) {

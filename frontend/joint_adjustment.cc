@@ -112,6 +112,10 @@ double VoteChiSquare(const Graph& graph, const Constraint& vote) {
   return chi_square;
 }
 
+// Relative change of the cost at which a solve ends after which votes and
+// weights are taken anew.
+constexpr double kRoundTolerance = 1e-4;
+
 // Medians of chi-square with two and three degrees of freedom.
 constexpr double kMedianOf2 = 1.386;
 constexpr double kMedianOf3 = 2.366;
@@ -355,8 +359,13 @@ void JointAdjustment::Reweigh() {
   }
 }
 
-void JointAdjustment::Solve() {
-  const SolveReport report = session_->SolveGlobal();
+void JointAdjustment::Solve(bool is_last) {
+  const SessionOptions& options = session_->options();
+  const SolveReport report =
+      is_last ? session_->SolveGlobal()
+              : session_->SolveGlobal(
+                    std::max(kRoundTolerance, options.function_tolerance),
+                    options.initial_trust_region_radius);
   if (!report.usable) {
     throw PLUMBLINE_ERROR("joint adjustment failed: " + report.message,
                           "a usable solution");
@@ -415,7 +424,7 @@ void JointAdjustment::EstimateVariances() {
     graph_->UpdateConstraint(id, expected, information / motion_factor_);
   }
   Reweigh();
-  Solve();
+  Solve(/*is_last=*/true);
 }
 
 void JointAdjustment::Adjust() {
@@ -430,7 +439,7 @@ void JointAdjustment::Adjust() {
       }
       Vote();
       Reweigh();
-      Solve();
+      Solve(round + 1 == options_.rounds);
     }
     const std::vector<Pose2> after = PlacePoses();
     double moved = 0.0;

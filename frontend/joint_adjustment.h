@@ -176,7 +176,8 @@ class JointAdjustment {
   // Others have taken all its returns.
   void DropWallsWithoutVotes();
   void Reweigh();
-  void Solve();
+  // To the tolerance of the session when `is_last`, coarsely on the way there.
+  void Solve(bool is_last);
 
   Graph* graph_;
   SolverSession* session_;

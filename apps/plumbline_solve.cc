@@ -24,6 +24,7 @@
 #include <plumbline/frontend/scan_odometry.h>
 #include <plumbline/outputs/building_frame.h>
 #include <plumbline/outputs/checkpoint_file.h>
+#include <plumbline/outputs/closing_lines.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/output_folder.h>
 #include <plumbline/outputs/solve_outputs.h>
@@ -44,6 +45,9 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+// Of apps/cli.
+DECLARE_bool(quiet);
 
 namespace plumbline {
 namespace {
@@ -117,16 +121,21 @@ void TellChanges(const OutputFolder::Changes& changes, const Summary& summary) {
          changes.replaced_whole_run ? " in place of a whole one" : "");
 }
 
-// Times of a whole run and of its steps: each step ends where the next begins.
+// Times of a whole run and of its steps, and the bar over them: each step ends
+// where the next begins.
 class RunClock {
  public:
   // A step; one of the same name goes on.
   void Begin(const std::string& step) {
+    bar_.Begin(step);
     const double now = watch_.Seconds();
     Add(now - step_begin_, &steps_);
     step_ = step;
     step_begin_ = now;
   }
+
+  // The bar over all steps.
+  WorkProgress& bar() { return bar_; }
 
   // The total and the steps until now.
   void Read(Summary* summary) const {
@@ -150,12 +159,19 @@ class RunClock {
     }
   }
 
+  WorkProgress bar_;
   Stopwatch watch_;
   Steps steps_;
   std::string step_ = "start";
   // s on the watch.
   double step_begin_ = 0.0;
 };
+
+// Below 0 when the whole is not known.
+double ShareOf(std::int64_t done, std::int64_t total) {
+  return total > 0 ? static_cast<double>(done) / static_cast<double>(total)
+                   : -1.0;
+}
 
 // Which files --outputs asks for. Where a log is only localized the map is as
 // it was, and so are the files that are made of it alone.
@@ -183,18 +199,11 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
   outcome->flags = OwnFlags();
   outcome->delta_threshold = FLAGS_delta_threshold;
   try {
-    WrittenOutputs written;
-    {
-      std::unique_ptr<Progress> progress;
-      written = WriteSolveOutputs(
-          *outcome, OutputsFromFlags(*outcome->registry), folder->staging(),
-          NumThreadsFromFlags(), [&](int done, int total) {
-            if (progress == nullptr) {
-              progress = std::make_unique<Progress>("writing", "files", total);
-            }
-            progress->Update(done);
-          });
-    }
+    WrittenOutputs written = WriteSolveOutputs(
+        *outcome, OutputsFromFlags(*outcome->registry), folder->staging(),
+        NumThreadsFromFlags(), [clock](int done, int total) {
+          clock->bar().Update(ShareOf(done, total));
+        });
     for (const std::string& reason : written.reasons) {
       Remark("%s", reason.c_str());
     }
@@ -213,6 +222,15 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
     Detail("%8.3f s  %s", seconds, step.c_str());
   }
   Detail("written to %s in %.1f s", FLAGS_output_dir.c_str(), watch.Seconds());
+}
+
+// The last words of a run.
+void TellEnd(const SolveOutcome& outcome, RunClock* clock) {
+  clock->bar().Finish();
+  if (FLAGS_quiet) return;
+  for (const std::string& line : ClosingLines(outcome, FLAGS_output_dir)) {
+    std::printf("%s\n", line.c_str());
+  }
 }
 
 // All files that the run reads, as far as flags name them.
@@ -295,15 +313,12 @@ void TellPhase(const EmPhase& phase) {
   }
 }
 
-// A bar while an input is read.
+// Tells the bar how much of an input is read.
 class ReadingProgress {
  public:
-  explicit ReadingProgress(InputStream* input) : input_(input) {
-    input_->SetProgress([this](std::int64_t done, std::int64_t size) {
-      if (progress_ == nullptr) {
-        progress_ = std::make_unique<Progress>("reading", "kB", size / 1000);
-      }
-      progress_->Update(done / 1000);
+  ReadingProgress(InputStream* input, RunClock* clock) : input_(input) {
+    input_->SetProgress([clock](std::int64_t done, std::int64_t size) {
+      clock->bar().Update(ShareOf(done, size));
     });
   }
   ~ReadingProgress() { input_->SetProgress(nullptr); }
@@ -312,7 +327,6 @@ class ReadingProgress {
 
  private:
   InputStream* input_;
-  std::unique_ptr<Progress> progress_;
 };
 
 // A file's name, for people: a name may have any bytes.
@@ -331,19 +345,15 @@ struct LogInput {
   InputStream* stream = nullptr;
 };
 
-Log ReadInput(const LogInput& input) {
+Log ReadInput(const LogInput& input, RunClock* clock) {
   LaserOptions options = LaserOptionsFromFlags();
   if (input.stream != nullptr) {
-    const ReadingProgress progress(input.stream);
+    const ReadingProgress progress(input.stream, clock);
     return input.reader->read(input.stream, options);
   }
-  std::unique_ptr<Progress> progress;
   options.stop = [] { return InterruptRequested(); };
-  options.progress = [&](std::int64_t done, std::int64_t size) {
-    if (progress == nullptr) {
-      progress = std::make_unique<Progress>("reading", "kB", size / 1000);
-    }
-    progress->Update(done / 1000);
+  options.progress = [clock](std::int64_t done, std::int64_t size) {
+    clock->bar().Update(ShareOf(done, size));
   };
   return input.reader->read_path(input.name, options);
 }
@@ -373,20 +383,19 @@ constexpr char kMatchingStep[] = "scan matching for want of odometry";
 
 // Scan matching alone carries a log without odometry.
 void MatchScansAlone(const std::string& name,
-                     const LogSolverOptions& solver_options, Log* log,
-                     Summary* summary) {
+                     const LogSolverOptions& solver_options, RunClock* clock,
+                     Log* log, Summary* summary) {
+  clock->Begin(kMatchingStep);
   ScanOdometryOptions options;
   options.points = solver_options.odometry.points;
   options.matcher = solver_options.odometry.matcher;
   options.stop = [] { return InterruptRequested(); };
-  Progress progress("matching", "scans",
-                    static_cast<std::int64_t>(log->scans.size()));
-  options.progress = [&](std::size_t done, std::size_t) {
-    progress.Update(static_cast<std::int64_t>(done));
+  options.progress = [clock](std::size_t done, std::size_t total) {
+    clock->bar().Update(ShareOf(static_cast<std::int64_t>(done),
+                                static_cast<std::int64_t>(total)));
   };
   const Stopwatch watch;
   const ScanOdometryReport report = AddScanOdometry(options, log);
-  progress.Finish();
   char text[256];
   summary->odometry_source = "scan matching";
   if (report.used_yaw_rates) {
@@ -421,6 +430,46 @@ void MatchScansAlone(const std::string& name,
     summary->notes.push_back(text);
   }
   Detail("matched scans for want of odometry in %.1f s", watch.Seconds());
+}
+
+// Stages of a run on logs, by the names of its steps. `sizes`: of each log, its
+// scans as a share of those of a middling one of them. The scans of a log are
+// counted on the way; what comes after the last one is taken to be as much work
+// for every scan as it is in the middle of logs with 800 to 17,000 of them.
+std::vector<WorkStage> StagesOfLogs(const std::vector<double>& sizes,
+                                    const LogSolverOptions& options) {
+  double all = 0.0;
+  std::vector<WorkStage> stages;
+  for (const double size : sizes) {
+    all += size;
+    stages.push_back({"reading", 0.1 * size});
+  }
+  for (const double size : sizes) {
+    stages.push_back({"scans", size});
+    if (!options.structure) continue;
+    stages.push_back({"structure of the whole map", 0.02 * size});
+    stages.push_back({"closing of loops", 0.15 * size});
+  }
+  if (sizes.size() > 1) stages.push_back({"placing of logs", 0.5 * all});
+  if (RecoversPoses(options))
+    stages.push_back({"recovery of poses", 0.2 * all});
+  if (options.refine == Refinement::kFull) {
+    stages.push_back({"adjustment of poses", 0.5 * all});
+    stages.push_back({"walls from adjusted poses", 0.1 * all});
+    stages.push_back({"joint adjustment of poses and walls", 0.2 * all});
+    stages.push_back({"structure of the map from adjusted poses", 0.2 * all});
+  }
+  if (options.check_map) stages.push_back({"check of the map", 0.1 * all});
+  stages.push_back({"writing", 0.4 * all});
+  return stages;
+}
+
+// The same for what is left once a log turned out to have no odometry.
+void PlanMatching(const std::vector<double>& sizes,
+                  const LogSolverOptions& options, RunClock* clock) {
+  std::vector<WorkStage> stages = StagesOfLogs(sizes, options);
+  stages.insert(stages.begin(), {kMatchingStep, 1.0});
+  clock->bar().Plan(std::move(stages));
 }
 
 // A hierarchy that does not fit what logs are made of is refused before the log
@@ -490,20 +539,17 @@ CheckpointFile::Identity IdentityOfRun(const Log& log) {
   return identity;
 }
 
-// Bars and lines on the way through one log or several.
+// The bar and lines on the way through one log or several.
 class SolvingProgress {
  public:
   // `clock` is told of the steps; it has to outlive this.
   explicit SolvingProgress(RunClock* clock) : clock_(*clock) {}
 
   // A log begins.
-  void BeginLog(const std::string& title, std::size_t num_scans) {
+  void BeginLog(const std::string& title) {
     clock_.Begin("scans");
-    // One bar at a time.
-    finishing_.reset();
-    taking_scans_.reset();
-    taking_scans_ = std::make_unique<Progress>(
-        title, "scans", static_cast<std::int64_t>(num_scans));
+    clock_.bar().SetTitle(title);
+    is_finishing_ = false;
   }
 
   // For a solver; this has to stay while it runs.
@@ -513,7 +559,7 @@ class SolvingProgress {
       TakeScan(done, total);
     };
     control.stop = [this] {
-      if (finishing_ != nullptr) finishing_->Update(++steps_);
+      if (is_finishing_) clock_.bar().Update();
       return InterruptRequested();
     };
     control.step = [this](const char* step) {
@@ -525,21 +571,18 @@ class SolvingProgress {
 
  private:
   void TakeScan(std::size_t done, std::size_t total) {
-    taking_scans_->Update(static_cast<std::int64_t>(done));
+    clock_.bar().Update(ShareOf(static_cast<std::int64_t>(done),
+                                static_cast<std::int64_t>(total)));
     if (done % 500 == 0 || done == total) {
       Detail("%zu of %zu scans in %.1f s", done, total, watch_.Seconds());
     }
-    if (done < total) return;
-    taking_scans_->Finish();
-    finishing_ = std::make_unique<Progress>("adjusting", "steps", 0);
+    is_finishing_ = done == total;
   }
 
   RunClock& clock_;
   Stopwatch watch_;
-  std::unique_ptr<Progress> taking_scans_;
-  // What comes after the last scan: its steps are not known beforehand.
-  std::unique_ptr<Progress> finishing_;
-  std::int64_t steps_ = 0;
+  // All scans are in: how many steps are left is not known.
+  bool is_finishing_ = false;
 };
 
 // Solves a log, from where a run that did not end had got to if there is one,
@@ -557,7 +600,7 @@ LogSolverResult RunWithCheckpoints(const Log& log, RunClock* clock,
            FLAGS_output_dir.c_str());
   }
   SolvingProgress progress(clock);
-  progress.BeginLog("solving", log.scans.size());
+  progress.BeginLog("scans");
   RunControl control = progress.Control();
   if (may_write) {
     control.checkpoint = [&](const std::function<std::string()>& make_state) {
@@ -690,15 +733,16 @@ int SolveLog(const LogInput& input, const Registry& registry, RunClock* clock,
   CheckHierarchy(options, registry);
   RemarkOnFlags(input.name, "log", "graphs", GraphFlags());
 
+  clock->bar().Plan(StagesOfLogs({1.0}, options));
   clock->Begin("reading");
   const Stopwatch reading;
-  Log log = ReadInput(input);
+  Log log = ReadInput(input, clock);
   summary.parse_seconds = reading.Seconds();
   TellOfLog(input.name, log, &summary);
   Detail("read %zu scans in %.1f s", log.scans.size(), summary.parse_seconds);
   if (!log.has_odometry) {
-    clock->Begin(kMatchingStep);
-    MatchScansAlone(input.name, options, &log, &summary);
+    PlanMatching({1.0}, options, clock);
+    MatchScansAlone(input.name, options, clock, &log, &summary);
   }
 
   CheckpointFile checkpoint(
@@ -710,6 +754,7 @@ int SolveLog(const LogInput& input, const Registry& registry, RunClock* clock,
   clock->Begin("figures");
   TakeMap(input.name, log.scans, solver, registry, options, result, &outcome);
   WriteOutputs(&outcome, clock, folder);
+  TellEnd(outcome, clock);
   if (!summary.partial) checkpoint.Remove();
   return kExitSuccess;
 }
@@ -807,17 +852,18 @@ std::vector<Summary::LogInput> DescribeLogs(
 std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
                           const LogSolverOptions& options, RunClock* clock,
                           Summary* summary) {
+  clock->bar().Plan(
+      StagesOfLogs(std::vector<double>(inputs.size(), 1.0), options));
   std::vector<Log> logs;
   for (const std::unique_ptr<OpenInput>& input : inputs) {
     const std::string& name = input->log.name;
     clock->Begin("reading");
-    Log log = ReadInput(input->log);
+    Log log = ReadInput(input->log, clock);
     Summary of_log;
     TellOfLog(name, log, &of_log);
     if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
     if (!log.has_odometry) {
-      clock->Begin(kMatchingStep);
-      MatchScansAlone(name, options, &log, &of_log);
+      MatchScansAlone(name, options, clock, &log, &of_log);
     }
     AddNotes(TitleOf(name), of_log, summary);
     logs.push_back(std::move(log));
@@ -830,13 +876,23 @@ SeveralLogsResult RunSeveralLogs(const Registry& registry,
                                  const SeveralLogsOptions& options,
                                  RunClock* clock) {
   std::vector<std::size_t> num_scans;
-  for (const Log& log : logs) num_scans.push_back(log.scans.size());
+  std::size_t scans = 0;
+  for (const Log& log : logs) {
+    num_scans.push_back(log.scans.size());
+    scans += log.scans.size();
+  }
+  // Now the sizes of the logs are known.
+  std::vector<double> sizes;
+  for (const std::size_t number : num_scans) {
+    sizes.push_back(static_cast<double>(number * logs.size()) /
+                    static_cast<double>(scans));
+  }
+  clock->bar().Plan(StagesOfLogs(sizes, options.solver));
   SolvingProgress progress(clock);
   SeveralLogsControl control;
   control.begin_log = [&](std::size_t i) {
-    progress.BeginLog("log " + std::to_string(i + 1) + " of " +
-                          std::to_string(num_scans.size()),
-                      num_scans[i]);
+    progress.BeginLog("scans of log " + std::to_string(i + 1) + " of " +
+                      std::to_string(num_scans.size()));
   };
   control.run = progress.Control();
   return SolveSeveralLogs(registry, std::move(logs), options, control);
@@ -938,12 +994,14 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
   const SeveralLogsResult solved =
       RunSeveralLogs(registry, std::move(logs), options, clock);
   if (solved.interrupted) {
+    clock->bar().Finish();
     std::fprintf(stderr,
                  "interrupted: the logs are not put together, nothing is "
                  "written\n");
     return kExitInterrupted;
   }
   if (solved.is_elsewhere) {
+    clock->bar().Finish();
     TellElsewhere(inputs, solved);
     return kExitElsewhere;
   }
@@ -969,6 +1027,7 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
             &outcome);
     if (m == 0) {
       WriteOutputs(&outcome, clock, folder);
+      TellEnd(outcome, clock);
       continue;
     }
     OutputFolder apart(std::filesystem::path(FLAGS_output_dir) / FolderOfMap(m),
@@ -980,10 +1039,11 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
 
 // Reads a graph; nothing when that was interrupted.
 std::optional<G2oFile> ReadGraph(InputStream* input, const Registry& registry,
-                                 Graph* graph) {
-  const ReadingProgress progress(input);
+                                 RunClock* clock, Graph* graph) {
+  const ReadingProgress progress(input, clock);
   std::istringstream text(input->ReadRest());
   if (InterruptRequested()) {
+    clock->bar().Finish();
     std::fprintf(stderr, "interrupted: the graph is not read whole\n");
     return std::nullopt;
   }
@@ -1040,10 +1100,14 @@ int SolveGraph(InputStream* input, const Registry& registry, RunClock* clock,
   const GraphSolverOptions options = GraphSolverOptionsFromFlags(registry);
   RemarkOnFlags(input->name(), "graph", "logs", LogFlags());
 
+  clock->bar().Plan({{"reading", 0.5},
+                     {"first guess", 0.1},
+                     {"solving", 1.0},
+                     {"writing", 0.3}});
   clock->Begin("reading");
   const Stopwatch reading;
   Graph graph;
-  const std::optional<G2oFile> g2o = ReadGraph(input, registry, &graph);
+  const std::optional<G2oFile> g2o = ReadGraph(input, registry, clock, &graph);
   if (!g2o) return kExitInterrupted;
   summary.parse_seconds = reading.Seconds();
   for (const auto& tag : g2o->unknown_tags) {
@@ -1068,11 +1132,9 @@ int SolveGraph(InputStream* input, const Registry& registry, RunClock* clock,
   GraphSolverResult result;
   {
     clock->Begin("solving");
-    Progress progress("solving", "steps", 0);
-    std::int64_t steps = 0;
     result = solver.Run(
-        [&] {
-          progress.Update(++steps);
+        [clock] {
+          clock->bar().Update();
           return InterruptRequested();
         },
         TellPhase);
@@ -1099,6 +1161,7 @@ int SolveGraph(InputStream* input, const Registry& registry, RunClock* clock,
   };
   outcome.title = TitleOf(input->name());
   WriteOutputs(&outcome, clock, folder);
+  TellEnd(outcome, clock);
   return kExitSuccess;
 }
 

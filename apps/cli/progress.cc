@@ -9,7 +9,9 @@
 #include <cstdio>
 #include <utility>
 
-DEFINE_bool(quiet, false, "Print errors only: no progress bars and no remarks");
+DEFINE_bool(quiet, false,
+            "Print errors only: no progress bar (there is one on a terminal "
+            "only), no remarks, no closing lines");
 DEFINE_bool(verbose, false, "Print what is being done, a line a step");
 
 namespace plumbline {
@@ -21,6 +23,8 @@ constexpr double kInterval = 0.2;
 
 // There is a bar on the terminal.
 bool bar_is_shown = false;
+// A bar over all stages is alive.
+bool work_is_shown = false;
 
 void WipeBar() {
   if (!bar_is_shown) return;
@@ -122,7 +126,7 @@ Progress::Progress(std::string title, std::string unit, std::int64_t total)
     : title_(std::move(title)),
       unit_(std::move(unit)),
       total_(total),
-      enabled_(!FLAGS_quiet && isatty(STDERR_FILENO) != 0) {}
+      enabled_(!FLAGS_quiet && !work_is_shown && isatty(STDERR_FILENO) != 0) {}
 
 Progress::~Progress() { Finish(); }
 
@@ -142,6 +146,113 @@ void Progress::Update(std::int64_t done) {
 }
 
 void Progress::Finish() {
+  if (!visible_) return;
+  WipeBar();
+  std::fflush(stderr);
+  visible_ = false;
+}
+
+void WorkEstimate::Plan(std::vector<WorkStage> stages) {
+  left_ = std::move(stages);
+}
+
+void WorkEstimate::Begin(const std::string& title, double seconds) {
+  const auto next = std::find_if(
+      left_.begin(), left_.end(),
+      [&title](const WorkStage& stage) { return stage.title == title; });
+  if (next == left_.end()) return;
+  // What was passed over was not done: it is no part of the work any more.
+  weight_before_ += present_.weight;
+  present_ = *next;
+  left_.erase(left_.begin(), next + 1);
+  begin_ = seconds;
+}
+
+double WorkEstimate::Done(double seconds, double share) {
+  if (share < 0.0) {
+    // As fast as before; where nothing was before, nothing can be said.
+    const double expected =
+        weight_before_ > 0.0 ? begin_ * present_.weight / weight_before_ : 0.0;
+    const double passed =
+        expected > 0.0 ? std::max(0.0, seconds - begin_) / expected : 0.0;
+    constexpr double kEven = 0.7;
+    share =
+        passed <= kEven
+            ? passed
+            : 1.0 - (1.0 - kEven) * std::exp(-(passed - kEven) / (1.0 - kEven));
+  }
+  double total = weight_before_ + present_.weight;
+  for (const WorkStage& stage : left_) total += stage.weight;
+  if (!(total > 0.0)) return last_;
+  const double done =
+      (weight_before_ + present_.weight * std::clamp(share, 0.0, 1.0)) / total;
+  last_ = std::clamp(done, last_, 1.0);
+  return last_;
+}
+
+std::string WorkLine(const std::string& title, double done, double seconds,
+                     int columns) {
+  std::string line;
+  if (!(done > 0.0)) {
+    line = title + ", " + FormatDuration(seconds);
+  } else {
+    std::string numbers;
+    // The first few percent say little about the rest.
+    if (done >= 0.02) {
+      numbers = ", " + FormatDuration(seconds * (1.0 - done) / done) + " left";
+    }
+    char percent[16];
+    std::snprintf(percent, sizeof(percent), "%3d%%",
+                  static_cast<int>(100.0 * std::min(done, 1.0)));
+    const int room =
+        columns - static_cast<int>(title.size() + numbers.size()) - 8;
+    const int width = std::min(30, room);
+    std::string bar;
+    if (width >= 5) {
+      const int filled = static_cast<int>(std::min(done, 1.0) * width);
+      bar = "[" + std::string(filled, '=') + std::string(width - filled, ' ') +
+            "] ";
+    }
+    line = title + " " + bar + percent + numbers;
+  }
+  line.resize(
+      std::min(line.size(), static_cast<std::size_t>(std::max(columns, 0))));
+  return line;
+}
+
+WorkProgress::WorkProgress()
+    : enabled_(!FLAGS_quiet && isatty(STDERR_FILENO) != 0) {
+  work_is_shown = true;
+}
+
+WorkProgress::~WorkProgress() { Finish(); }
+
+void WorkProgress::Plan(std::vector<WorkStage> stages) {
+  estimate_.Plan(std::move(stages));
+}
+
+void WorkProgress::Begin(const std::string& title) {
+  title_ = title;
+  estimate_.Begin(title, watch_.Seconds());
+}
+
+void WorkProgress::Update(double share) {
+  if (!enabled_) return;
+  const double elapsed = watch_.Seconds();
+  if (elapsed < kPatience) return;
+  if (visible_ && elapsed - last_shown_ < kInterval) return;
+  const std::string line = WorkLine(title_, estimate_.Done(elapsed, share),
+                                    elapsed, TerminalColumns() - 1);
+  std::fprintf(stderr, "\r\033[K%s", line.c_str());
+  std::fflush(stderr);
+  visible_ = true;
+  bar_is_shown = true;
+  last_shown_ = elapsed;
+}
+
+void WorkProgress::Finish() {
+  work_is_shown = false;
+  enabled_ = false;
   if (!visible_) return;
   WipeBar();
   std::fflush(stderr);

@@ -192,8 +192,8 @@ TEST_F(TerminalTest, BarOnATerminal) {
   WriteSlowly(&process);
   EXPECT_EQ(process.Wait(), 0) << process.output();
   const std::string& output = process.output();
-  EXPECT_THAT(output, HasSubstr("\r\033[Kreading "));
-  EXPECT_THAT(output, HasSubstr(" kB/s"));
+  // How much there is to read of a pipe is not known.
+  EXPECT_THAT(output, HasSubstr("\r\033[Kreading, 1 s"));
   // Nothing of it is left, and no line was longer than the terminal.
   EXPECT_EQ(output.substr(output.size() - 4), "\r\033[K");
   std::size_t width = 0;

@@ -55,6 +55,64 @@ TEST(ProgressLineTest, LongTimesInMinutesAndHours) {
             "T   1% 1/91, 0.0 s/s, 2 h 30 min left");
 }
 
+TEST(WorkEstimateTest, KnownSharesCountByWeight) {
+  WorkEstimate work;
+  work.Plan({{"reading", 10.0}, {"solving", 80.0}, {"writing", 10.0}});
+  EXPECT_EQ(work.Done(0.5, 0.5), 0.0);
+  work.Begin("reading", 1.0);
+  EXPECT_DOUBLE_EQ(work.Done(1.0, 0.5), 0.05);
+  work.Begin("solving", 2.0);
+  EXPECT_DOUBLE_EQ(work.Done(3.0, 0.25), 0.3);
+  // A step of no stage is part of the present one.
+  work.Begin("other", 4.0);
+  EXPECT_DOUBLE_EQ(work.Done(4.0, 0.5), 0.5);
+  work.Begin("writing", 10.0);
+  EXPECT_DOUBLE_EQ(work.Done(11.0, 1.0), 1.0);
+}
+
+TEST(WorkEstimateTest, UnknownSharesAdvanceAsWorkDidBefore) {
+  WorkEstimate work;
+  work.Plan({{"a", 50.0}, {"b", 50.0}});
+  work.Begin("a", 0.0);
+  // Nothing was before: nothing can be said.
+  EXPECT_EQ(work.Done(5.0), 0.0);
+  work.Begin("b", 10.0);
+  EXPECT_NEAR(work.Done(15.0), 0.75, 1e-12);
+  // Late: it goes on, and never ends.
+  const double late = work.Done(20.0);
+  EXPECT_GT(late, 0.85);
+  EXPECT_LT(late, 1.0);
+  EXPECT_GT(work.Done(40.0), late);
+  EXPECT_LE(work.Done(60.0), 1.0);
+}
+
+TEST(WorkEstimateTest, NeverGoesBackAndLeavesOutWhatIsPassedOver) {
+  WorkEstimate work;
+  work.Plan({{"a", 10.0}, {"b", 10.0}, {"c", 80.0}, {"b", 10.0}});
+  work.Begin("a", 0.0);
+  EXPECT_DOUBLE_EQ(work.Done(1.0, 1.0), 10.0 / 110.0);
+  work.Begin("c", 3.0);
+  EXPECT_DOUBLE_EQ(work.Done(3.0, 0.0), 0.1);
+  work.Begin("a", 4.0);
+  EXPECT_DOUBLE_EQ(work.Done(4.0, 0.5), 0.5);
+  work.Begin("b", 5.0);
+  EXPECT_DOUBLE_EQ(work.Done(5.0, 0.0), 0.9);
+  // More work than was known: it waits.
+  work.Plan({{"d", 900.0}});
+  EXPECT_DOUBLE_EQ(work.Done(6.0, 0.5), 0.9);
+}
+
+TEST(WorkLineTest, FitsAndTellsTheTimeLeft) {
+  EXPECT_EQ(WorkLine("solving", 0.25, 10.0, 60),
+            "solving [=======                       ]  25%, 30 s left");
+  EXPECT_EQ(WorkLine("solving", 0.01, 10.0, 60),
+            "solving [                              ]   1%");
+  EXPECT_EQ(WorkLine("reading", 0.0, 12.0, 60), "reading, 12 s");
+  EXPECT_LE(
+      WorkLine("joint adjustment of poses and walls", 0.5, 10.0, 40).size(),
+      40u);
+}
+
 TEST(RemarkTest, QuietAndVerbose) {
   gflags::FlagSaver saver;
   const auto print = [] {

@@ -1,0 +1,97 @@
+#include <gtest/gtest.h>
+#include <plumbline/detectors/builtins.h>
+#include <plumbline/outputs/closing_lines.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+class ClosingLinesTest : public ::testing::Test {
+ protected:
+  ClosingLinesTest() {
+    RegisterBuiltins(&registry_);
+    Transaction transaction;
+    Feature wall;
+    wall.type = &registry_.GetFeature("segment");
+    wall.extent_end = 8.0;
+    const FeatureId first = transaction.AddFeature(wall);
+    wall.parameters[0] = 9.0;
+    wall.extent_end = 2.0;
+    const FeatureId second = transaction.AddFeature(wall);
+    Feature direction;
+    direction.type = &registry_.GetFeature("orientation");
+    direction.level = 1;
+    direction.is_virtual = true;
+    const FeatureId orientation = transaction.AddFeature(direction);
+    Constraint tie;
+    tie.type = &registry_.GetRelation("segment_orientation");
+    tie.expected = Eigen::VectorXd::Zero(1);
+    tie.information = Eigen::MatrixXd::Identity(1, 1);
+    tie.kind = ConstraintClass::kStructure;
+    tie.features = {first, orientation};
+    transaction.AddConstraint(tie);
+    tie.features = {second, orientation};
+    transaction.AddConstraint(tie);
+    graph_.Apply(std::move(transaction));
+    outcome_.graph = &graph_;
+    outcome_.registry = &registry_;
+    outcome_.summary.em_termination = EmTermination::kConvergence;
+  }
+
+  void Break(ConstraintId id) {
+    Transaction transaction;
+    transaction.BreakConstraint(id);
+    graph_.Apply(std::move(transaction));
+  }
+
+  Registry registry_;
+  Graph graph_;
+  SolveOutcome outcome_;
+};
+
+TEST_F(ClosingLinesTest, NothingToLookAt) {
+  EXPECT_EQ(ClosingLines(outcome_, "out"),
+            (std::vector<std::string>{"out: 2 walls, 1 shared direction"}));
+  outcome_.summary.files = {"map.svg", "report.html"};
+  EXPECT_EQ(ClosingLines(outcome_, "out/"),
+            (std::vector<std::string>{"out/: 2 walls, 1 shared direction",
+                                      "open out/report.html"}));
+}
+
+TEST_F(ClosingLinesTest, WhatIsWorthALook) {
+  outcome_.summary.closures = {5, 3, 2};
+  outcome_.summary.em_termination = EmTermination::kNoConvergence;
+  outcome_.summary.tracking.loose = {{1.0, 2.0, "lost"}};
+  // The short wall says little.
+  Break(0);
+  Break(1);
+  outcome_.summary.files = {"map.png"};
+  EXPECT_EQ(
+      ClosingLines(outcome_, "out"),
+      (std::vector<std::string>{
+          "out: 2 walls, 1 shared direction, 3 closures (2 broken)",
+          "worth a look: the search for structure did not converge, the map "
+          "hangs by a thread in 1 place, 1 long wall off every direction (up "
+          "to 8.0 m)",
+          "open out/map.png"}));
+  outcome_.summary.partial = true;
+  EXPECT_NE(ClosingLines(outcome_, "out")[1].find("the run was interrupted"),
+            std::string::npos);
+}
+
+// A wall that has another direction in its place is fine.
+TEST_F(ClosingLinesTest, ADirectionInPlaceOfTheOneThatWasBroken) {
+  Break(0);
+  Transaction transaction;
+  Constraint again = graph_.GetConstraint(1);
+  again.features[0] = 0;
+  transaction.AddConstraint(again);
+  graph_.Apply(std::move(transaction));
+  EXPECT_EQ(ClosingLines(outcome_, "out").size(), 1u);
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -235,7 +235,8 @@ void TellEnd(const SolveOutcome& outcome, RunClock* clock) {
 
 // All files that the run reads, as far as flags name them.
 std::vector<std::filesystem::path> InputFiles() {
-  std::vector<std::filesystem::path> files = {FLAGS_structure_prior, FLAGS_map};
+  std::vector<std::filesystem::path> files = {FLAGS_structure_prior, FLAGS_map,
+                                              FLAGS_plan, FLAGS_constraints};
   for (const std::string& input : InputsFromFlags()) {
     files.emplace_back(input == "-" ? "/dev/stdin" : input);
   }
@@ -515,9 +516,11 @@ CheckpointFile::Identity IdentityOfRun(const Log& log) {
   while (std::getline(plugins, plugin, ',')) {
     identity["the digest of " + plugin] = Sha256OfFile(plugin);
   }
-  if (!FLAGS_structure_prior.empty()) {
-    identity["the structure prior's digest"] =
-        Sha256OfFile(FLAGS_structure_prior);
+  for (const auto& [what, file] :
+       {std::make_pair("the structure prior's digest", &FLAGS_structure_prior),
+        std::make_pair("the plan's digest", &FLAGS_plan),
+        std::make_pair("the digest of the constraints", &FLAGS_constraints)}) {
+    if (!file->empty()) identity[what] = Sha256OfFile(*file);
   }
   const std::set<std::string> without_effect = {"input",
                                                 "output_dir",
@@ -629,6 +632,10 @@ void TellOfTrack(const std::string& name, const std::vector<Scan>& scans,
     if (!part.found) ++summary->tracking.pieces;
     Remark("%s: the map hangs by a thread, %.3f s to %.3f s: %s", name.c_str(),
            begin.timestamp, end.timestamp, part.why.c_str());
+  }
+  for (const std::string& note : result.notes) {
+    summary->notes.push_back(note);
+    Remark("%s: %s", name.c_str(), PrintableUtf8(note).c_str());
   }
   if (result.second_map_refused) {
     summary->notes.push_back(

@@ -7,6 +7,7 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/text_file.h>
 #include <plumbline/detectors/structure_prior.h>
+#include <plumbline/pipeline/plan_dxf.h>
 
 #include <charconv>
 #include <cmath>
@@ -34,6 +35,20 @@ DEFINE_string(
 DEFINE_bool(localize, false,
             "Only find --input in --map, which stays as it is: "
             "trajectory.tum has the poses in its frame");
+DEFINE_string(plan, "",
+              "Drawing of the building (DXF as text): walls of the map that "
+              "agree with its lines are tied to them, and let go where the "
+              "measurements contradict the plan. It may lie anywhere");
+DEFINE_string(
+    plan_layers, "",
+    "Layers of --plan, separated by commas; WALL* stands for all that "
+    "begin so. Empty: WALL* and A-WALL*");
+DEFINE_double(plan_sigma, 0.03,
+              "Tolerance of a wall against its line of --plan, m");
+PLUMBLINE_FLAG_RANGE(plan_sigma, 0.001, 1);
+DEFINE_string(constraints, "",
+              "File of what is known of walls: which are one, how far apart, "
+              "parallel or at right angles");
 DEFINE_string(
     start_pose, "",
     "Where the first scan of a log is in the frame of the first "
@@ -359,6 +374,8 @@ std::vector<FlagGroup> SolveFlagGroups() {
       {"Input and output",
        {"input", "output_dir", "log_reader", "map", "localize", "start_pose",
         "outputs", "align", "grid_resolution"}},
+      {"Known beforehand",
+       {"plan", "plan_layers", "plan_sigma", "constraints"}},
       {"Graphs", GraphFlags()},
       {"Uncertainty", {"marginals", "marginals_hold_gauge", "ellipse_sigmas"}},
       {"Structure",
@@ -390,6 +407,10 @@ std::vector<std::string> GraphFlags() {
 
 std::vector<std::string> LogFlags() {
   return {"align",
+          "plan",
+          "plan_layers",
+          "plan_sigma",
+          "constraints",
           "map",
           "localize",
           "grid_resolution",
@@ -409,6 +430,44 @@ std::vector<std::string> LogFlags() {
           "scan_topic",
           "odometry_topic"};
 }
+
+namespace {
+
+constexpr std::size_t kLargestPlan = std::size_t{1} << 28;
+constexpr std::size_t kLargestConstraints = std::size_t{1} << 20;
+
+void TakeKnownStructureFlags(LogSolverOptions* options) {
+  KnownStructure& known = options->known;
+  known.plan_sigma_offset = FLAGS_plan_sigma;
+  for (const std::string* file : {&FLAGS_plan, &FLAGS_constraints}) {
+    if (file->empty() ||
+        (options->structure && options->features == RawFeatures::kSegments &&
+         options->refine == Refinement::kFull)) {
+      continue;
+    }
+    throw Error(file == &FLAGS_plan ? "--plan" : "--constraints", 0,
+                "does not go with --structure=false, --features=points, "
+                "--refine=map or --refine=none",
+                "structure, segments and full refinement");
+  }
+  if (!FLAGS_plan.empty()) {
+    std::vector<std::string> layers;
+    std::istringstream list(FLAGS_plan_layers);
+    std::string layer;
+    while (std::getline(list, layer, ',')) {
+      if (!layer.empty()) layers.push_back(layer);
+    }
+    known.plan = ReadPlanDxf(ReadTextFile(FLAGS_plan, kLargestPlan), FLAGS_plan,
+                             layers, &known.notes);
+  }
+  if (!FLAGS_constraints.empty()) {
+    known.statements =
+        ReadWallStatements(ReadTextFile(FLAGS_constraints, kLargestConstraints),
+                           FLAGS_constraints);
+  }
+}
+
+}  // namespace
 
 LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   LogSolverOptions options;
@@ -430,6 +489,7 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
         &options.detector_parameters);
   }
   TakeFrontEndFlags(&options);
+  TakeKnownStructureFlags(&options);
   return options;
 }
 

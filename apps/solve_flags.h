@@ -19,6 +19,8 @@ DECLARE_string(input);
 DECLARE_string(output_dir);
 DECLARE_string(log_reader);
 DECLARE_string(map);
+DECLARE_string(plan);
+DECLARE_string(constraints);
 DECLARE_bool(localize);
 DECLARE_string(start_pose);
 DECLARE_string(outputs);

@@ -30,6 +30,9 @@ constexpr std::size_t kScansAhead = 64;
 // lost what the scans show, and is no better.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
 
+// Rounds of binding walls to a plan, with EM after each.
+constexpr int kPlanRounds = 6;
+
 // How well a wall of glimpses is known relative to the place that saw it, m
 // and rad.
 constexpr double kGlimpsedPosition = 0.03;
@@ -796,10 +799,23 @@ void LogSolver::FindStructureAgain(Context* context) {
   options.break_share = options_.closing_break_share;
   ReplaceEm(options_.structure ? MakeDetectors(hierarchy) : Hierarchy(),
             options);
+  KnownStructureBinder known(options_.known, registry_, context->places.front(),
+                             graph_.get());
+  if (options_.structure) known.AddStatements();
   RunEm(context);
+  if (options_.structure) TieToPlan(&known, context);
   context->IsStopped();
   result.final_cost = session_->Cost();
   TakeTrajectory(context);
+}
+
+// Walls that lie near the plan pull others near.
+void LogSolver::TieToPlan(KnownStructureBinder* known, Context* context) {
+  for (int round = 0; round < kPlanRounds && !context->IsStopped(); ++round) {
+    if (known->TieToPlan(context->control.stop) == 0) break;
+    RunEm(context);
+  }
+  context->result.notes = known->Notes();
 }
 
 void LogSolver::TakeTrajectory(Context* context) const {

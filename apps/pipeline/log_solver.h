@@ -17,6 +17,7 @@
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/wall_completion.h>
+#include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/raw_features.h>
 #include <plumbline/pipeline/run_control.h>
 
@@ -81,6 +82,9 @@ struct LogSolverOptions {
   /// visits, and report those that contradict it.
   bool check_map = true;
   MapCheckOptions check;
+  /// What is known of the building beforehand; needs structure and full
+  /// refinement of segments.
+  KnownStructure known;
   /// Scans after which a run can be gone on with before all are in: EM and the
   /// minimizer start anew there, and what was broken may be proposed again. 0:
   /// never.
@@ -141,6 +145,8 @@ struct LogSolverResult {
   /// which the options' distances were larger for it.
   double range_sigma = 0.0;
   double noise_scale = 1.0;
+  /// What became of LogSolverOptions::known, for people.
+  std::vector<std::string> notes;
 };
 
 /// Whether poses are recovered once all scans are in (pose_recovery.h): the map
@@ -293,6 +299,7 @@ class LogSolver {
   // The first map stands.
   void ReturnToFirstMap(Context* context);
   void FindStructureAgain(Context* context);
+  void TieToPlan(KnownStructureBinder* known, Context* context);
   // Tells what hangs loosely, or contradicts the rest of the map.
   void CheckMap(Context* context) const;
 

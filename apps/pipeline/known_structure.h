@@ -1,0 +1,137 @@
+#ifndef PLUMBLINE_PIPELINE_KNOWN_STRUCTURE_H_
+#define PLUMBLINE_PIPELINE_KNOWN_STRUCTURE_H_
+
+#include <plumbline/core/feature.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/core/registry.h>
+#include <plumbline/factors/pose2.h>
+
+#include <Eigen/Core>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+
+/// A straight line of a plan, m, frame of the plan.
+struct PlanLine {
+  Eigen::Vector2d begin = Eigen::Vector2d::Zero();
+  Eigen::Vector2d end = Eigen::Vector2d::Zero();
+  std::string layer;
+};
+
+/// What somebody says of two walls.
+struct WallStatement {
+  enum class Kind {
+    /// They lie on one line.
+    kSame,
+    /// They are parallel, so far apart.
+    kDistance,
+    kParallel,
+    kRightAngle,
+  };
+  Kind kind = Kind::kSame;
+  /// Points by which the walls are named, m, map frame: each is the wall
+  /// nearest to its point.
+  Eigen::Vector2d first = Eigen::Vector2d::Zero();
+  Eigen::Vector2d second = Eigen::Vector2d::Zero();
+  /// Of kDistance, m.
+  double distance = 0.0;
+  /// Tolerances, m and rad.
+  double sigma_offset = 0.02;
+  double sigma_angle = DegToRad(0.3);
+  /// True: counts as a measurement, and is never broken.
+  bool is_hard = false;
+  /// "walls.txt:3", for messages.
+  std::string place;
+};
+
+/// What is known of a building beforehand.
+struct KnownStructure {
+  std::vector<PlanLine> plan;
+  std::vector<WallStatement> statements;
+  /// What was taken for granted in reading them, for people.
+  std::vector<std::string> notes;
+  /// Tolerances of a wall against its line of the plan, m and rad.
+  double plan_sigma_offset = 0.03;
+  double plan_sigma_angle = DegToRad(0.3);
+  /// p-value below which a wall is let go from its line, or a statement is
+  /// broken.
+  double break_below = 0.01;
+  /// A wall may lie so far from its line when it is tied to it, m and rad: a
+  /// line that is wrong by less is tied, and breaks.
+  double max_offset = 0.6;
+  double max_angle = DegToRad(4.0);
+  /// What it takes to believe a place of the plan: length of walls that lie on
+  /// lines, m, their share of the length of all walls, and the share of that
+  /// which a second place may have at most.
+  double min_agreeing_length = 8.0;
+  double min_agreeing_share = 0.4;
+  double rival_share = 0.85;
+};
+
+/// Reads statements: a line each, # begins a comment. Points are x,y in the map
+/// frame, m.
+///
+///     same 1.5,2 30,2.1             the walls at these points are one
+///     distance 1.5,2 1.5,14.4 12.40 they are parallel, 12.40 m apart
+///     parallel 1.5,2 8,14
+///     right_angle 1.5,2 8,14
+///
+/// and behind it, in any order, `sigma=0.05` (m), `sigma_deg=1` and `hard`.
+/// Throws Error with file and line.
+std::vector<WallStatement> ReadWallStatements(const std::string& text,
+                                              const std::string& name);
+
+/// Puts what is known into the map of a log: hypotheses like those of the
+/// detectors, weighed and broken by EM where measurements contradict them.
+///
+/// The plan is a rigid body with a pose of its own: each wall of the map that
+/// lies near a line of it is bound to that pose (pose_segment_collinearity), so
+/// that the plan bends the map and is not bent by it. Where the plan lies is
+/// found without a guess: walls of a part of the map after the other are looked
+/// for in it over the full circle, and the place that most walls agree with
+/// counts.
+class KnownStructureBinder {
+ public:
+  /// `first_pose`: the feature that fixes the map frame. All must outlive this.
+  KnownStructureBinder(const KnownStructure& known, const Registry& registry,
+                       FeatureId first_pose, Graph* graph);
+
+  /// Adds the statements.
+  void AddStatements();
+
+  /// Binds walls that lie near lines of the plan, which it places first, to
+  /// them, but for pairs that were bound before. Returns how many.
+  int TieToPlan(const std::function<bool()>& stop = nullptr);
+
+  /// What became of it, for people: sentences without a full stop.
+  std::vector<std::string> Notes() const;
+
+ private:
+  struct Wall;
+  std::vector<Wall> Walls() const;
+  const Wall* WallAt(const std::vector<Wall>& walls,
+                     const Eigen::Vector2d& point) const;
+  // Pose of the plan's frame in the map's, or why there is none.
+  std::optional<Pose2> PlacePlan(const std::function<bool()>& stop);
+
+  const KnownStructure& known_;
+  const Registry& registry_;
+  FeatureId first_pose_;
+  Graph* graph_;
+  FeatureId plan_pose_ = kNoId;
+  bool was_placed_ = false;
+  // By wall and line.
+  std::map<std::pair<FeatureId, std::size_t>, ConstraintId> ties_;
+  // By statement; kNoId where there is no such wall.
+  std::vector<ConstraintId> statements_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PIPELINE_KNOWN_STRUCTURE_H_

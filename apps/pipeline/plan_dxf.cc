@@ -1,0 +1,294 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/number_text.h>
+#include <plumbline/core/utf8.h>
+#include <plumbline/pipeline/plan_dxf.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <string_view>
+
+namespace plumbline {
+namespace {
+
+constexpr double kLeastLength = 0.3;
+constexpr std::size_t kMostLines = 20000;
+constexpr double kAbsurdCoordinate = 1e7;
+constexpr int kShownLayers = 20;
+
+// $INSUNITS in metres; 0 for what no building is drawn in.
+double Unit(int code) {
+  constexpr std::array<double, 15> kUnits = {1.0,    0.0254, 0.3048, 0.0,  1e-3,
+                                             1e-2,   1.0,    1e3,    0.0,  0.0,
+                                             0.9144, 0.0,    1e-9,   1e-6, 0.1};
+  return code >= 0 && code < static_cast<int>(kUnits.size())
+             ? kUnits[static_cast<std::size_t>(code)]
+             : 0.0;
+}
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+bool Selects(const std::string& pattern, const std::string& layer) {
+  const std::string low = Lower(pattern);
+  if (!low.empty() && low.back() == '*') {
+    return Lower(layer).compare(0, low.size() - 1, low, 0, low.size() - 1) == 0;
+  }
+  return Lower(layer) == low;
+}
+
+// Pairs of lines: a code and a value.
+class DxfReader {
+ public:
+  DxfReader(const std::string& text, const std::string& name,
+            const std::vector<std::string>& layers)
+      : text_(text), name_(name), layers_(layers) {
+    if (layers_.empty()) layers_ = {"WALL*", "A-WALL*"};
+  }
+
+  std::vector<PlanLine> Read(std::vector<std::string>* notes) {
+    if (text_.compare(0, 18, "AutoCAD Binary DXF") == 0) {
+      throw Error(name_, 0, "is a binary DXF", "a DXF saved as text");
+    }
+    if (text_.compare(0, 4, "AC10") == 0) {
+      throw Error(name_, 0, "is a DWG", "a DXF saved as text");
+    }
+    std::string section;
+    bool has_ended = false;
+    while (!has_ended && Next()) {
+      if (code_ == 0) {
+        EndEntity();
+        entity_ = value_;
+        if (entity_ == "ENDSEC") section.clear();
+        has_ended = entity_ == "EOF";
+        BeginEntity(section == "ENTITIES");
+      } else if (code_ == 2 && entity_ == "SECTION") {
+        section = value_;
+        has_sections_ = true;
+      } else if (section == "HEADER") {
+        if (code_ == 9) variable_ = value_;
+        if (code_ == 70 && variable_ == "$INSUNITS") ReadUnit();
+      } else if (is_entity_) {
+        TakeGroup();
+      }
+    }
+    EndEntity();
+    if (!has_sections_) Refuse("has no sections", "a drawing (DXF)");
+    if (lines_.empty()) {
+      throw Error(
+          name_, 0,
+          "has no lines on the layers that are read; it has " + Layers(),
+          "--plan_layers with some of these");
+    }
+    for (PlanLine& line : lines_) {
+      line.begin *= unit_;
+      line.end *= unit_;
+    }
+    const auto is_short = [](const PlanLine& line) {
+      return (line.end - line.begin).norm() < kLeastLength;
+    };
+    lines_.erase(std::remove_if(lines_.begin(), lines_.end(), is_short),
+                 lines_.end());
+    if (lines_.empty()) {
+      throw Error(name_, 0, "has lines of less than 0.3 m only",
+                  "walls, and the drawing's unit in $INSUNITS");
+    }
+    if (notes != nullptr) {
+      if (!has_unit_) {
+        notes->push_back("the plan says no unit: it is taken for metres");
+      }
+      if (inserts_ > 0) {
+        notes->push_back(std::to_string(inserts_) +
+                         " blocks of the plan are not read");
+      }
+    }
+    return std::move(lines_);
+  }
+
+ private:
+  [[noreturn]] void Refuse(const std::string& what,
+                           const std::string& expected) const {
+    throw Error(name_, line_, what, expected);
+  }
+
+  bool NextLine(std::string* line) {
+    if (at_ >= text_.size()) return false;
+    const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+    std::string_view view(text_.data() + at_, end - at_);
+    at_ = end + 1;
+    ++line_;
+    while (!view.empty() &&
+           std::isspace(static_cast<unsigned char>(view.front()))) {
+      view.remove_prefix(1);
+    }
+    while (!view.empty() &&
+           std::isspace(static_cast<unsigned char>(view.back()))) {
+      view.remove_suffix(1);
+    }
+    line->assign(view);
+    return true;
+  }
+
+  bool Next() {
+    std::string code;
+    if (!NextLine(&code)) return false;
+    // Some writers end with empty lines.
+    if (code.empty() &&
+        text_.find_first_not_of(" \r\n", at_) == std::string::npos) {
+      return false;
+    }
+    if (!ParseNumber(std::string_view(code), &code_)) {
+      Refuse("'" + PrintableUtf8(code.substr(0, 40)) + "' is no group code",
+             "a drawing (DXF): a line with a whole number before every value");
+    }
+    if (!NextLine(&value_)) Refuse("breaks off", "a whole drawing (DXF)");
+    return true;
+  }
+
+  double Number() const {
+    double number = 0.0;
+    if (!ParseNumber(std::string_view(value_), &number) ||
+        !(std::abs(number) < 1e12)) {
+      Refuse("'" + PrintableUtf8(value_.substr(0, 40)) + "' is no coordinate",
+             "a number");
+    }
+    return number;
+  }
+
+  void ReadUnit() {
+    int code = 0;
+    if (!ParseNumber(std::string_view(value_), &code) || Unit(code) == 0.0) {
+      Refuse("'" + PrintableUtf8(value_.substr(0, 40)) +
+                 "' is no unit of a building",
+             "$INSUNITS of metres (6), millimetres (4), feet (2), ...");
+    }
+    unit_ = Unit(code);
+    has_unit_ = code != 0;
+  }
+
+  void BeginEntity(bool is_entity) {
+    is_entity_ = is_entity;
+    if (entity_ == "VERTEX" || entity_ == "SEQEND") return;
+    is_paper_ = is_closed_ = false;
+    layer_.clear();
+    points_.clear();
+    bulges_.clear();
+  }
+
+  void TakeGroup() {
+    const bool is_vertex = entity_ == "VERTEX";
+    if (code_ == 8 && !is_vertex) layer_ = value_;
+    if (code_ == 67) is_paper_ = value_ == "1";
+    const bool is_line = entity_ == "LINE";
+    const bool is_polyline = entity_ == "LWPOLYLINE";
+    if (code_ == 70 && (is_polyline || entity_ == "POLYLINE")) {
+      int flags = 0;
+      ParseNumber(std::string_view(value_), &flags);
+      is_closed_ = (flags & 1) != 0;
+      // A mesh is no line.
+      if ((flags & 80) != 0) is_paper_ = true;
+    }
+    if (!is_line && !is_polyline && !is_vertex) return;
+    if (code_ == 10 || (code_ == 11 && is_line)) {
+      points_.emplace_back(Number(), 0.0);
+      bulges_.push_back(0.0);
+    } else if ((code_ == 20 || (code_ == 21 && is_line)) && !points_.empty()) {
+      points_.back().y() = Number();
+    } else if (code_ == 42 && !bulges_.empty()) {
+      bulges_.back() = Number();
+    }
+    if (points_.size() > kMostLines) {
+      Refuse("has a polyline of too many points", "20000 at most");
+    }
+  }
+
+  // What came before the next entity is whole.
+  void EndEntity() {
+    if (!is_entity_) return;
+    if (entity_ == "INSERT") ++inserts_;
+    const bool is_whole =
+        entity_ == "LINE" || entity_ == "LWPOLYLINE" || entity_ == "SEQEND";
+    if (!is_whole || is_paper_ || points_.size() < 2) return;
+    const bool is_closed = is_closed_ && entity_ != "LINE";
+    const std::size_t count = points_.size() - (is_closed ? 0 : 1);
+    auto& [lines, is_read] = found_[layer_];
+    if (lines == 0) {
+      is_read = std::any_of(
+          layers_.begin(), layers_.end(),
+          [this](const std::string& p) { return Selects(p, layer_); });
+    }
+    lines += static_cast<int>(count);
+    if (is_read) {
+      for (std::size_t i = 0; i < count; ++i) {
+        if (bulges_[i] != 0.0) continue;
+        PlanLine line;
+        line.begin = points_[i];
+        line.end = points_[(i + 1) % points_.size()];
+        line.layer = layer_;
+        if (line.begin.cwiseAbs().maxCoeff() * unit_ > kAbsurdCoordinate ||
+            line.end.cwiseAbs().maxCoeff() * unit_ > kAbsurdCoordinate) {
+          Refuse("a line is absurdly far away", "metres of a building");
+        }
+        lines_.push_back(std::move(line));
+      }
+      if (lines_.size() > kMostLines) {
+        Refuse("has too many lines on the layers that are read",
+               "20000 at most: --plan_layers with those of walls");
+      }
+    }
+    points_.clear();
+    bulges_.clear();
+  }
+
+  std::string Layers() const {
+    if (found_.empty()) return "no lines at all";
+    std::string text;
+    int shown = 0;
+    for (const auto& [layer, found] : found_) {
+      if (++shown > kShownLayers) return text + ", ...";
+      text += (text.empty() ? "" : ", ") + PrintableUtf8(layer) + " (" +
+              std::to_string(found.first) + " lines)";
+    }
+    return text;
+  }
+
+  const std::string& text_;
+  const std::string& name_;
+  std::vector<std::string> layers_;
+  std::size_t at_ = 0;
+  int line_ = 0;
+  int code_ = 0;
+  std::string value_;
+  std::string variable_;
+  bool has_sections_ = false;
+  double unit_ = 1.0;
+  bool has_unit_ = false;
+  int inserts_ = 0;
+  // The entity that is read.
+  std::string entity_;
+  bool is_entity_ = false;
+  bool is_paper_ = false;
+  bool is_closed_ = false;
+  std::string layer_;
+  std::vector<Eigen::Vector2d> points_;
+  std::vector<double> bulges_;
+  // By layer: lines, and whether they are read.
+  std::map<std::string, std::pair<int, bool>> found_;
+  std::vector<PlanLine> lines_;
+};
+
+}  // namespace
+
+std::vector<PlanLine> ReadPlanDxf(const std::string& text,
+                                  const std::string& name,
+                                  const std::vector<std::string>& layers,
+                                  std::vector<std::string>* notes) {
+  return DxfReader(text, name, layers).Read(notes);
+}
+
+}  // namespace plumbline

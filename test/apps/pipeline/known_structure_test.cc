@@ -1,0 +1,266 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <plumbline/apps/simulation/simulator.h>
+#include <plumbline/apps/simulation/world.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/em.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/session.h>
+#include <plumbline/detectors/builtins.h>
+#include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/pipeline/known_structure.h>
+#include <plumbline/pipeline/log_solver.h>
+
+#include <cmath>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "refusal.h"
+
+namespace plumbline {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(WallStatementsTest, Reads) {
+  const std::vector<WallStatement> statements = ReadWallStatements(
+      "# of the west wing\n"
+      "same 1.5,2 30,-2.1\n"
+      "\n"
+      "distance 1,2 3,4 12.40 sigma=0.05 sigma_deg=1 # measured\n"
+      "parallel 1,2 3,4 hard\n"
+      "right_angle 1,2 3,4\n",
+      "walls.txt");
+  ASSERT_EQ(statements.size(), 4u);
+  EXPECT_EQ(statements[0].kind, WallStatement::Kind::kSame);
+  EXPECT_EQ(statements[0].second, Eigen::Vector2d(30.0, -2.1));
+  EXPECT_FALSE(statements[0].is_hard);
+  EXPECT_EQ(statements[1].kind, WallStatement::Kind::kDistance);
+  EXPECT_EQ(statements[1].distance, 12.4);
+  EXPECT_EQ(statements[1].sigma_offset, 0.05);
+  EXPECT_NEAR(RadToDeg(statements[1].sigma_angle), 1.0, 1e-12);
+  EXPECT_EQ(statements[1].place, "walls.txt:4");
+  EXPECT_TRUE(statements[2].is_hard);
+  EXPECT_EQ(statements[3].kind, WallStatement::Kind::kRightAngle);
+}
+
+TEST(WallStatementsTest, RefusesWhatIsNone) {
+  const auto why = [](const std::string& text) {
+    return Refusal([&] { ReadWallStatements(text, "walls.txt"); });
+  };
+  EXPECT_THAT(why("\nequal 1,2 3,4\n"), HasSubstr("walls.txt:2: 'equal'"));
+  EXPECT_THAT(why("same 1,2\n"), HasSubstr("without two points"));
+  EXPECT_THAT(why("same 1,2 3\n"), HasSubstr("without two points"));
+  EXPECT_THAT(why("same 1,2 3,nan\n"), HasSubstr("without two points"));
+  EXPECT_THAT(why("distance 1,2 3,4\n"), HasSubstr("without metres"));
+  EXPECT_THAT(why("distance 1,2 3,4 -5\n"), HasSubstr("no distance"));
+  EXPECT_THAT(why("distance 1,2 3,4 far\n"), HasSubstr("no distance"));
+  EXPECT_THAT(why("same 1,2 3,4 sigma=0\n"), HasSubstr("not understood"));
+  EXPECT_THAT(why("same 1,2 3,4 sigma=x\n"), HasSubstr("not understood"));
+  EXPECT_THAT(why("same 1,2 3,4 soft\n"), HasSubstr("not understood"));
+}
+
+// Walls that a fixed pose has measured, each to `sigma`, m and rad / 10.
+class StatementTest : public ::testing::Test {
+ protected:
+  StatementTest() { RegisterBuiltins(&registry_); }
+
+  void MakeWalls(const std::vector<Pose2>& walls, double sigma) {
+    Transaction transaction;
+    Feature pose;
+    pose.type = &registry_.GetFeature("pose");
+    pose.fixed = true;
+    const FeatureId first = transaction.AddFeature(pose);
+    for (const Pose2& at : walls) {
+      Feature wall;
+      wall.type = &registry_.GetFeature("segment");
+      wall.parameters = {at[0], at[1], at[2]};
+      wall.extent_begin = -2.0;
+      wall.extent_end = 2.0;
+      transaction.AddConstraint(MakeMeasurement(
+          registry_.GetRelation("pose_pose"),
+          {first, transaction.AddFeature(wall)}, at,
+          InformationFromSigmas(Eigen::Vector3d(sigma, sigma, 0.1 * sigma)),
+          "test"));
+    }
+    const std::vector<FeatureId> ids =
+        graph_.Apply(std::move(transaction)).features;
+    pose_ = ids[0];
+    walls_.assign(ids.begin() + 1, ids.end());
+  }
+
+  // Tells what is said of it after EM.
+  std::vector<std::string> Solve(const std::string& text) {
+    KnownStructure known;
+    known.statements = ReadWallStatements(text, "walls.txt");
+    KnownStructureBinder binder(known, registry_, pose_, &graph_);
+    SolverSession session(&graph_, registry_, {});
+    EmOrchestrator em(&graph_, &session, registry_, Hierarchy(), {});
+    binder.AddStatements();
+    em.Run();
+    return binder.Notes();
+  }
+
+  Pose2 Wall(std::size_t i) {
+    const Feature& wall = graph_.GetFeature(walls_[i]);
+    return Pose2(wall.parameters[0], wall.parameters[1], wall.parameters[2]);
+  }
+
+  Registry registry_;
+  Graph graph_;
+  FeatureId pose_ = kNoId;
+  std::vector<FeatureId> walls_;
+};
+
+TEST_F(StatementTest, ADistanceHoldsBetweenFacesThatLookAtEachOther) {
+  MakeWalls({Pose2(0.0, 0.0, 0.0), Pose2(1.0, 12.5, kPi - 0.01)}, 0.2);
+  EXPECT_TRUE(Solve("distance 0,0.1 1,12.5 12.40\n").empty());
+  EXPECT_NEAR(std::abs(Between(Wall(0), Wall(1))[1]), 12.4, 0.01);
+  EXPECT_NEAR(std::cos(Wall(0)[2] - Wall(1)[2]), -1.0, 1e-4);
+}
+
+TEST_F(StatementTest, WallsAreOneOrAtRightAngles) {
+  MakeWalls({Pose2(0.0, 0.0, 0.02), Pose2(10.0, 0.2, 0.0),
+             Pose2(4.0, 5.0, 0.5 * kPi + 0.03)},
+            0.3);
+  EXPECT_TRUE(Solve("same 0,0 10,0\nright_angle 10,0 4,5\n").empty());
+  EXPECT_NEAR(Between(Wall(0), Wall(1))[1], 0.0, 0.01);
+  EXPECT_NEAR(Wall(2)[2] - Wall(1)[2], 0.5 * kPi, 2e-3);
+}
+
+TEST_F(StatementTest, WhatMeasurementsContradictBreaksUnlessItIsHard) {
+  const std::vector<Pose2> walls = {Pose2(0.0, 0.0, 0.0), Pose2(0.0, 5.0, 0.0)};
+  MakeWalls(walls, 0.02);
+  EXPECT_THAT(Solve("distance 0,0 0,5 6\n"),
+              Contains(HasSubstr("walls.txt:1: measurements contradict")));
+  EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 5.0, 1e-3);
+  EXPECT_TRUE(Solve("distance 0,0 0,5 6 hard sigma=0.001\n").empty());
+  EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 6.0, 0.01);
+}
+
+TEST_F(StatementTest, SaysWhereThereIsNoWall) {
+  MakeWalls({Pose2(0.0, 0.0, 0.0), Pose2(0.0, 5.0, 0.0)}, 0.02);
+  EXPECT_THAT(
+      Solve("same 0,0 0,2.5\nsame 0,0 1,0\n"),
+      ::testing::ElementsAre(HasSubstr("no wall within 1 m of 0.00,2.50"),
+                             HasSubstr("both points are at one wall")));
+}
+
+// The first half of a drive, which closes no loop.
+class PlanTest : public ::testing::Test {
+ protected:
+  PlanTest() {
+    RegisterBuiltins(&registry_);
+    SimulatorOptions options;
+    options.laser.maximum_range = 6.0;
+    options.laser.noise = 0.03;
+    options.odometry.heading_noise_deg = 1.0;
+    options.progress = [](double share) { return share < 0.5; };
+    const Simulation simulation =
+        Simulate(MakeWorld("oblique", 5, 1.0), options, 5);
+    std::ostringstream text;
+    WriteCarmenLog(simulation, options.laser, {}, text);
+    InputStream input("oblique", text.str());
+    log_ = ReadCarmenLog(&input, {});
+    for (const SimulatedState& state : simulation.states) {
+      truth_[std::lround(1e3 * state.time)] = state.pose;
+    }
+    // Somewhere else, and turned.
+    const PoseTransform elsewhere(Pose2(100.0, -50.0, 0.65));
+    for (const WorldFace& face : simulation.surfaces.faces) {
+      if (face.orientation < 0 || (face.end - face.begin).norm() < 0.5)
+        continue;
+      PlanLine line;
+      line.begin = elsewhere.Point(face.begin);
+      line.end = elsewhere.Point(face.end);
+      plan_.push_back(line);
+    }
+    options_.global_association = false;
+  }
+
+  LogSolverResult Solve() {
+    LogSolver solver(registry_, options_);
+    return solver.Run(log_);
+  }
+
+  // RMS distance from the truth after the best rigid motion, m.
+  double Error(const LogSolverResult& result) const {
+    Eigen::Vector2d from = Eigen::Vector2d::Zero();
+    Eigen::Vector2d to = Eigen::Vector2d::Zero();
+    const std::size_t n = result.trajectory.size();
+    const auto truth = [&](std::size_t i) -> Eigen::Vector2d {
+      return truth_.at(std::lround(1e3 * log_.scans[i].timestamp)).head<2>();
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+      from += result.trajectory[i].head<2>() / static_cast<double>(n);
+      to += truth(i) / static_cast<double>(n);
+    }
+    double c = 0.0;
+    double s = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector2d a = result.trajectory[i].head<2>() - from;
+      const Eigen::Vector2d b = truth(i) - to;
+      c += a.dot(b);
+      s += a.x() * b.y() - a.y() * b.x();
+    }
+    const PoseTransform turn(Pose2(0.0, 0.0, std::atan2(s, c)));
+    double sum = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      sum +=
+          (turn.Point(result.trajectory[i].head<2>() - from) - (truth(i) - to))
+              .squaredNorm();
+    }
+    return std::sqrt(sum / static_cast<double>(n));
+  }
+
+  Registry registry_;
+  Log log_;
+  std::map<long, Pose2> truth_;
+  std::vector<PlanLine> plan_;
+  LogSolverOptions options_;
+};
+
+TEST_F(PlanTest, AWrongWallBreaksAndTheRestImprovesTheMap) {
+  const double without = Error(Solve());
+  options_.known.plan = plan_;
+  const LogSolverResult right = Solve();
+  EXPECT_LT(Error(right), 0.8 * without);
+  EXPECT_THAT(right.notes, Contains(HasSubstr("walls are tied to")));
+  // Half a metre off: the longest wall.
+  std::size_t longest = 0;
+  const auto length = [](const PlanLine& line) {
+    return (line.end - line.begin).norm();
+  };
+  for (std::size_t i = 0; i < plan_.size(); ++i) {
+    if (length(plan_[i]) > length(plan_[longest])) longest = i;
+  }
+  PlanLine& wrong = options_.known.plan[longest];
+  const Eigen::Vector2d along = (wrong.end - wrong.begin).normalized();
+  const Eigen::Vector2d shift(-0.5 * along.y(), 0.5 * along.x());
+  wrong.begin += shift;
+  wrong.end += shift;
+  wrong.layer = "the wrong one";
+  const LogSolverResult with_wrong = Solve();
+  EXPECT_LT(Error(with_wrong), 0.8 * without);
+  EXPECT_THAT(with_wrong.notes, Contains(HasSubstr("(the wrong one)")));
+}
+
+TEST_F(PlanTest, ThePlanOfAnotherBuildingIsNotUsed) {
+  for (PlanLine& line : plan_) {
+    line.begin *= 1.15;
+    line.end *= 1.15;
+  }
+  const LogSolverResult without = Solve();
+  options_.known.plan = plan_;
+  const LogSolverResult with = Solve();
+  EXPECT_THAT(with.notes, Contains(HasSubstr("the plan is not used")));
+  EXPECT_THAT(with.notes, Not(Contains(HasSubstr("tied"))));
+  EXPECT_EQ(with.trajectory, without.trajectory);
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -34,6 +34,7 @@ class RangeNoise {
   /// counted.
   double sigma() const;
 
+  /// Fewest deviations that say anything: those of a handful of scans.
   static constexpr std::int64_t kFewest = 1000;
 
  private:

@@ -25,12 +25,15 @@ struct PlanLine {
 
 /// What somebody says of two walls.
 struct WallStatement {
+  /// What is said.
   enum class Kind {
     /// They lie on one line.
     kSame,
     /// They are parallel, so far apart.
     kDistance,
+    /// They are parallel.
     kParallel,
+    /// They are at right angles.
     kRightAngle,
   };
   Kind kind = Kind::kSame;

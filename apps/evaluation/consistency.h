@@ -54,9 +54,9 @@ struct Consistency {
 /// Tests the covariances of the walls of a map (features of type segment, level
 /// 0) on the truth of a simulated building: Bar-Shalom, Li, Kirubarajan 2001,
 /// "Estimation with applications to tracking and navigation", section 5.4.
-/// Which wall is which is told by the nearest pose that saw it, or the nearest of
-/// the trajectory in front of it, so that the map may be as far off as it is. Throws Error as Marginals and
-/// AlignTrajectory do.
+/// Which wall is which is told by the nearest pose that saw it, or the nearest
+/// of the trajectory in front of it, so that the map may be as far off as it
+/// is. Throws Error as Marginals and AlignTrajectory do.
 Consistency EvaluateConsistency(
     const Graph& graph, const SolverSession& session, const MapTruth& truth,
     const std::vector<TimedPose>& trajectory,

@@ -36,6 +36,10 @@ constexpr double kFullFlanks = 0.6;
 // this distance before or after the crossing, m.
 constexpr double kBesideCrossing = 0.3;
 constexpr double kWallThere = 0.6;
+// It goes straight on when that holds on both sides, within this, m.
+constexpr double kStraightOn = 1.5;
+// What stands before a wall in a corridor is no deeper than this, m.
+constexpr double kDeepestFurniture = 0.8;
 // A wall that is crossed this far within another's end is met there, m.
 constexpr double kAtTheEnd = 0.4;
 // Share of a partition that may look open: laser points go astray.
@@ -263,9 +267,14 @@ double WallShare(const WallProfile& profile, double t, double reach) {
 }
 
 // Where walls cross a line, along it.
-std::vector<double> WallCrossings(const std::vector<DrawnLine>& drawn,
-                                  std::size_t line) {
-  std::vector<double> crossings;
+struct Crossings {
+  std::vector<double> all;
+  // Those of walls that go on on both sides of the line.
+  std::vector<double> straight_on;
+};
+
+Crossings WallCrossings(const std::vector<DrawnLine>& drawn, std::size_t line) {
+  Crossings crossings;
   for (std::size_t j = 0; j < drawn.size(); ++j) {
     double t, t_other;
     if (j == line || !drawn[j].line.is_wall ||
@@ -274,11 +283,15 @@ std::vector<double> WallCrossings(const std::vector<DrawnLine>& drawn,
         t_other > drawn[j].to) {
       continue;
     }
-    if (std::max(WallShare(drawn[j].profile, t_other - kBesideCrossing,
-                           kBesideCrossing),
-                 WallShare(drawn[j].profile, t_other + kBesideCrossing,
-                           kBesideCrossing)) >= kWallThere) {
-      crossings.push_back(t);
+    const auto share = [&](double beside) {
+      return WallShare(drawn[j].profile, t_other + beside, std::abs(beside));
+    };
+    if (std::max(share(-kBesideCrossing), share(kBesideCrossing)) >=
+        kWallThere) {
+      crossings.all.push_back(t);
+    }
+    if (std::min(share(-kStraightOn), share(kStraightOn)) >= kWallThere) {
+      crossings.straight_on.push_back(t);
     }
   }
   return crossings;
@@ -301,7 +314,8 @@ void DropSpecks(const std::vector<double>& crossings, WallProfile* profile) {
 }
 
 // Finds doors, openings with wall on both sides, and what each place holds.
-void Weigh(const DoorOptions& options, bool is_wall, WallProfile* profile) {
+void Weigh(const DoorOptions& options, bool is_wall,
+           const std::vector<double>& straight_on, WallProfile* profile) {
   std::vector<Mark>& marks = profile->marks;
   const int count = profile->size();
   profile->holds.assign(marks.size(), -1.0);
@@ -313,6 +327,12 @@ void Weigh(const DoorOptions& options, bool is_wall, WallProfile* profile) {
   const auto walls = [&](int first, int last) {
     return walls_before[static_cast<std::size_t>(std::min(last, count))] -
            walls_before[static_cast<std::size_t>(std::max(first, 0))];
+  };
+  const auto meets = [](double t, const std::vector<double>& crossings) {
+    return std::any_of(crossings.begin(), crossings.end(),
+                       [&](double crossing) {
+                         return std::abs(crossing - t) <= kDeepestFurniture;
+                       });
   };
   for (int i = 0; i < count;) {
     const bool is_here = marks[static_cast<std::size_t>(i)] == Mark::kWall;
@@ -336,9 +356,15 @@ void Weigh(const DoorOptions& options, bool is_wall, WallProfile* profile) {
     const int last = std::min(count, j + around);
     const int length = std::max(1, last - first - (j - i));
     const double covered = static_cast<double>(walls(first, last)) / length;
-    const bool is_between = is_wall && i > 0 && j < count;
-    const double narrow = std::clamp(
-        (options.wide - width) / (options.wide - options.narrow), 0.0, 1.0);
+    bool is_between = is_wall && i > 0 && j < count;
+    if (width > options.narrow &&
+        meets(profile->begin + i * kStep, straight_on) &&
+        meets(profile->begin + j * kStep, straight_on)) {
+      is_between = false;
+    }
+    const double wider = std::clamp(
+        (width - options.narrow) / (options.wide - options.narrow), 0.0, 1.0);
+    const double narrow = 1.0 - wider * wider;
     const double flanked = std::clamp(
         (covered - kBareFlanks) / (kFullFlanks - kBareFlanks), 0.0, 1.0);
     const double important =
@@ -428,13 +454,14 @@ std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
 void MeasureLines(const SpaceGrid& space, const DoorOptions& options,
                   std::vector<DrawnLine>* drawn) {
   for (DrawnLine& line : *drawn) Measure(space, &line);
-  std::vector<std::vector<double>> crossings(drawn->size());
+  std::vector<Crossings> crossings(drawn->size());
   for (std::size_t i = 0; i < drawn->size(); ++i) {
     crossings[i] = WallCrossings(*drawn, i);
   }
   for (std::size_t i = 0; i < drawn->size(); ++i) {
-    DropSpecks(crossings[i], &(*drawn)[i].profile);
-    Weigh(options, (*drawn)[i].line.is_wall, &(*drawn)[i].profile);
+    DropSpecks(crossings[i].all, &(*drawn)[i].profile);
+    Weigh(options, (*drawn)[i].line.is_wall, crossings[i].straight_on,
+          &(*drawn)[i].profile);
   }
 }
 

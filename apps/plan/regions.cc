@@ -63,10 +63,12 @@ double Openness(const BorderLengths& border) {
   return length < kLeastBorder ? -1.0 : -border.holds / length;
 }
 
-// How large a region is.
+// How large a region is, m^2 and m.
 struct Extent {
   double area = 0.0;
   double perimeter = 0.0;
+  // What was seen of it.
+  double free = 0.0;
 
   // Of a rectangle of the same area and perimeter: for corridors that branch,
   // their width.
@@ -96,6 +98,7 @@ class Regions {
       if (is_inside[i]) region_[i] = static_cast<int>(i);
       extents_[i].area = arrangement.faces[i].Area();
       extents_[i].perimeter = arrangement.faces[i].Perimeter();
+      extents_[i].free = arrangement.free[i];
     }
     for (const ArrangementEdge& edge : arrangement.edges) {
       if (edge.right < 0 || edge.left == edge.right) continue;
@@ -115,8 +118,9 @@ class Regions {
     // Then by number.
     using Pair = std::tuple<double, int, int>;
     std::set<Pair> queue;
-    const auto key = [](const BorderLengths& border, int a, int b) {
-      return Pair(-Openness(border), std::min(a, b), std::max(a, b));
+    const auto key = [&](const BorderLengths& border, int a, int b) {
+      return Pair(AreApart(border, a, b, options) ? 1.0 : -Openness(border),
+                  std::min(a, b), std::max(a, b));
     };
     for (std::size_t a = 0; a < borders_.size(); ++a) {
       for (const auto& [b, border] : borders_[a]) {
@@ -167,11 +171,22 @@ class Regions {
     return borders_[static_cast<std::size_t>(region)];
   }
 
+  // Both were seen, but nobody looked from one into the other: two rooms, even
+  // when hardly anything was seen of the wall between them.
+  bool AreApart(const BorderLengths& border, int a, int b,
+                const RegionOptions& options) const {
+    return border.Of(Mark::kOpen) + border.Of(Mark::kDoor) < kLeastOpening &&
+           std::min(extents_[static_cast<std::size_t>(a)].free,
+                    extents_[static_cast<std::size_t>(b)].free) >=
+               options.min_area;
+  }
+
   // b goes into a.
   void Join(int a, int b) {
     Extent& extent = extents_[static_cast<std::size_t>(a)];
     const Extent& more = extents_[static_cast<std::size_t>(b)];
     extent.area += more.area;
+    extent.free += more.free;
     extent.perimeter += more.perimeter - 2.0 * BordersOf(a)[b].length();
     BordersOf(a).erase(b);
     BordersOf(b).erase(a);

@@ -213,6 +213,45 @@ TEST(BuildingPlanTest, AShortPieceOfAnUnseenWallKeepsRoomsApart) {
   EXPECT_EQ(rooms(true), 2u);
 }
 
+// The same where most of the wall is hidden behind shelves.
+TEST(BuildingPlanTest, WhatWasSeenFromTwoDoorsIsTwoRooms) {
+  const auto rooms = [](bool is_seen_through) {
+    Drawing drawing(14.0, 18.0);
+    drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 13.0, 16.2);
+    drawing.Free(2.0, 2.9, 2.9, 3.3).Free(10.0, 2.9, 10.9, 3.3);
+    drawing.Fill(6.0, 3.2, 7.0, 16.2, Space::kUnknown);
+    drawing.Fill(6.0, 8.5, 6.05, 10.6, Space::kOccupied);
+    if (is_seen_through) drawing.Free(6.0, 10.6, 7.0, 16.2);
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms(false), 3u);
+  EXPECT_EQ(rooms(true), 2u);
+}
+
+// A corridor of 2 m in which a cupboard stands, 0.4 m deep, in line with the
+// wall of a room beside it.
+TEST(BuildingPlanTest, CupboardsDoNotDivideACorridor) {
+  Drawing drawing(20.0, 12.0);
+  drawing.Room(1.0, 1.0, 19.0, 3.0);
+  drawing.Room(1.0, 3.2, 9.8, 8.0).Room(10.0, 3.2, 19.0, 8.0);
+  drawing.Free(2.0, 2.9, 2.9, 3.3).Free(10.3, 2.9, 11.2, 3.3);
+  drawing.Fill(9.9, 1.0, 10.6, 1.4, Space::kOccupied);
+  const BuildingPlan plan = PlanOf(drawing);
+  EXPECT_EQ(plan.rooms.size(), 3u);
+  EXPECT_EQ(plan.doors.size(), 2u);
+}
+
+// The end of a room at the side of a corridor: open for 2 of its 2.8 m.
+TEST(BuildingPlanTest, ARoomWithAWideDoorIsNoPartOfTheCorridor) {
+  Drawing drawing(20.0, 12.0);
+  drawing.Room(1.0, 1.0, 19.0, 3.0);
+  drawing.Room(1.0, 3.2, 16.0, 8.0).Room(16.2, 3.2, 19.0, 8.0);
+  drawing.Free(2.0, 2.9, 2.9, 3.3).Free(17.0, 2.9, 19.0, 3.3);
+  const BuildingPlan plan = PlanOf(drawing);
+  ASSERT_EQ(plan.rooms.size(), 3u);
+  EXPECT_EQ(plan.doors.size(), 2u);
+}
+
 TEST(BuildingPlanTest, OneRoomAndOneCorridor) {
   const BuildingPlan room = PlanOf(Drawing(8.0, 8.0).Room(1, 1, 6, 5));
   ASSERT_EQ(room.rooms.size(), 1u);

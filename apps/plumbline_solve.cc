@@ -25,8 +25,10 @@
 #include <plumbline/outputs/building_frame.h>
 #include <plumbline/outputs/checkpoint_file.h>
 #include <plumbline/outputs/closing_lines.h>
+#include <plumbline/outputs/live_report.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/output_folder.h>
+#include <plumbline/outputs/report.h>
 #include <plumbline/outputs/solve_outputs.h>
 #include <plumbline/outputs/summary.h>
 #include <plumbline/pipeline/graph_solver.h>
@@ -136,6 +138,9 @@ class RunClock {
 
   // The bar over all steps.
   WorkProgress& bar() { return bar_; }
+
+  // The step that is under way.
+  const std::string& step() const { return step_; }
 
   // The total and the steps until now.
   void Read(Summary* summary) const {
@@ -433,6 +438,15 @@ void MatchScansAlone(const std::string& name,
   Detail("matched scans for want of odometry in %.1f s", watch.Seconds());
 }
 
+// A summary that says what the run is asked to do.
+Summary BeginSummary() {
+  Summary summary;
+  summary.input = FLAGS_input;
+  summary.seed = FLAGS_seed;
+  summary.flags = ChangedFlags();
+  return summary;
+}
+
 // Stages of a run on logs, by the names of its steps. `sizes`: of each log, its
 // scans as a share of those of a middling one of them. The scans of a log are
 // counted on the way; what comes after the last one is taken to be as much work
@@ -528,6 +542,8 @@ CheckpointFile::Identity IdentityOfRun(const Log& log) {
                                                 "marginals",
                                                 "verbose",
                                                 "quiet",
+                                                "live_dir",
+                                                "live_every",
                                                 "checkpoint_every",
                                                 "num_threads",
                                                 "marginals_hold_gauge",
@@ -542,16 +558,102 @@ CheckpointFile::Identity IdentityOfRun(const Log& log) {
   return identity;
 }
 
-// The bar and lines on the way through one log or several.
+// The report of --live_dir; does nothing without.
+class LiveMap {
+ public:
+  // `clock` has to outlive this.
+  explicit LiveMap(const RunClock& clock) : clock_(clock) {
+    if (FLAGS_live_dir.empty()) return;
+    namespace fs = std::filesystem;
+    std::error_code error;
+    if (fs::weakly_canonical(FLAGS_live_dir, error) ==
+        fs::weakly_canonical(FLAGS_output_dir, error)) {
+      throw Error("--live_dir", 0, "is the folder of --output_dir",
+                  "another one");
+    }
+    ForFlag("live_dir",
+            [this] { report_.emplace(FLAGS_live_dir, FLAGS_live_every); });
+  }
+
+  bool is_on() const { return report_.has_value(); }
+
+  // The map as it stands, if it is time to; `stage` says where the run is.
+  void Show(const MapSoFar& map, const std::function<std::string()>& stage) {
+    if (!is_on() || !report_->IsDue()) return;
+    Try([&] { report_->Offer(stage(), [&] { return MakeReport(map); }); });
+  }
+
+  // The end of the run: its report.html if it wrote one.
+  void Finish(const SolveOutcome& outcome) {
+    if (!is_on()) return;
+    const std::vector<std::string>& files = outcome.summary.files;
+    std::filesystem::path written;
+    if (std::count(files.begin(), files.end(), kPage) > 0) {
+      written = std::filesystem::path(FLAGS_output_dir) / kPage;
+    }
+    Try([&] {
+      report_->Finish(written, [&] {
+        Report report =
+            MakeReport({*outcome.graph, outcome.trace, [&] {
+                          std::vector<Pose2> poses;
+                          for (const TimedPose& timed : outcome.trajectory) {
+                            poses.push_back(timed.pose);
+                          }
+                          return poses;
+                        }});
+        report.summary = outcome.summary;
+        report.title = outcome.title;
+        return report;
+      });
+    });
+  }
+
+ private:
+  static constexpr char kPage[] = "report.html";
+
+  Report MakeReport(const MapSoFar& map) const {
+    Report report;
+    report.graph = &map.graph;
+    report.path = map.trajectory();
+    for (const EmPhase& phase : map.trace) report.trace.push_back({phase, {}});
+    report.summary = BeginSummary();
+    report.summary.scans = static_cast<std::int64_t>(report.path.size());
+    CountGraph(map.graph, &report.summary);
+    clock_.Read(&report.summary);
+    report.summary.peak_memory_bytes = PeakMemoryBytes();
+    report.flags = OwnFlags();
+    report.delta_threshold = FLAGS_delta_threshold;
+    report.title = TitleOf(FLAGS_input);
+    return report;
+  }
+
+  // The run can do without.
+  template <typename Write>
+  void Try(const Write& write) {
+    try {
+      write();
+    } catch (const Error& error) {
+      report_.reset();
+      Remark("goes on without --live_dir: %s", error.what());
+    }
+  }
+
+  const RunClock& clock_;
+  std::optional<LiveReport> report_;
+};
+
+// The bar and lines on the way through one log or several, and the live map.
 class SolvingProgress {
  public:
-  // `clock` is told of the steps; it has to outlive this.
-  explicit SolvingProgress(RunClock* clock) : clock_(*clock) {}
+  // `clock` is told of the steps; both have to outlive this.
+  SolvingProgress(RunClock* clock, LiveMap* live)
+      : clock_(*clock), live_(*live) {}
 
   // A log begins.
   void BeginLog(const std::string& title) {
     clock_.Begin("scans");
     clock_.bar().SetTitle(title);
+    title_ = title;
     is_finishing_ = false;
   }
 
@@ -569,11 +671,24 @@ class SolvingProgress {
       clock_.Begin(step);
       Detail("%s, after %.1f s", step, watch_.Seconds());
     };
+    if (live_.is_on()) {
+      control.look = [this](const MapSoFar& map) {
+        live_.Show(map, [this] { return Stage(); });
+      };
+    }
     return control;
   }
 
  private:
+  std::string Stage() const {
+    if (is_finishing_) return clock_.step();
+    return title_ + ", " + std::to_string(done_) + " of " +
+           std::to_string(total_);
+  }
+
   void TakeScan(std::size_t done, std::size_t total) {
+    done_ = done;
+    total_ = total;
     clock_.bar().Update(ShareOf(static_cast<std::int64_t>(done),
                                 static_cast<std::int64_t>(total)));
     if (done % 500 == 0 || done == total) {
@@ -583,7 +698,12 @@ class SolvingProgress {
   }
 
   RunClock& clock_;
+  LiveMap& live_;
   Stopwatch watch_;
+  // Of the log, and its scans.
+  std::string title_;
+  std::size_t done_ = 0;
+  std::size_t total_ = 0;
   // All scans are in: how many steps are left is not known.
   bool is_finishing_ = false;
 };
@@ -591,7 +711,7 @@ class SolvingProgress {
 // Solves a log, from where a run that did not end had got to if there is one,
 // and leaves checkpoints on the way.
 LogSolverResult RunWithCheckpoints(const Log& log, RunClock* clock,
-                                   CheckpointFile* checkpoint,
+                                   LiveMap* live, CheckpointFile* checkpoint,
                                    LogSolver* solver) {
   // An interrupt that cuts the reading off leaves another log than that of the
   // state, which stays for the next run.
@@ -602,7 +722,7 @@ LogSolverResult RunWithCheckpoints(const Log& log, RunClock* clock,
     Remark("%s: goes on where a run that did not end had got to",
            FLAGS_output_dir.c_str());
   }
-  SolvingProgress progress(clock);
+  SolvingProgress progress(clock, live);
   progress.BeginLog("scans");
   RunControl control = progress.Control();
   if (may_write) {
@@ -722,17 +842,8 @@ void TakeMap(const std::string& name, const std::vector<Scan>& scans,
                                                     : ", without structure");
 }
 
-// A summary that says what the run is asked to do.
-Summary BeginSummary() {
-  Summary summary;
-  summary.input = FLAGS_input;
-  summary.seed = FLAGS_seed;
-  summary.flags = ChangedFlags();
-  return summary;
-}
-
 int SolveLog(const LogInput& input, const Registry& registry, RunClock* clock,
-             OutputFolder* folder) {
+             LiveMap* live, OutputFolder* folder) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
   summary = BeginSummary();
@@ -757,10 +868,11 @@ int SolveLog(const LogInput& input, const Registry& registry, RunClock* clock,
       [&log] { return IdentityOfRun(log); }, FLAGS_checkpoint_every);
   LogSolver solver(registry, options);
   const LogSolverResult result =
-      RunWithCheckpoints(log, clock, &checkpoint, &solver);
+      RunWithCheckpoints(log, clock, live, &checkpoint, &solver);
   clock->Begin("figures");
   TakeMap(input.name, log.scans, solver, registry, options, result, &outcome);
   WriteOutputs(&outcome, clock, folder);
+  live->Finish(outcome);
   TellEnd(outcome, clock);
   if (!summary.partial) checkpoint.Remove();
   return kExitSuccess;
@@ -881,7 +993,7 @@ std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
 SeveralLogsResult RunSeveralLogs(const Registry& registry,
                                  std::vector<Log> logs,
                                  const SeveralLogsOptions& options,
-                                 RunClock* clock) {
+                                 RunClock* clock, LiveMap* live) {
   std::vector<std::size_t> num_scans;
   std::size_t scans = 0;
   for (const Log& log : logs) {
@@ -895,7 +1007,7 @@ SeveralLogsResult RunSeveralLogs(const Registry& registry,
                     static_cast<double>(scans));
   }
   clock->bar().Plan(StagesOfLogs(sizes, options.solver));
-  SolvingProgress progress(clock);
+  SolvingProgress progress(clock, live);
   SeveralLogsControl control;
   control.begin_log = [&](std::size_t i) {
     progress.BeginLog("scans of log " + std::to_string(i + 1) + " of " +
@@ -952,7 +1064,8 @@ void TellElsewhere(const std::vector<std::unique_ptr<OpenInput>>& inputs,
 // Writes where the robot was in the earlier map.
 void WriteLocalized(const EarlierMap& earlier, const Registry& registry,
                     const std::string& title, const MapOfLogs& map,
-                    Summary summary, RunClock* clock, OutputFolder* folder) {
+                    Summary summary, RunClock* clock, LiveMap* live,
+                    OutputFolder* folder) {
   SolveOutcome outcome;
   outcome.summary = std::move(summary);
   TellOfTrack(title, map.scans, map.result, &outcome.summary);
@@ -969,13 +1082,14 @@ void WriteLocalized(const EarlierMap& earlier, const Registry& registry,
   outcome.scans = &scans;
   outcome.title = title + ", in " + TitleOf(FLAGS_map);
   WriteOutputs(&outcome, clock, folder);
+  live->Finish(outcome);
 }
 
 // `earlier`: the map that the logs continue or are found in, or null.
 int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
               const std::vector<std::optional<Pose2>>& starts,
               const EarlierMap* earlier, const Registry& registry,
-              RunClock* clock, OutputFolder* folder) {
+              RunClock* clock, LiveMap* live, OutputFolder* folder) {
   SeveralLogsOptions options;
   options.solver = LogSolverOptionsFromFlags(registry);
   options.starts = starts;
@@ -999,7 +1113,7 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
   common.parse_seconds = reading.Seconds();
 
   const SeveralLogsResult solved =
-      RunSeveralLogs(registry, std::move(logs), options, clock);
+      RunSeveralLogs(registry, std::move(logs), options, clock, live);
   if (solved.interrupted) {
     clock->bar().Finish();
     std::fprintf(stderr,
@@ -1015,7 +1129,7 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
   common.logs = DescribeLogs(inputs, solved);
   if (FLAGS_localize) {
     WriteLocalized(*earlier, registry, TitleOf(inputs.front()->log.name),
-                   solved.maps.front(), std::move(common), clock, folder);
+                   solved.maps.front(), std::move(common), clock, live, folder);
     return kExitSuccess;
   }
 
@@ -1034,6 +1148,7 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
             &outcome);
     if (m == 0) {
       WriteOutputs(&outcome, clock, folder);
+      live->Finish(outcome);
       TellEnd(outcome, clock);
       continue;
     }
@@ -1100,7 +1215,7 @@ void SummarizeSolves(const GraphSolverResult& result,
 }
 
 int SolveGraph(InputStream* input, const Registry& registry, RunClock* clock,
-               OutputFolder* folder) {
+               LiveMap* live, OutputFolder* folder) {
   SolveOutcome outcome;
   Summary& summary = outcome.summary;
   summary = BeginSummary();
@@ -1139,12 +1254,21 @@ int SolveGraph(InputStream* input, const Registry& registry, RunClock* clock,
   GraphSolverResult result;
   {
     clock->Begin("solving");
+    std::vector<EmPhase> trace;
     result = solver.Run(
         [clock] {
           clock->bar().Update();
           return InterruptRequested();
         },
-        TellPhase);
+        [&](const EmPhase& phase) {
+          TellPhase(phase);
+          if (!live->is_on()) return;
+          trace.push_back(phase);
+          live->Show({graph, trace, [] { return std::vector<Pose2>(); }}, [&] {
+            return "solving, iteration " + std::to_string(phase.iteration) +
+                   ": " + phase.phase;
+          });
+        });
   }
   clock->Begin("figures");
   Summarize(result.initial_cost, result.final_cost, result.em, &summary);
@@ -1168,6 +1292,7 @@ int SolveGraph(InputStream* input, const Registry& registry, RunClock* clock,
   };
   outcome.title = TitleOf(input->name());
   WriteOutputs(&outcome, clock, folder);
+  live->Finish(outcome);
   TellEnd(outcome, clock);
   return kExitSuccess;
 }
@@ -1231,14 +1356,16 @@ int Run() {
     Remark("%s: removed what a run that was killed had left: %s",
            FLAGS_output_dir.c_str(), Joined(folder.cleaned()).c_str());
   }
+  LiveMap live(clock);
   const ThreadsScope threads(NumThreadsFromFlags());
   if (inputs.size() > 1 || earlier != nullptr) {
-    return SolveLogs(inputs, starts, earlier.get(), registry, &clock, &folder);
+    return SolveLogs(inputs, starts, earlier.get(), registry, &clock, &live,
+                     &folder);
   }
   const OpenInput& input = *inputs.front();
-  return input.is_graph
-             ? SolveGraph(&*inputs.front()->stream, registry, &clock, &folder)
-             : SolveLog(input.log, registry, &clock, &folder);
+  return input.is_graph ? SolveGraph(&*inputs.front()->stream, registry, &clock,
+                                     &live, &folder)
+                        : SolveLog(input.log, registry, &clock, &live, &folder);
 }
 
 }  // namespace

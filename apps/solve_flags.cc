@@ -25,6 +25,13 @@ DEFINE_string(input, "",
               "(g2o), plain or compressed; - reads standard input. Several "
               "logs of one building, separated by commas, become one map");
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
+DEFINE_string(live_dir, "",
+              "Folder, other than --output_dir, for a report.html that shows "
+              "the map while the run is under way and renews itself");
+DEFINE_double(live_every, 5.0,
+              "Seconds between two pages of --live_dir; more where making them "
+              "would take over 5 % of the time");
+PLUMBLINE_FLAG_RANGE(live_every, 0.01, 86400.0);
 DEFINE_string(log_reader, "",
               "Format of the log; empty: recognized by content");
 DEFINE_string(
@@ -372,8 +379,8 @@ void RefuseForPoints(const std::string& flag, const std::string& value,
 std::vector<FlagGroup> SolveFlagGroups() {
   return {
       {"Input and output",
-       {"input", "output_dir", "log_reader", "map", "localize", "start_pose",
-        "outputs", "align", "grid_resolution"}},
+       {"input", "output_dir", "live_dir", "live_every", "log_reader", "map",
+        "localize", "start_pose", "outputs", "align", "grid_resolution"}},
       {"Known beforehand",
        {"plan", "plan_layers", "plan_sigma", "constraints"}},
       {"Graphs", GraphFlags()},

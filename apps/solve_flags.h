@@ -26,6 +26,8 @@ DECLARE_string(start_pose);
 DECLARE_string(outputs);
 DECLARE_string(align);
 DECLARE_double(checkpoint_every);
+DECLARE_string(live_dir);
+DECLARE_double(live_every);
 DECLARE_bool(structure);
 DECLARE_double(delta_threshold);
 DECLARE_string(hierarchy);

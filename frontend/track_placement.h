@@ -89,6 +89,13 @@ struct TrackPlacementOptions {
   int min_agreeing_at_start = 1;
   double start_distance = 3.0;
   double start_turn = DegToRad(45.0);
+
+  /// Makes distances fit ranges this many times as noisy as usual
+  /// (range_noise.h).
+  void ScaleToNoise(double scale) {
+    points.ScaleToNoise(scale);
+    matcher.ScaleToNoise(scale);
+  }
 };
 
 /// Where a track lies in a map.

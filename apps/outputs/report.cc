@@ -442,10 +442,11 @@ Json DataToJson(const Report& report) {
   json["structure"] = StructureToJson(report, &relations, &sources);
   json["closures"] = ClosuresToJson(*report.graph);
   json["grid"] = GridToJson(report.grid);
-  json["live"] =
-      report.reload_seconds > 0
-          ? Json{{"stage", report.stage}, {"seconds", report.reload_seconds}}
-          : Json(nullptr);
+  json["live"] = report.reload_seconds > 0
+                     ? Json{{"stage", report.stage},
+                            {"seconds", report.reload_seconds},
+                            {"written_at", report.written_at}}
+                     : Json(nullptr);
   json["types"] = types.ToJson();
   json["sources"] = sources.ToJson();
   json["relations"] = relations.ToJson();

@@ -11,6 +11,7 @@
 #include <plumbline/outputs/summary.h>
 #include <plumbline/plan/building_plan.h>
 
+#include <cstdint>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -43,6 +44,9 @@ struct Report {
   /// seconds the page loads itself anew. 0: it stays as it is.
   std::string stage;
   int reload_seconds = 0;
+  /// When a page of such a run was written, s since 1970: one that is old says
+  /// that the run no longer renews it.
+  std::int64_t written_at = 0;
 };
 
 /// Writes one page that needs nothing but a browser: the map with and without

@@ -312,6 +312,9 @@ bool LogSolver::TakeStage(const std::vector<Scan>& scans,
   while (const std::optional<Processed> processed = ahead.Next()) {
     TakeScan(scans, *processed);
     if (control.progress) control.progress(refined_.size(), scans.size());
+    if (control.look) {
+      control.look({*graph_, trace_, [this] { return Trajectory(); }});
+    }
     // Also what was begun when it was stopped: the refiner has gone that far.
     ask_stop();
   }
@@ -394,6 +397,8 @@ LogSolverResult LogSolver::GoOn(const std::vector<Scan>& scans,
         "a first map of " + std::to_string(first.refined.size()) + " scans",
         std::to_string(scans.size()));
   }
+  // A solver that made the first map allows for the noise already.
+  if (!is_finished_) ScaleToNoise(first.noise_scale);
   is_finished_ = true;
   builder_.reset();
   Context context(scans, control);
@@ -539,6 +544,16 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Stage end,
 }
 
 void LogSolver::BeginStage(Stage stage, Context* context) {
+  if (context->control.look) {
+    context->control.look({*graph_, trace_, [&] {
+                             const LogSolverResult& result = context->result;
+                             return result.trajectory.empty()
+                                        ? InterpolateScans(
+                                              result.refined, result.records,
+                                              KeyPoses(result.records))
+                                        : result.trajectory;
+                           }});
+  }
   // What was cut short is for no other run to go on with.
   if (context->IsStopped()) return;
   Renew();

@@ -219,7 +219,8 @@ class LogSolver {
 
   /// Does what RunFirst has left. In a new solver `first` may be of a log that
   /// was put together of several (SolveSeveralLogs): `trajectory`, `refined`
-  /// and `records` are what the second map is made of, and `wall_length`, the
+  /// and `records` are what the second map is made of, `noise_scale` is what is
+  /// allowed for, and `wall_length`, the
   /// length of the walls of the first map, m, is what it is measured by (0: the
   /// solver's own first map).
   LogSolverResult GoOn(const std::vector<Scan>& scans, LogSolverResult first,

@@ -1,11 +1,25 @@
 #ifndef PLUMBLINE_PIPELINE_RUN_CONTROL_H_
 #define PLUMBLINE_PIPELINE_RUN_CONTROL_H_
 
+#include <plumbline/core/em.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/factors/pose2.h>
+
 #include <cstddef>
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace plumbline {
+
+/// The map of a log while it is made; it changes once the callback returns.
+struct MapSoFar {
+  const Graph& graph;
+  /// Phases of EM on the whole map until now.
+  const std::vector<EmPhase>& trace;
+  /// Makes a pose for every scan so far, map frame. Cost: linear in the scans.
+  std::function<std::vector<Pose2>()> trajectory;
+};
 
 /// Callbacks while a log or a graph is solved. Each may be null.
 struct RunControl {
@@ -18,6 +32,9 @@ struct RunControl {
   /// Told when a stage of solving a log has ended. `state()` makes the bytes
   /// that LogSolver::Resume goes on from, at the cost of copying the map.
   std::function<void(const std::function<std::string()>& state)> checkpoint;
+  /// Shown the map after every scan and between the stages that follow. The
+  /// result does not depend on whether it is looked at.
+  std::function<void(const MapSoFar& map)> look;
 };
 
 }  // namespace plumbline

@@ -2,6 +2,7 @@
 #include <plumbline/core/graph.h>
 #include <plumbline/core/session.h>
 #include <plumbline/frontend/joint_adjustment.h>
+#include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/pipeline/several_logs.h>
 
@@ -29,6 +30,10 @@ LogSolverResult ResultOf(const KeyScanArchive& earlier) {
   result.refined = earlier.refined;
   result.records = earlier.records;
   result.scan_seconds.assign(earlier.scans.size(), 0.0f);
+  RangeNoise noise;
+  for (const Scan& scan : earlier.scans) noise.Add(scan);
+  result.range_sigma = noise.sigma();
+  result.noise_scale = RangeNoiseScale(result.range_sigma);
   return result;
 }
 
@@ -51,6 +56,8 @@ struct Group {
   std::vector<std::size_t> logs;
   // Of all of them, frame of the first.
   std::vector<KeyView> views;
+  // The largest of theirs.
+  double noise_scale = 1.0;
 };
 
 UncertainPose2 TieOf(const TrackPlacement& placement, const FirstMap& log,
@@ -121,6 +128,9 @@ void Append(int from_record, FirstMap* log, LogSolverResult* whole) {
   whole->wide_searches += part.wide_searches;
   whole->refused_matches += part.refused_matches;
   whole->lost_tracks += part.lost_tracks;
+  // The noisiest laser has its say.
+  whole->range_sigma = std::max(whole->range_sigma, part.range_sigma);
+  whole->noise_scale = std::max(whole->noise_scale, part.noise_scale);
   whole->feature_matches += part.feature_matches;
   whole->features_created += part.features_created;
   whole->em.iterations += part.em.iterations;
@@ -159,6 +169,7 @@ class Merger {
       Group group;
       group.logs.push_back(left.front());
       group.views = maps_[left.front()].views;
+      group.noise_scale = maps_[left.front()].result.noise_scale;
       left.erase(left.begin());
       Gather(&left, &group);
       if (IsStopped()) return std::move(result_);
@@ -190,9 +201,16 @@ class Merger {
       poses.push_back(
           log.result.trajectory[static_cast<std::size_t>(record.scan)]);
     }
-    log.views =
-        MakeKeyViews(logs_[i].scans, keys, poses, options_.placement.points);
+    log.views = MakeKeyViews(logs_[i].scans, keys, poses,
+                             PlacementWith(log.result.noise_scale).points);
     maps_.push_back(std::move(log));
+  }
+
+  // The options of placing that go with the noise of lasers.
+  TrackPlacementOptions PlacementWith(double noise_scale) const {
+    TrackPlacementOptions placement = options_.placement;
+    placement.ScaleToNoise(noise_scale);
+    return placement;
   }
 
   std::optional<Pose2> StartOf(std::size_t i) const {
@@ -224,8 +242,10 @@ class Merger {
     for (const KeyScanRecord& record : earlier.records) {
       keys.push_back(record.scan);
     }
+    earlier_result_ = ResultOf(earlier);
+    group.noise_scale = earlier_result_.noise_scale;
     group.views = MakeKeyViews(earlier.scans, keys, earlier.trajectory,
-                               options_.placement.points);
+                               PlacementWith(group.noise_scale).points);
     Gather(&left, &group);
     if (IsStopped()) return;
     result_.is_elsewhere = !left.empty();
@@ -244,7 +264,7 @@ class Merger {
     MapOfLogs map;
     map.logs = group.logs;
     map.scans = options_.earlier->scans;
-    map.result = ResultOf(*options_.earlier);
+    map.result = std::move(earlier_result_);
     for (const std::size_t i : group.logs) {
       Append(result_.logs[i].placement.from, &maps_[i], &map.result);
       std::move(logs_[i].scans.begin(), logs_[i].scans.end(),
@@ -258,6 +278,7 @@ class Merger {
     Graph graph;
     SolverSession session(&graph, registry_, options_.solver.session);
     JointAdjustmentOptions adjustment_options = options_.solver.adjustment;
+    adjustment_options.ScaleToNoise(map.result.noise_scale);
     adjustment_options.num_held_records = options_.earlier->records.size();
     JointAdjustment adjustment(&graph, &session, registry_, map.scans,
                                map.result.refined, map.result.records, keys,
@@ -277,12 +298,14 @@ class Merger {
   // Adds a log to the group if it has its place there.
   bool Place(std::size_t i, Group* group) {
     FirstMap& log = maps_[i];
+    const double noise_scale =
+        std::max(group->noise_scale, log.result.noise_scale);
     // The start is given in the first log's frame.
     const TrackPlacement placement = PlaceTrack(
         group->views, log.views,
         options_.earlier != nullptr || group->logs.front() == 0 ? StartOf(i)
                                                                 : std::nullopt,
-        options_.placement, control_.run.stop);
+        PlacementWith(noise_scale), control_.run.stop);
     // What came nearest to being its place is what there is to say of it.
     TrackPlacement& told = result_.logs[i].placement;
     if (placement.found || placement.agreeing >= told.agreeing) {
@@ -292,6 +315,7 @@ class Merger {
     log.tie = TieOf(placement, log, *group);
     log.pose = placement.pose;
     group->logs.push_back(i);
+    group->noise_scale = noise_scale;
     for (KeyView view : log.views) {
       view.pose = Compose(log.pose, view.pose);
       group->views.push_back(std::move(view));
@@ -328,7 +352,7 @@ class Merger {
     double wall_length = 0.0;
     std::size_t at = 0;
     if (options_.earlier != nullptr) {
-      first = ResultOf(*options_.earlier);
+      first = std::move(earlier_result_);
       map.scans = options_.earlier->scans;
       wall_length = options_.earlier_wall_length;
       at = map.scans.size();
@@ -375,6 +399,8 @@ class Merger {
   SeveralLogsOptions options_;
   SeveralLogsControl control_;
   std::vector<FirstMap> maps_;
+  // The earlier map's.
+  LogSolverResult earlier_result_;
   SeveralLogsResult result_;
 };
 

@@ -872,6 +872,62 @@ TEST_F(SolveTest, AKilledRunIsGoneOnWith) {
   }
 }
 
+TEST_F(SolveTest, ALiveReportChangesNothing) {
+  const std::string log = Write("office.log", Join(OfficeLines(250)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "alone", "", &output), 0) << output;
+  const fs::path page = folder_ / "live" / "report.html";
+  const std::string mark = "\"live\":{\"stage\":\"";
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string out = "--output_dir=" + (folder_ / "out").string();
+    const std::string live = "--live_dir=" + (folder_ / "live").string();
+    const std::string input = "--input=" + log;
+    execl(binary_.c_str(), binary_.c_str(), input.c_str(), out.c_str(),
+          live.c_str(), "--live_every=0.01", "--quiet",
+          static_cast<char*>(nullptr));
+    _exit(99);
+  }
+  int status = 0;
+  std::set<std::string> stages;
+  while (waitpid(child, &status, WNOHANG) == 0) {
+    usleep(2000);
+    if (!fs::exists(page)) continue;
+    // Pages are whole at any time.
+    const std::string text = ReadFile(page);
+    ASSERT_THAT(text, ::testing::EndsWith("</html>\n"));
+    const std::size_t begin = text.find(mark);
+    if (begin == std::string::npos) continue;
+    stages.insert(text.substr(begin + mark.size(), 6));
+  }
+  ASSERT_TRUE(WIFEXITED(status));
+  ASSERT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(stages.count("scans,"), 1u);
+  EXPECT_EQ(ReadFile(page), Out("out", "report.html"));
+  auto alone = Comparable("alone");
+  for (const auto& [name, content] : Comparable("out")) {
+    // They name the folders.
+    if (name == "summary.json" || name == "report.html") continue;
+    EXPECT_EQ(content, alone[name]) << name;
+  }
+
+  // Of a run without a report, and of several logs; a folder of its own.
+  const std::string live = "--live_dir=" + (folder_ / "other").string();
+  ASSERT_EQ(
+      Solve(log + "," + log, "out",
+            live + " --live_every=0.01 --outputs=trajectory.tum", &output),
+      0)
+      << output;
+  const std::string last = ReadFile(folder_ / "other" / "report.html");
+  EXPECT_THAT(last, HasSubstr("\"live\":null"));
+  EXPECT_THAT(last, HasSubstr("\"scans\":500"));
+  EXPECT_EQ(
+      Solve(log, "out", "--live_dir=" + (folder_ / "out/.").string(), &output),
+      2);
+  EXPECT_THAT(output, HasSubstr("is the folder of --output_dir"));
+}
+
 // Said, since a reader of the command would think otherwise.
 TEST_F(SolveTest, SeveralLogs) {
   const std::vector<std::string> lines = OfficeLines(400);

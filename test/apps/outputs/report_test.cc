@@ -543,6 +543,36 @@ TEST_F(ReportInBrowserTest, MeasuresAndShowsLayers) {
   EXPECT_THAT(browser_->complaints(), IsEmpty());
 }
 
+// Names are as long as they are: none is cut, none runs into a bar.
+TEST_F(ReportInBrowserTest, NamesOfStepsAreWhole) {
+  MakeCorridor(3);
+  Report report = MakeReport();
+  report.summary.step_seconds = {
+      {"reading", 1.0},
+      {"structure of the map from adjusted poses", 4.0},
+      {"scan matching for want of odometry", 2.0}};
+  Open(report);
+  for (const int width : {420, 950, 1300, 2000}) {
+    browser_->Call("Emulation.setDeviceMetricsOverride",
+                   {{"width", width},
+                    {"height", 900},
+                    {"deviceScaleFactor", 1},
+                    {"mobile", false}});
+    browser_->Evaluate("drawTimes()");
+    EXPECT_EQ(browser_->Evaluate(
+                  "(() => { const svg = document.querySelector('#times svg'); "
+                  "const w = svg.viewBox.baseVal.width; const boxes = "
+                  "[...svg.querySelectorAll('text, rect')].map((n) => "
+                  "n.getBBox()); return boxes.filter((b) => b.x < 0 || "
+                  "b.x + b.width > w).length + boxes.filter((b, k) => "
+                  "k % 3 === 0 && b.x + b.width > boxes[k + 1].x && "
+                  "b.y + b.height > boxes[k + 1].y + 4).length; })()"),
+              0)
+        << width;
+  }
+  EXPECT_THAT(browser_->complaints(), IsEmpty());
+}
+
 TEST_F(ReportInBrowserTest, LoadsAndAnswersTheMouse) {
   MakeCorridor(3);
   Transaction transaction;

@@ -12,6 +12,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -74,13 +75,16 @@ class SeveralLogsTest : public ::testing::Test {
   // Largest error of the relative poses of scans that lie `stride` apart in a
   // map, with those of other logs, m.
   double LargestError(const MapOfLogs& map) const {
+    return LargestError(map.scans, map.result.trajectory);
+  }
+  double LargestError(const std::vector<Scan>& scans,
+                      const std::vector<Pose2>& trajectory) const {
     double largest = 0.0;
-    const std::size_t n = map.scans.size();
+    const std::size_t n = scans.size();
     for (std::size_t i = 0; i < n; i += 7) {
       const std::size_t j = (i + n / 2) % n;
-      const Pose2 error =
-          Between(Between(TruthOf(map.scans[i]), TruthOf(map.scans[j])),
-                  Between(map.result.trajectory[i], map.result.trajectory[j]));
+      const Pose2 error = Between(Between(TruthOf(scans[i]), TruthOf(scans[j])),
+                                  Between(trajectory[i], trajectory[j]));
       largest = std::max(largest, error.head<2>().norm());
     }
     return largest;
@@ -261,6 +265,63 @@ TEST_F(SeveralLogsTest, AnotherBuildingIsNotPutIntoAnEarlierMap) {
   options.earlier = nullptr;
   EXPECT_THROW(SolveSeveralLogs(registry_, {Piece(office, 0, 50)}, options),
                Error);
+}
+
+// Ranges as those of a laser with 4 cm of noise.
+Log Noisy(Log log) {
+  std::mt19937 random(7);
+  std::normal_distribution<float> noise(0.0f, 0.04f);
+  for (Scan& scan : log.scans) {
+    for (float& range : scan.ranges) {
+      if (range > 0.0f) range = std::max(0.05f, range + noise(random));
+    }
+  }
+  return log;
+}
+
+TEST_F(SeveralLogsTest, NoisyLogsAreAllowedForTogether) {
+  const Log noisy = Noisy(Office());
+  const std::size_t n = noisy.scans.size();
+  LogSolver alone(registry_, {});
+  const LogSolverResult whole = alone.Run(noisy);
+  ASSERT_GT(whole.noise_scale, 2.0);
+  const SeveralLogsResult result = SolveSeveralLogs(
+      registry_, {Piece(noisy, 0, n / 2), Piece(noisy, n / 2, n)}, {});
+  ASSERT_EQ(result.maps.size(), 1u);
+  const MapOfLogs& map = result.maps.front();
+  EXPECT_NEAR(map.result.noise_scale, whole.noise_scale,
+              0.2 * whole.noise_scale);
+  EXPECT_LT(LargestError(map),
+            1.2 * LargestError(noisy.scans, whole.trajectory) + 0.05);
+  // What is not allowed for draws walls twice.
+  const double length = LengthOfWalls(alone.graph());
+  EXPECT_NEAR(LengthOfWalls(map.solver->graph()), length, 0.07 * length);
+}
+
+// The archive does not say how noisy its scans are: they show it.
+TEST_F(SeveralLogsTest, ANoisyLogIsFoundInANoisyMap) {
+  const Log noisy = Noisy(Office());
+  const std::size_t n = noisy.scans.size();
+  const KeyScanArchive earlier = Archived(registry_, Piece(noisy, 0, n / 2));
+  SeveralLogsOptions options;
+  options.earlier = &earlier;
+  options.localize_only = true;
+  const SeveralLogsResult result =
+      SolveSeveralLogs(registry_, {Piece(noisy, n / 2, n)}, options);
+  ASSERT_FALSE(result.is_elsewhere) << result.logs[0].placement.why_not;
+  const MapOfLogs& map = result.maps.front();
+  EXPECT_GT(map.result.noise_scale, 2.0);
+  // Relative to the place where the map begins.
+  double sum = 0.0;
+  for (std::size_t i = n / 2; i < n; ++i) {
+    const Pose2 error = Between(
+        Between(TruthOf(noisy.scans[0]), TruthOf(noisy.scans[i])),
+        Between(map.result.trajectory[0],
+                map.result.trajectory[result.logs[0].begin + i - n / 2]));
+    EXPECT_LT(error.head<2>().norm(), 0.25);
+    sum += error.head<2>().norm();
+  }
+  EXPECT_LT(sum / static_cast<double>(n - n / 2), 0.08);
 }
 
 TEST_F(SeveralLogsTest, AnInterruptLeavesNoHalfMap) {

@@ -1,14 +1,16 @@
 // Says how good a trajectory and a map are: against another trajectory, against
 // true relations (Kuemmerle et al. 2009) and against the truth of a simulated
-// building.
+// building, and rooms against those of a real one.
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/evaluation/closure_truth.h>
+#include <plumbline/apps/evaluation/grid_file.h>
 #include <plumbline/apps/evaluation/map_evaluation.h>
 #include <plumbline/apps/evaluation/map_truth.h>
 #include <plumbline/apps/evaluation/plan_evaluation.h>
 #include <plumbline/apps/evaluation/relations.h>
+#include <plumbline/apps/evaluation/traced_rooms.h>
 #include <plumbline/apps/evaluation/trajectory_alignment.h>
 #include <plumbline/apps/evaluation/trajectory_errors.h>
 #include <plumbline/apps/evaluation/trajectory_file.h>
@@ -20,6 +22,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -69,8 +72,14 @@ DEFINE_string(relations, "",
 DEFINE_string(truth, "", "Truth of a simulated building, as JSON.");
 DEFINE_string(map, "", "Map to compare with the truth: map.json of a solve.");
 DEFINE_string(plan, "",
-              "Plan to compare with the truth, too: floorplan.geojson of a "
-              "solve.");
+              "Plan to compare with the truth or with --rooms: "
+              "floorplan.geojson of a solve.");
+DEFINE_string(rooms, "",
+              "Rooms of the real building as traced by somebody, as JSON; they "
+              "are placed over the grid of the same map by themselves.");
+DEFINE_string(grid, "",
+              "Grid to place --rooms over, of a map_server; empty: the "
+              "occupancy.yaml beside --plan.");
 DEFINE_string(output, "", "Where to write the results as JSON.");
 DEFINE_string(relation_errors, "",
               "Where to write the error of every relation as CSV.");
@@ -418,6 +427,53 @@ Json TellPlan(const PlanEvaluation& plan) {
   return result;
 }
 
+// Compares the plan with rooms of the real building.
+Json EvaluateAgainstRooms() {
+  const std::string grid =
+      FLAGS_grid.empty()
+          ? (std::filesystem::path(FLAGS_plan).parent_path() / "occupancy.yaml")
+                .string()
+          : FLAGS_grid;
+  const TracedRooms rooms = ReadTracedRooms(FLAGS_rooms);
+  const BuildingPlan plan = ReadBuildingPlan(FLAGS_plan);
+  const SpaceGrid space = ReadSpaceGrid(grid);
+  const TracedEvaluation result =
+      ForFlag("grid", [&] { return EvaluateTracedRooms(plan, rooms, space); });
+  std::printf(
+      "rooms of %s: %d of %d seen, %d of them found; %d drawn; mean IoU %.3f, "
+      "precision %.3f, recall %.3f\n",
+      PrintableUtf8(rooms.name).c_str(), result.seen, result.traced,
+      result.found, result.drawn, result.mean_iou, result.precision,
+      result.recall);
+  const TracedPlacement& placement = result.placement;
+  std::printf(
+      "placed: overlap with free space %.3f, turned by %.1f degrees, scale "
+      "%.2f, middle at %.2f %.2f\n",
+      placement.overlap, RadToDeg(placement.turn), placement.scale,
+      placement.center[0], placement.center[1]);
+  Json iou = Json::array();
+  for (const double value : result.iou) {
+    iou.push_back(value < 0.0 ? Json() : Json(value));
+  }
+  return Json{{"file", FLAGS_rooms},
+              {"plan", FLAGS_plan},
+              {"grid", grid},
+              {"name", rooms.name},
+              {"traced", result.traced},
+              {"seen", result.seen},
+              {"found", result.found},
+              {"drawn", result.drawn},
+              {"mean_iou", result.mean_iou},
+              {"precision", result.precision},
+              {"recall", result.recall},
+              {"iou", iou},
+              {"placement",
+               {{"overlap", placement.overlap},
+                {"turn_deg", RadToDeg(placement.turn)},
+                {"scale", placement.scale},
+                {"center_m", {placement.center[0], placement.center[1]}}}}};
+}
+
 Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
   const MapTruth truth = ReadMapTruth(FLAGS_truth);
   const StraightMap map = ReadStraightMap(FLAGS_map);
@@ -479,14 +535,18 @@ int UsageError(const std::string& message) {
 }
 
 int Run() {
-  if (!FLAGS_plan.empty() && FLAGS_truth.empty())
-    return UsageError("--plan needs --truth");
+  if (!FLAGS_plan.empty() && FLAGS_truth.empty() && FLAGS_rooms.empty())
+    return UsageError("--plan needs --truth or --rooms");
   if (FLAGS_relations.empty() && FLAGS_truth.empty() &&
-      FLAGS_reference.empty()) {
+      FLAGS_reference.empty() && FLAGS_rooms.empty()) {
     return UsageError(
-        "nothing to compare with: expected --reference, --relations or "
-        "--truth");
+        "nothing to compare with: expected --reference, --relations, --truth "
+        "or --rooms");
   }
+  if (!FLAGS_rooms.empty() && FLAGS_plan.empty())
+    return UsageError("--rooms needs a plan: expected --plan");
+  if (!FLAGS_grid.empty() && FLAGS_rooms.empty())
+    return UsageError("--grid needs --rooms");
   if (FLAGS_truth.empty() != FLAGS_map.empty())
     return UsageError("--truth and --map go together: expected both");
   if (!FLAGS_relations.empty() && FLAGS_trajectory.empty())
@@ -531,6 +591,7 @@ int Run() {
   if (!FLAGS_relations.empty())
     result["relations"] = EvaluateAgainstRelations(trajectory);
   if (!FLAGS_truth.empty()) result["truth"] = EvaluateAgainstTruth(trajectory);
+  if (!FLAGS_rooms.empty()) result["rooms"] = EvaluateAgainstRooms();
   if (!FLAGS_output.empty()) {
     WriteFileAtomically(FLAGS_output, [&](std::ostream& output) {
       output << result.dump(2, ' ', false, Json::error_handler_t::replace)
@@ -549,17 +610,19 @@ int main(int argc, char** argv) {
   info.summary =
       "Says how good a trajectory is against another one (APE and RPE, as evo "
       "has them) or against true relations (Kuemmerle et al. 2009), and how "
-      "good a map is against the truth of a simulated building.";
+      "good a map is against the truth of a simulated building, or its rooms "
+      "against those of a real one.";
   info.usage = {"--trajectory=T.tum --reference=R.tum [flags]",
                 "--trajectory=T.tum --relations=R [flags]",
-                "--trajectory=T.tum --truth=TRUTH.json --map=map.json [flags]"};
+                "--trajectory=T.tum --truth=TRUTH.json --map=map.json [flags]",
+                "--plan=floorplan.geojson --rooms=ROOMS.json [flags]"};
   info.example =
       "plumbline_evaluate --trajectory=out/trajectory.tum "
       "--relations=intel.relations";
   info.groups = {
       {"Input",
        {"trajectory", "trajectory_topic", "reference", "reference_topic",
-        "relations", "truth", "map", "plan"}},
+        "relations", "truth", "map", "plan", "rooms", "grid"}},
       {"Output", {"output", "plot", "pose_errors", "relation_errors"}},
       {"Comparison with a reference",
        {"alignment", "max_time_difference", "time_offset", "rpe_delta",

@@ -225,7 +225,9 @@ TEST_F(EvaluateTest, Usage) {
               Flag("plan", "plan.geojson"),
           &output),
       1);
-  EXPECT_THAT(output, HasSubstr("--plan needs --truth"));
+  EXPECT_THAT(output, HasSubstr("--plan needs --truth or --rooms"));
+  EXPECT_EQ(Run(Flag("rooms", "rooms.json"), &output), 1);
+  EXPECT_THAT(output, HasSubstr("--rooms needs a plan"));
   EXPECT_EQ(Run(" --no_such_flag=1", &output), 1);
   EXPECT_THAT(output, HasSubstr("no_such_flag"));
   EXPECT_EQ(Run(" --trajektory=a", &output), 1);

@@ -19,6 +19,7 @@ namespace plumbline {
 namespace {
 
 constexpr char kSource[] = "refinement";
+constexpr char kVoteRelation[] = "pose_segment_points";
 
 // Where along a wall its position is, is a choice and no measurement, m: as
 // good as exact, or what it is wide would be in every covariance as seen from
@@ -201,7 +202,8 @@ void JointAdjustment::WriteState(StateWriter* state) {
 template <typename Archive>
 void JointAdjustment::ExchangeState(Archive& archive) {
   ExchangeAll(archive, poses_, relations_, relation_constraints_, motions_,
-              motion_factor_, relation_factor_, vote_factor_, votes_);
+              motion_factor_, relation_factor_, vote_factor_, vote_excess_,
+              votes_);
 }
 
 JointAdjustment::JointAdjustment(
@@ -333,7 +335,7 @@ void JointAdjustment::Match() {
 void JointAdjustment::Vote() {
   Transaction transaction;
   for (const ConstraintId id : votes_) transaction.RemoveConstraint(id);
-  const RelationType& relation = registry_.GetRelation("pose_segment_points");
+  const RelationType& relation = registry_.GetRelation(kVoteRelation);
   const std::vector<std::vector<WallVote>> votes =
       CollectWallVotes(*graph_, places_, PlacePoses(), options_.votes);
   for (std::size_t k = 0; k < votes.size(); ++k) {
@@ -402,14 +404,19 @@ void JointAdjustment::EstimateVariances() {
                           2 * (of_votes.size() - walls.size())) /
       rows;
   const auto factor = [&](std::vector<double> chi_squares, double expected) {
-    return std::clamp(VarianceFactor(std::move(chi_squares), expected,
-                                     redundancy, kPriorLinks),
-                      options_.min_variance_factor,
+    return VarianceFactor(std::move(chi_squares), expected, redundancy,
+                          kPriorLinks);
+  };
+  const auto within_bounds = [&](double value) {
+    return std::clamp(value, options_.min_variance_factor,
                       options_.max_variance_factor);
   };
-  motion_factor_ = factor(std::move(of_motions), kMedianOf3);
-  relation_factor_ = factor(std::move(of_relations), kMedianOf3);
-  const double vote_factor = factor(std::move(of_votes), kMedianOf2);
+  motion_factor_ = within_bounds(factor(std::move(of_motions), kMedianOf3));
+  relation_factor_ = within_bounds(factor(std::move(of_relations), kMedianOf3));
+  const double shown = factor(std::move(of_votes), kMedianOf2);
+  const double vote_factor = within_bounds(shown);
+  vote_excess_ = std::max(
+      1.0, vote_factor / std::max(shown, options_.min_reported_factor));
   for (const ConstraintId id : votes_) {
     const Constraint& vote = graph_->GetConstraint(id);
     const Eigen::VectorXd expected = vote.expected;
@@ -425,6 +432,19 @@ void JointAdjustment::EstimateVariances() {
   }
   Reweigh();
   Solve(/*is_last=*/true);
+}
+
+void ReportVoteVariances(double excess, Graph* graph) {
+  if (excess == 1.0) return;
+  for (const Constraint* vote : std::as_const(*graph).Constraints()) {
+    if (vote->type->name != kVoteRelation ||
+        vote->state != ConstraintState::kLive) {
+      continue;
+    }
+    const Eigen::VectorXd expected = vote->expected;
+    const Eigen::MatrixXd information = excess * vote->information;
+    graph->UpdateConstraint(vote->id, expected, information);
+  }
 }
 
 void JointAdjustment::Adjust() {

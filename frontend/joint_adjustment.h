@@ -37,6 +37,10 @@ struct JointAdjustmentOptions {
   /// Bounds of the factors by which EstimateVariances changes variances.
   double min_variance_factor = 0.08;
   double max_variance_factor = 4.0;
+  /// Smallest factor of the variances of votes that covariances are reported
+  /// with (ReportVoteVariances). In simulated buildings residuals show less
+  /// than a hundredth, as looks at one wall share what no residual shows.
+  double min_reported_factor = 0.04;
   /// Rounds of taking votes and weights anew, each followed by a solve.
   int rounds = 3;
   /// After that places that have come near each other are matched, and all is
@@ -65,6 +69,12 @@ std::vector<Pose2> KeyPosesOfPlaces(const Graph& graph,
                                     const std::vector<FeatureId>& places,
                                     const std::vector<KeyScanRecord>& records,
                                     int place_stride);
+
+/// Divides the variances of the votes for walls by JointAdjustment::
+/// vote_variance_excess: the last thing that is done to a map. Solves give
+/// votes more room than their residuals ask for, since the edges of walls at
+/// small angles need it; covariances of walls would come out too wide with it.
+void ReportVoteVariances(double excess, Graph* graph);
 
 /// Joint adjustment of poses, walls and structure: the last word of the scans
 /// on the map (ours; core/method.md, section 7, ends with finding the scans
@@ -130,6 +140,9 @@ class JointAdjustment {
   double motion_variance_factor() const { return motion_factor_; }
   double relation_variance_factor() const { return relation_factor_; }
   double vote_variance_factor() const { return vote_factor_; }
+  /// How many times wider the variances of votes are in the graph than they are
+  /// to be reported; at least 1.
+  double vote_variance_excess() const { return vote_excess_; }
 
   /// Adds walls (segments of level 0 without constraints, as they lie among the
   /// poses at present), each bound to the poses by the votes of its returns;
@@ -199,6 +212,7 @@ class JointAdjustment {
   double motion_factor_ = 1.0;
   double relation_factor_ = 1.0;
   double vote_factor_ = 1.0;
+  double vote_excess_ = 1.0;
   // Live vote constraints.
   std::vector<ConstraintId> votes_;
 };

@@ -101,6 +101,8 @@ struct LogSolver::Context {
   std::string first_map;
   std::vector<Pose2> first_trajectory;
   double first_length = 0.0;
+  // Of the second map (JointAdjustment::vote_variance_excess).
+  double vote_excess = 1.0;
 
   Context(const std::vector<Scan>& all_scans, const RunControl& run_control)
       : scans(all_scans), control(run_control) {}
@@ -592,7 +594,8 @@ void LogSolver::ExchangeState(Archive& archive, Stage* stage,
                               Context* context) {
   ExchangeAll(archive, *stage, context->result, context->keys, context->places,
               context->first_map, context->first_trajectory,
-              context->first_length, em_before_, trace_, break_log_.records());
+              context->first_length, context->vote_excess, em_before_, trace_,
+              break_log_.records());
   Exchange(archive, registry_, *graph_);
 }
 
@@ -771,6 +774,7 @@ void LogSolver::AdjustWalls(Context* context) {
   TakeTrajectory(context);
   result.scan_relations = adjustment.num_relations();
   result.wall_votes = adjustment.num_votes();
+  context->vote_excess = adjustment.vote_variance_excess();
   result.second_map_refused =
       LengthOfWalls(*graph_) < kLeastSecondShare * context->first_length;
   if (result.second_map_refused) return ReturnToFirstMap(context);
@@ -822,6 +826,7 @@ void LogSolver::FindStructureAgain(Context* context) {
   context->IsStopped();
   result.final_cost = session_->Cost();
   TakeTrajectory(context);
+  ReportVoteVariances(context->vote_excess, graph_.get());
 }
 
 // Walls that lie near the plan pull others near.

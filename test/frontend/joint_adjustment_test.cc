@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -319,6 +320,42 @@ TEST_F(JointAdjustmentTest, VariancesOfVotesComeFromResiduals) {
   EXPECT_GT(factor, 1e-4);
   // Votes that count less are found to be better than they say.
   EXPECT_LT(estimate(0.05), 0.5 * factor);
+}
+
+// A bound of the factor keeps votes wide in solves; what is reported is as the
+// residuals have it, down to a bound of its own.
+TEST_F(JointAdjustmentTest, CovariancesAreReportedWithoutTheBoundOfSolves) {
+  const auto excess = [&](double least, double least_reported) {
+    JointAdjustmentOptions options = options_;
+    options.min_variance_factor = least;
+    options.min_reported_factor = least_reported;
+    Graph graph;
+    SolverSession session(&graph, registry_, {});
+    JointAdjustment adjustment(&graph, &session, registry_, scans_, refined_,
+                               records_, keys_, kNoId, options);
+    adjustment.Adjust();
+    adjustment.AddWalls(FreeWalls(walls_));
+    adjustment.Adjust();
+    adjustment.EstimateVariances();
+    std::map<ConstraintId, Eigen::MatrixXd> before;
+    for (const Constraint* constraint : std::as_const(graph).Constraints()) {
+      before[constraint->id] = constraint->information;
+    }
+    ReportVoteVariances(adjustment.vote_variance_excess(), &graph);
+    for (const Constraint* constraint : std::as_const(graph).Constraints()) {
+      const double scale = constraint->type->name == "pose_segment_points"
+                               ? adjustment.vote_variance_excess()
+                               : 1.0;
+      const Eigen::MatrixXd& was = before[constraint->id];
+      EXPECT_LE((constraint->information - scale * was).norm(),
+                1e-12 * constraint->information.norm());
+    }
+    return adjustment.vote_variance_excess();
+  };
+  // The laser is better than votes are given, so that the bounds count.
+  EXPECT_DOUBLE_EQ(excess(0.5, 0.25), 2.0);
+  EXPECT_EQ(excess(1e-6, 0.25), 1.0);
+  EXPECT_GT(excess(0.5, 1e-6), 2.0);
 }
 
 // A map that is bent between two places does not keep its bend: scans are

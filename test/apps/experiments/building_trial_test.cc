@@ -193,7 +193,7 @@ TEST(BuildingTrialTest, CovariancesHold) {
   };
   const Mode modes[] = {{"none", false, false, Refinement::kMap, 0.6, 1.5},
                         {"structure", true, false, Refinement::kMap, 0.6, 1.5},
-                        {"default", true, true, Refinement::kFull, 0.5, 1.5}};
+                        {"default", true, true, Refinement::kFull, 0.6, 1.5}};
   Registry registry;
   RegisterBuiltins(&registry);
   for (const Mode& mode : modes) {

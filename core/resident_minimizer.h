@@ -31,18 +31,32 @@ class ResidentMinimizer {
   ResidentMinimizer& operator=(const ResidentMinimizer&) = delete;
   ~ResidentMinimizer();
 
+  /// How steps are damped to begin with.
+  enum class Damping {
+    /// By the initial trust region radius.
+    kAsGiven,
+    /// By the largest radius, and by the initial one only where the first
+    /// factorization finds something that is undetermined or next to it: what
+    /// residuals tie weakly, as the far end of a long chain, damping would hold
+    /// back for many steps.
+    kWhereNeeded,
+  };
+
   /// Optimizes the parameters in place, as ceres::Solve() does; they stay as
   /// they were when the solve fails. Of `options` it heeds the limits of
   /// iterations, time and invalid steps, tolerances, trust region radii, bounds
   /// of the diagonal, jacobi_scaling, use_nonmonotonic_steps with
-  /// max_consecutive_nonmonotonic_steps (ended at the best state), callbacks
-  /// and update_state_every_iteration. It works on one thread and writes no
-  /// log. Bounds of parameters and evaluation callbacks are not supported: the
-  /// solve fails and says so. Of `summary` it fills in what says how the
-  /// solve ended: termination_type, message, costs, iterations, counts of steps
-  /// and linear solves, and times.
+  /// max_consecutive_nonmonotonic_steps (as Ceres has them; besides, once in a
+  /// solve as many steps may be taken without regard to what they cost, up to
+  /// twice the lowest cost, to see whether they come to a lower one; ended at
+  /// the best state), callbacks and update_state_every_iteration. It works on
+  /// one thread and writes no log. Bounds of parameters and evaluation
+  /// callbacks are not supported: the solve fails and says so. Of `summary` it
+  /// fills in what says how the solve ended: termination_type, message, costs,
+  /// iterations, counts of steps and linear solves, and times.
   void Solve(const ceres::Solver::Options& options,
-             ceres::Solver::Summary* summary);
+             ceres::Solver::Summary* summary,
+             Damping damping = Damping::kAsGiven);
 
   /// Has the next solve analyse the problem anew. To be called when a parameter
   /// block has been freed: another one may come to lie at its address, and

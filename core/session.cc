@@ -117,7 +117,7 @@ class CoarseEnd final : public ceres::IterationCallback {
                                 ? step.cost_change
                                 : step.cost_change / step.relative_decrease;
     const double left =
-        step.step_is_successful
+        step.step_is_successful && !step.step_is_nonmonotonic
             ? std::min(step.cost_change, std::abs(promised - step.cost_change))
             : promised;
     return left <= function_tolerance_ * step.cost
@@ -359,7 +359,9 @@ struct SolverSession::Impl {
           solver.linear_solver_type == ceres::SPARSE_NORMAL_CHOLESKY) {
         solver.use_nonmonotonic_steps = true;
         solver.max_consecutive_nonmonotonic_steps = kUphillSteps;
-        resident->Solve(solver, &summary);
+        resident->Solve(solver, &summary,
+                        is_coarse ? ResidentMinimizer::Damping::kAsGiven
+                                  : ResidentMinimizer::Damping::kWhereNeeded);
       } else {
         ceres::Solve(solver, solved, &summary);
       }

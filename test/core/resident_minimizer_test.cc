@@ -383,6 +383,99 @@ TEST(ResidentMinimizerTest, UphillStepsEndAtTheBestState) {
   }
 }
 
+// The end of a lever that turns: the linear step leaves the circle, and costs
+// more than staying; the one after it is right.
+struct Lever {
+  template <typename T>
+  bool operator()(const T* const x, T* residual) const {
+    using std::cos;
+    using std::sin;
+    residual[0] = 2.0 * (x[0] - 3.0 * sin(x[1]));
+    residual[1] = 2.0 * (x[2] - 3.0 * (1.0 - cos(x[1])));
+    residual[2] = x[1] - 0.8;
+    residual[3] = T(3.0);
+    return true;
+  }
+};
+
+TEST(ResidentMinimizerTest, AStepUphillMayBeMadeUpFor) {
+  const auto solve = [](bool uphill, ceres::Solver::Summary* summary) {
+    std::array<double, 3> x = {0.0, 0.0, 0.0};
+    ceres::Problem problem;
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<Lever, 4, 3>(new Lever), nullptr,
+        x.data());
+    ceres::Solver::Options options = Tight();
+    options.use_nonmonotonic_steps = uphill;
+    options.max_consecutive_nonmonotonic_steps = 3;
+    ResidentMinimizer(&problem).Solve(options, summary);
+    EXPECT_NEAR(x[1], 0.8, 1e-6);
+    EXPECT_NEAR(summary->final_cost, 4.5, 1e-9);
+  };
+  ceres::Solver::Summary monotonic, uphill;
+  solve(false, &monotonic);
+  solve(true, &uphill);
+  EXPECT_LT(uphill.num_linear_solves, monotonic.num_linear_solves);
+  bool has_gone_up = false;
+  for (const ceres::IterationSummary& step : uphill.iterations) {
+    has_gone_up = has_gone_up || step.cost > uphill.initial_cost;
+  }
+  EXPECT_TRUE(has_gone_up);
+}
+
+// -- Damping ------------------------------------------------------------------
+
+struct ChainLink {
+  template <typename T>
+  bool operator()(const T* a, const T* b, T* residual) const {
+    residual[0] = b[0] - a[0] - 1.0;
+    return true;
+  }
+};
+
+TEST(ResidentMinimizerTest, WhatIsTiedWeaklyIsNotHeldBack) {
+  // The far end of a chain without a closure: damping by 1e-4 of the diagonal
+  // takes many steps to bring it home.
+  const auto solve = [](ResidentMinimizer::Damping damping,
+                        ceres::Solver::Summary* summary) {
+    constexpr int kLength = 300;
+    std::vector<std::array<double, 1>> x(kLength);
+    ceres::Problem problem;
+    for (int i = 0; i + 1 < kLength; ++i) {
+      problem.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<ChainLink, 1, 1, 1>(new ChainLink),
+          nullptr, x[i].data(), x[i + 1].data());
+    }
+    problem.SetParameterBlockConstant(x[0].data());
+    ceres::Solver::Options options = Tight();
+    options.initial_trust_region_radius = 1e4;
+    options.max_trust_region_radius = 1e16;
+    ResidentMinimizer(&problem).Solve(options, summary, damping);
+    EXPECT_NEAR(x[kLength - 1][0], kLength - 1.0, 1e-6);
+  };
+  ceres::Solver::Summary given, needed;
+  solve(ResidentMinimizer::Damping::kAsGiven, &given);
+  solve(ResidentMinimizer::Damping::kWhereNeeded, &needed);
+  EXPECT_LE(needed.num_linear_solves, 2);
+  EXPECT_GT(given.num_linear_solves, 4);
+}
+
+TEST(ResidentMinimizerTest, WhatIsUndeterminedIsDampedAsGiven) {
+  // Nothing holds the ring in the plane: its place is undetermined.
+  Ring ring(40, nullptr, /*holds_gauge=*/false);
+  const std::vector<Pose> before = ring.poses;
+  ceres::Solver::Summary summary;
+  ResidentMinimizer(&ring.problem)
+      .Solve(Tight(), &summary, ResidentMinimizer::Damping::kWhereNeeded);
+  EXPECT_EQ(summary.termination_type, ceres::CONVERGENCE) << summary.message;
+  ASSERT_GT(summary.iterations.size(), 1u);
+  EXPECT_LT(summary.iterations[1].trust_region_radius, 1e13);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_NEAR(ring.poses[i][0], before[i][0], 1.0);
+    EXPECT_NEAR(ring.poses[i][1], before[i][1], 1.0);
+  }
+}
+
 // -- Reasons to stop ----------------------------------------------------------
 
 class CountAndAnswer final : public ceres::IterationCallback {

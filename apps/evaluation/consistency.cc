@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -12,6 +13,9 @@
 
 namespace plumbline {
 namespace {
+
+// What a map says in rounding only, m^2 and rad^2.
+constexpr double kRounding = 1e-12;
 
 // A wall of the map on the true wall that it is.
 struct Pairing {
@@ -234,8 +238,7 @@ Consistency EvaluateConsistency(const Graph& graph,
     error.segment<2>(2 * i) = pair.error;
   }
   Eigen::MatrixXd covariance = jacobian * joint * jacobian.transpose();
-  // What the map says in rounding only, m^2 and rad^2.
-  covariance.diagonal().array() += 1e-12;
+  covariance.diagonal().array() += kRounding;
   const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
   // The frame is not known: it is fitted.
   const Eigen::MatrixXd weighted = factor.solve(gauge);
@@ -262,6 +265,70 @@ Consistency EvaluateConsistency(const Graph& graph,
   result.direction_error_deg = RadToDeg(std::sqrt(result.direction_error_deg));
   result.direction_sigma_deg =
       RadToDeg(std::sqrt(std::max(0.0, result.direction_sigma_deg)));
+  return result;
+}
+
+Consistency EvaluatePointConsistency(const Graph& graph,
+                                     const SolverSession& session,
+                                     const SyntheticTruth& truth) {
+  Consistency result;
+  std::vector<FeatureId> ids;
+  for (const Feature* feature : graph.Features()) {
+    if (feature->type->name == "point" && feature->level == 0) {
+      ids.push_back(feature->id);
+    }
+  }
+  result.walls = static_cast<int>(ids.size());
+  if (ids.size() < 2) return result;
+  MarginalsOptions marginals_options;
+  marginals_options.hold_gauge = true;
+  Marginals marginals(graph, session, marginals_options);
+  Eigen::MatrixXd covariance = marginals.JointCovariance(ids);
+
+  const int n = 2 * result.walls;
+  const RigidTransform alignment = AlignToTruth(graph, truth);
+  Eigen::VectorXd error(n);
+  Eigen::MatrixXd gauge(n, 3);
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();
+  const auto position = [&](int i) {
+    const Feature& point = graph.GetFeature(ids[i]);
+    return Eigen::Vector2d(point.parameters[0], point.parameters[1]);
+  };
+  for (int i = 0; i < result.walls; ++i) center += position(i) / result.walls;
+  for (int i = 0; i < result.walls; ++i) {
+    const Eigen::Vector2d lever = position(i) - center;
+    error.segment<2>(2 * i) =
+        alignment.rotation.transpose() *
+        (alignment * position(i) -
+         truth.positions[static_cast<std::size_t>(ids[i])]);
+    gauge.row(2 * i) << 1.0, 0.0, -lever.y();
+    gauge.row(2 * i + 1) << 0.0, 1.0, lever.x();
+  }
+  // Nothing ties the points to the plane: the frame's own variance, which is
+  // next to infinite, is no error of theirs.
+  const Eigen::MatrixXd basis =
+      Eigen::HouseholderQR<Eigen::MatrixXd>(gauge).householderQ() *
+      Eigen::MatrixXd::Identity(n, 3);
+  const auto without_frame = [&basis](const Eigen::MatrixXd& m) {
+    return Eigen::MatrixXd(m - basis * (basis.transpose() * m));
+  };
+  error = without_frame(error);
+  covariance = without_frame(without_frame(covariance).transpose());
+  const double share = 1.0 / n;
+  for (int i = 0; i < result.walls; ++i) {
+    const Eigen::Vector2d e = error.segment<2>(2 * i);
+    const Eigen::Matrix2d c = covariance.block<2, 2>(2 * i, 2 * i);
+    result.mean_wall_ratio += share * e.dot(c.ldlt().solve(e));
+    result.offset_error += share * e.squaredNorm();
+    result.offset_sigma += share * c.trace();
+  }
+  result.offset_error = std::sqrt(result.offset_error);
+  result.offset_sigma = std::sqrt(std::max(0.0, result.offset_sigma));
+  // The frame, of which the error has nothing, gets a variance again.
+  covariance += basis * basis.transpose();
+  covariance.diagonal().array() += kRounding;
+  result.nees = error.dot(covariance.ldlt().solve(error));
+  result.degrees_of_freedom = n - 3;
   return result;
 }
 

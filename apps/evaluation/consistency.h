@@ -2,6 +2,7 @@
 #define PLUMBLINE_APPS_EVALUATION_CONSISTENCY_H_
 
 #include <plumbline/apps/evaluation/map_truth.h>
+#include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/session.h>
 #include <plumbline/frontend/timed_pose.h>
@@ -61,6 +62,16 @@ Consistency EvaluateConsistency(
     const Graph& graph, const SolverSession& session, const MapTruth& truth,
     const std::vector<TimedPose>& trajectory,
     const ConsistencyOptions& options = ConsistencyOptions());
+
+/// The same for a graph of points (features of type point, level 0) as
+/// MakeSyntheticWorld makes them, against their true positions: two degrees of
+/// freedom a point but for the three of the frame. `walls` counts points;
+/// offset_error and offset_sigma are those of a coordinate in the frame that
+/// fits best by least squares, as is mean_wall_ratio; directions are 0. Throws
+/// Error as Marginals does.
+Consistency EvaluatePointConsistency(const Graph& graph,
+                                     const SolverSession& session,
+                                     const SyntheticTruth& truth);
 
 }  // namespace plumbline
 

@@ -16,7 +16,6 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/registry.h>
-#include <plumbline/core/text_file.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -164,7 +163,7 @@ World LoadWorld() {
     return MakeBentWorld(options, FLAGS_seed);
   }
   try {
-    std::istringstream text(ReadTextFile(FLAGS_world, kLargestWorldFile));
+    std::istringstream text(ReadTextInput(FLAGS_world, kLargestWorldFile));
     return ReadWorld(text, FLAGS_world);
   } catch (const Error& error) {
     if (std::filesystem::is_regular_file(FLAGS_world)) throw;

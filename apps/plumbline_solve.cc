@@ -12,7 +12,6 @@
 #include <plumbline/core/plugin.h>
 #include <plumbline/core/sha256.h>
 #include <plumbline/core/stopwatch.h>
-#include <plumbline/core/text_file.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/core/version.h>
 #include <plumbline/detectors/builtins.h>
@@ -1034,7 +1033,7 @@ std::unique_ptr<EarlierMap> EarlierMapFromFlags(const Registry& registry) {
     throw Error("--align", 0, "--localize gives poses in the frame of --map",
                 "one of them");
   }
-  const std::string text = ReadTextFile(FLAGS_map, kLargestMap);
+  const std::string text = ReadTextInput(FLAGS_map, kLargestMap);
   auto map = std::make_unique<EarlierMap>();
   map->key_scans = ReadKeyScans(text, FLAGS_map);
   std::istringstream input(text);

@@ -5,7 +5,6 @@
 #include <plumbline/core/detector.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
-#include <plumbline/core/text_file.h>
 #include <plumbline/detectors/structure_prior.h>
 #include <plumbline/pipeline/plan_dxf.h>
 
@@ -464,13 +463,13 @@ void TakeKnownStructureFlags(LogSolverOptions* options) {
     while (std::getline(list, layer, ',')) {
       if (!layer.empty()) layers.push_back(layer);
     }
-    known.plan = ReadPlanDxf(ReadTextFile(FLAGS_plan, kLargestPlan), FLAGS_plan,
-                             layers, &known.notes);
+    known.plan = ReadPlanDxf(ReadTextInput(FLAGS_plan, kLargestPlan),
+                             FLAGS_plan, layers, &known.notes);
   }
   if (!FLAGS_constraints.empty()) {
-    known.statements =
-        ReadWallStatements(ReadTextFile(FLAGS_constraints, kLargestConstraints),
-                           FLAGS_constraints);
+    known.statements = ReadWallStatements(
+        ReadTextInput(FLAGS_constraints, kLargestConstraints),
+        FLAGS_constraints);
   }
 }
 
@@ -490,7 +489,8 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.session.minimizer = FLAGS_minimizer;
   options.em = EmOptionsFromFlags(options.features);
   if (!FLAGS_structure_prior.empty()) {
-    std::istringstream text(ReadTextFile(FLAGS_structure_prior, kLargestPrior));
+    std::istringstream text(
+        ReadTextInput(FLAGS_structure_prior, kLargestPrior));
     ApplyStructurePrior(
         ReadStructurePrior(text, FLAGS_structure_prior, registry), &options.em,
         &options.detector_parameters);

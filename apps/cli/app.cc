@@ -6,6 +6,7 @@
 #include <plumbline/apps/cli/nearest_word.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/number_text.h>
+#include <plumbline/core/text_file.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/core/version.h>
 #include <unistd.h>
@@ -276,6 +277,9 @@ int RunMain(const std::function<int()>& run) {
       std::fprintf(stderr, "interrupted: what was done so far is written\n");
       status = kExitInterrupted;
     }
+  } catch (const Interruption&) {
+    std::fprintf(stderr, "interrupted\n");
+    status = kExitInterrupted;
   } catch (const Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     status = kExitInput;
@@ -294,6 +298,12 @@ int RunMain(const std::function<int()>& run) {
 }
 
 bool InterruptRequested() { return interrupted != 0; }
+
+std::string ReadTextInput(const std::string& path, std::size_t limit) {
+  std::string text = ReadTextFile(path, limit, InterruptRequested);
+  if (InterruptRequested()) throw Interruption();
+  return text;
+}
 
 std::vector<FlagValue> OwnFlags() {
   std::vector<FlagValue> flags;

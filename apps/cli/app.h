@@ -4,6 +4,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/flag_value.h>
 
+#include <cstddef>
 #include <functional>
 #include <initializer_list>
 #include <string>
@@ -69,6 +70,14 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc, char** argv);
 /// kExitInternal for any other exception; kExitInterrupted when it succeeded
 /// but was cut short by Ctrl-C.
 int RunMain(const std::function<int()>& run);
+
+/// Thrown when the user pressed Ctrl-C before there was anything to write:
+/// RunMain then returns kExitInterrupted.
+struct Interruption {};
+
+/// The content of a small text file that a flag names, as ReadTextFile. Throws
+/// Interruption at Ctrl-C while it waits for a pipe.
+std::string ReadTextInput(const std::string& path, std::size_t limit);
 
 /// Does what the value of a flag says. What a library finds wrong with it is
 /// then said of the flag: "--hierarchy: unknown detector ...".

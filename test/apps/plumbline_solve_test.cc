@@ -1462,6 +1462,21 @@ TEST_F(SolveTest, APipeAsInputAnswersTheFirstInterrupt) {
       0)
       << output;
   EXPECT_EQ(SummaryOf("out")["counts"]["scans"], 20);
+  // The small files that flags name.
+  const std::string solve = binary_ + "' --input='" + log + "' --output_dir='" +
+                            (folder_ / "out").string() + "' '--";
+  const std::string simulate = PLUMBLINE_BIN_DIR
+                               "/plumbline_simulate' --output='" +
+                               (folder_ / "simulated.log").string() + "' '--";
+  for (const std::string& command : {solve + "plan", solve + "constraints",
+                                     solve + "map", simulate + "world"}) {
+    EXPECT_EQ(RunInShell("timeout --signal=INT --kill-after=20 1 '" + command +
+                             "=" + pipe_name + "'; exit $?",
+                         &output),
+              124)
+        << command;
+    EXPECT_THAT(output, HasSubstr("interrupted")) << command;
+  }
   // One in the place of an output is refused before the work.
   fs::create_directories(folder_ / "pipes");
   ASSERT_EQ(mkfifo((folder_ / "pipes/map.svg").c_str(), 0600), 0);
@@ -1490,8 +1505,18 @@ TEST_F(SolveTest, FlagsThatAreNotUnderstood) {
       << output;
   EXPECT_EQ(SummaryOf("out")["seed"], 3);
   // Devices and packed nothing have no end.
-  EXPECT_EQ(Solve(log, "out", "--structure_prior=/dev/zero", &output), 2);
-  EXPECT_THAT(output, HasSubstr("/dev/zero: "));
+  for (const char* flag : {"structure_prior", "plan", "constraints", "map"}) {
+    EXPECT_EQ(
+        Solve(log, "out", "--" + std::string(flag) + "=/dev/zero", &output), 2)
+        << flag;
+    EXPECT_THAT(output, HasSubstr("/dev/zero: ")) << flag;
+  }
+  EXPECT_EQ(RunInShell(PLUMBLINE_BIN_DIR
+                           "/plumbline_simulate --world=/dev/zero --output='" +
+                           (folder_ / "simulated.log").string() + "'",
+                       &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("/dev/zero"));
 }
 
 TEST_F(SolveTest, FrameOfTheInformation) {
@@ -2119,6 +2144,26 @@ TEST_F(SolveTest, NumberOfBeamsChanges) {
     EXPECT_NEAR(trajectory[i].pose[0], 0.05 * i, 0.05) << i;
     EXPECT_NEAR(trajectory[i].pose[1], 0.0, 0.05) << i;
   }
+}
+
+// Their steps once grew with the square of the beams.
+TEST_F(SolveTest, AHundredThousandBeams) {
+  constexpr int kBeams = 100000;
+  std::vector<std::string> ranges;
+  for (int i = 0; i < kBeams; ++i) {
+    const double angle = kPi * (static_cast<double>(i) / kBeams - 0.5) + 1e-9;
+    ranges.push_back(std::to_string(
+        std::min(4.0 / std::max(1e-9, std::cos(angle)),
+                 3.0 / std::max(1e-9, std::abs(std::sin(angle))))));
+  }
+  std::string text;
+  for (int i = 0; i < 3; ++i) text += Flaser(ranges, 0.0, 100.0 + i) + "\n";
+  std::string output;
+  ASSERT_EQ(Solve(Write("beams.log", text), "out",
+                  "--outputs=map.json,trajectory.tum", &output),
+            0)
+      << output;
+  EXPECT_EQ(ReadTum((folder_ / "out/trajectory.tum").string()).size(), 3u);
 }
 
 TEST_F(SolveTest, ScansWithoutBeams) {

@@ -2,11 +2,14 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/text_file.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstddef>
 #include <cstdio>
 #include <fstream>
 #include <string>
+#include <thread>
 
 namespace plumbline {
 namespace {
@@ -23,7 +26,8 @@ std::string Refusal(const std::string& path, std::size_t limit) {
 }
 
 TEST(TextFileTest, ReadsUpToItsLimit) {
-  const std::string path = ::testing::TempDir() + "text_file_test";
+  const std::string path =
+      ::testing::TempDir() + "text_file_test_" + std::to_string(getpid());
   for (const std::size_t size : {0, 1, 65536, 200000}) {
     const std::string text(size, 'x');
     std::ofstream(path, std::ios::binary) << text;
@@ -42,6 +46,23 @@ TEST(TextFileTest, WhatIsNoTextFile) {
   EXPECT_THAT(Refusal(::testing::TempDir(), 9), HasSubstr("directory"));
   EXPECT_THAT(Refusal("/dev/zero", 1 << 30),
               HasSubstr("/dev/zero: holds bytes that are zero"));
+}
+
+// Opening one waits for its writer; reading before there is one finds an end.
+TEST(TextFileTest, NamedPipes) {
+  const std::string path =
+      ::testing::TempDir() + "text_file_pipe_" + std::to_string(getpid());
+  std::remove(path.c_str());
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  int asked = 0;
+  EXPECT_EQ(ReadTextFile(path, 100, [&] { return ++asked > 2; }), "");
+  std::thread writer([&] {
+    usleep(100000);
+    std::ofstream(path) << "a\nb\n";
+  });
+  EXPECT_EQ(ReadTextFile(path, 100), "a\nb\n");
+  writer.join();
+  std::remove(path.c_str());
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <set>
@@ -31,6 +32,11 @@ constexpr double kNearArchive = 5.0;
 // Key scans of one visit to a place.
 constexpr std::size_t kShortestVisit = 4;
 constexpr std::size_t kLongestVisit = 40;
+// Visits to a place that are looked at, and key scans that are searched in for
+// each square of the floor, whose side is this, m.
+constexpr std::size_t kMostVisits = 8;
+constexpr std::size_t kMostThere = 32;
+constexpr double kThere = 1.0;
 // Scans that wait for a tie at most while nothing can be tracked.
 constexpr std::size_t kMostPending = 1000;
 // So far from itself a place may lie that is visited again, m and rad.
@@ -651,10 +657,12 @@ bool OdometryRefiner::FindTie(
   const std::vector<ScoredPose> peaks = reference.Peaks(
       view.sparse, center, translation_window, kPi, kLeastScore, kPeakShare,
       kPeaks,
-      is_global ? kNearArchive : std::numeric_limits<double>::infinity());
+      is_global ? kNearArchive : std::numeric_limits<double>::infinity(),
+      stop_);
   std::vector<Hypothesis> hypotheses;
   for (const ScoredPose& peak : peaks) {
     for (const Visit& visit : visits(peak.pose)) {
+      if (stop_ && stop_()) return false;
       Hypothesis hypothesis;
       if (Judge(view, peak, visit, seen_through, is_global, &hypothesis)) {
         hypotheses.push_back(hypothesis);
@@ -862,6 +870,25 @@ void OdometryRefiner::SetArchive(const std::vector<std::size_t>& where,
   matcher->SetReference(std::move(reference), std::move(viewpoints));
 }
 
+std::vector<std::size_t> OdometryRefiner::Thinned(
+    const std::vector<std::size_t>& where) const {
+  std::map<std::pair<long, long>, std::vector<std::size_t>> there;
+  for (const std::size_t k : where) {
+    const Eigen::Vector2d at = archive_[k].pose.head<2>() / kThere;
+    there[{std::lround(at.x()), std::lround(at.y())}].push_back(k);
+  }
+  std::vector<std::size_t> thinned;
+  for (const auto& entry : there) {
+    const std::vector<std::size_t>& all = entry.second;
+    const std::size_t count = std::min(all.size(), kMostThere);
+    for (std::size_t i = 0; i < count; ++i) {
+      thinned.push_back(all[(2 * i + 1) * all.size() / (2 * count)]);
+    }
+  }
+  std::sort(thinned.begin(), thinned.end());
+  return thinned;
+}
+
 bool OdometryRefiner::FindInArchive(const std::vector<KeyScan>& keys,
                                     const std::vector<std::size_t>& where,
                                     std::size_t begin, std::size_t end,
@@ -873,11 +900,11 @@ bool OdometryRefiner::FindInArchive(const std::vector<KeyScan>& keys,
     high = high.cwiseMax(archive_[k].pose.head<2>());
   }
   ScanMatcher matcher(options_.matcher);
-  SetArchive(where, 0, where.size(), &matcher);
+  const std::vector<std::size_t> thinned = Thinned(where);
+  SetArchive(thinned, 0, thinned.size(), &matcher);
   std::deque<ScanMatcher> around;
   const auto visits = [&](const Pose2& pose) {
-    std::vector<Visit> result;
-    around.clear();
+    std::vector<std::pair<std::size_t, std::size_t>> all;
     std::size_t k = 0;
     while (k < where.size()) {
       const auto is_near = [&](std::size_t i) {
@@ -890,10 +917,17 @@ bool OdometryRefiner::FindInArchive(const std::vector<KeyScan>& keys,
       }
       const std::size_t first = k;
       while (k < where.size() && is_near(k) && k - first < kLongestVisit) ++k;
-      if (k - first < kShortestVisit) continue;
+      if (k - first >= kShortestVisit) all.emplace_back(first, k);
+    }
+    // In even steps where they are many.
+    const std::size_t count = std::min(all.size(), kMostVisits);
+    std::vector<Visit> result;
+    around.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto& [first, last] = all[(2 * i + 1) * all.size() / (2 * count)];
       around.emplace_back(options_.matcher);
-      SetArchive(where, first, k, &around.back());
-      result.push_back({&around.back(), first, k});
+      SetArchive(where, first, last, &around.back());
+      result.push_back({&around.back(), first, last});
     }
     return result;
   };
@@ -943,6 +977,7 @@ std::vector<std::vector<std::size_t>> OdometryRefiner::Parts() const {
 
 void OdometryRefiner::JoinParts() {
   // The largest part takes in others, largest first, until none is found.
+  const std::vector<LooseTrack> loose = loose_;
   bool is_joined = num_parts_ > 1;
   int looked_for = 0;
   while (is_joined) {
@@ -954,8 +989,13 @@ void OdometryRefiner::JoinParts() {
     for (std::size_t p = 1; p < parts.size() && !is_joined; ++p) {
       // A log of many parts comes to an end, too.
       if (++looked_for > kMostLateParts) break;
+      if (stop_ && stop_()) break;
       is_joined = JoinPart(parts[0], parts[p]);
     }
+  }
+  if (stop_ && stop_()) {
+    loose_ = loose;
+    late_ties_.clear();
   }
   std::sort(late_ties_.begin(), late_ties_.end(),
             [](const LateTie& a, const LateTie& b) { return a.scan < b.scan; });
@@ -986,6 +1026,7 @@ bool OdometryRefiner::JoinPart(const std::vector<std::size_t>& rest,
   };
   std::vector<Vote> votes;
   for (std::size_t w = 0; w < windows; ++w) {
+    if (stop_ && stop_()) return false;
     const std::size_t begin = windows > 1 ? w * room / (windows - 1) : 0;
     // A jump within a window is none of the track's: parts are whole.
     Vote vote{begin + size / 2, {}};
@@ -1077,11 +1118,13 @@ bool OdometryRefiner::TakeSettled(SettledScan* settled) {
   return true;
 }
 
-void OdometryRefiner::Finish() {
+void OdometryRefiner::Finish(const std::function<bool()>& stop) {
+  stop_ = stop;
   if (open_ != nullptr) Tie(true);
   if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
   guessed_ = -1;
   JoinParts();
+  stop_ = nullptr;
   // No scan follows.
   std::vector<ArchivedKey>().swap(archive_);
 }

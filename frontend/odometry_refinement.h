@@ -252,8 +252,9 @@ class OdometryRefiner {
   bool TakeSettled(SettledScan* settled);
 
   /// Settles what is open, and looks for loose parts in all that was seen: no
-  /// scan follows.
-  void Finish();
+  /// scan follows. `stop` (may be null) is asked now and then; once it has
+  /// returned true nothing more is looked for, and no part is found.
+  void Finish(const std::function<bool()>& stop = nullptr);
 
   /// Parts that Finish found, in the order of scans.
   const std::vector<LateTie>& late_ties() const { return late_ties_; }
@@ -448,6 +449,10 @@ class OdometryRefiner {
   // Sets what was seen from these key scans of the archive, [begin, end).
   void SetArchive(const std::vector<std::size_t>& where, std::size_t begin,
                   std::size_t end, ScanMatcher* matcher) const;
+  // Of these key scans of the archive, ascending, at most so many for each
+  // stretch of floor, in even steps: what the same place looked like the
+  // twentieth time says nothing new.
+  std::vector<std::size_t> Thinned(const std::vector<std::size_t>& where) const;
   // Covariance of a match, in the axes of `from`.
   Eigen::Matrix3d TieCovariance(const Hypothesis& found,
                                 const Pose2& from) const;
@@ -474,6 +479,8 @@ class OdometryRefiner {
   RangeNoise noise_;
   double noise_scale_ = 1.0;
   std::function<void(const std::string&)> trace_;
+  // While Finish runs.
+  std::function<bool()> stop_;
   Track track_;
   std::vector<ScanPoint> points_;
   bool started_ = false;

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <queue>
 #include <tuple>
@@ -46,8 +47,18 @@ constexpr std::int16_t kThrough = -128;
 constexpr double kRotationError = 0.15;
 constexpr double kLeastRotation = DegToRad(1.0);
 constexpr double kMostRotation = DegToRad(3.0);
-// Search nodes after which Peaks gives up.
+// Search nodes after which Peaks gives up, and between two questions whether to
+// stop: some hundredths of a second.
 constexpr int kMaxNodes = 3000000;
+constexpr int kNodesAtOnce = 20000;
+// A point's most score, the points between two looks at what a pose can still
+// come to, and the step in which points are taken.
+constexpr int kMostScore = 255;
+constexpr std::size_t kBoundBlock = 16;
+constexpr std::size_t kSpread = 8;
+// Search: one in so many poses of the lattice, each way, is looked at first.
+constexpr int kFewSteps = 3;
+constexpr int kFewRotations = 3;
 
 // Cosine of the largest angle between the normals of partners.
 constexpr double kSameSide = 0.7;
@@ -75,6 +86,20 @@ struct Nearest {
            (distance == squared_distance && index >= 0 && i < index);
   }
 };
+
+// The same points in an order in which those of every surface are spread over
+// the whole: what does not fit shows early.
+std::vector<Eigen::Vector2d> Spread(
+    const std::vector<Eigen::Vector2d>& points) {
+  std::vector<Eigen::Vector2d> spread;
+  spread.reserve(points.size());
+  for (std::size_t first = 0; first < kSpread; ++first) {
+    for (std::size_t i = first; i < points.size(); i += kSpread) {
+      spread.push_back(points[i]);
+    }
+  }
+  return spread;
+}
 
 // What PeakSearch looks at.
 struct PeakGrid {
@@ -119,23 +144,34 @@ class PeakSearch {
 
   // Opens the coarsest nodes of the window that are within `reach`, m, of a
   // viewpoint.
-  void OpenAll(double reach) {
-    const int stride = 1 << (kLevels - 1);
-    for (int y = -window_; y <= window_; y += stride) {
-      for (int x = -window_; x <= window_; x += stride) {
-        if (!IsNear(x, y, reach)) continue;
+  void OpenAll(double reach, const std::function<bool()>& stop) {
+    // Where no point is on the grid no pose has a score.
+    const NodeRange columns = NodesOnGrid(&Cell::x, grid_.columns);
+    const NodeRange rows = NodesOnGrid(&Cell::y, grid_.rows);
+    const std::vector<char> is_near = NearNodes(reach, columns, rows);
+    std::size_t node = 0;
+    for (int i = rows.begin; i < rows.end; ++i) {
+      if (stop && stop()) return;
+      for (int j = columns.begin; j < columns.end; ++j) {
+        if (!is_near[node++]) continue;
         for (int k = 0; k < static_cast<int>(cells_.size()); ++k) {
-          Open(kLevels - 1, k, x, y);
+          Open(kLevels - 1, k, j * kStride - window_, i * kStride - window_);
         }
       }
     }
   }
 
   // The peaks, best first, that have `share` of the best one's score.
-  std::vector<ScoredPose> Run(double share, int max_peaks) {
+  std::vector<ScoredPose> Run(double share, int max_peaks,
+                              const std::function<bool()>& stop) {
     std::vector<ScoredPose> peaks;
+    int asked_at = nodes_;
     while (!open_.empty() && static_cast<int>(peaks.size()) < max_peaks &&
            nodes_ < kMaxNodes) {
+      if (stop && nodes_ - asked_at >= kNodesAtOnce) {
+        if (stop()) return {};
+        asked_at = nodes_;
+      }
       const Node node = open_.top();
       open_.pop();
       if (node.bound < least_) break;
@@ -151,6 +187,9 @@ class PeakSearch {
   }
 
  private:
+  // Of the coarsest nodes, cells.
+  static constexpr int kStride = 1 << (kLevels - 1);
+
   struct Cell {
     int x;
     int y;
@@ -232,19 +271,69 @@ class PeakSearch {
     }
   }
 
-  // Whether some pose of a coarsest node may be within reach of a viewpoint.
-  bool IsNear(int x, int y, double reach) const {
-    if (!std::isfinite(reach)) return true;
-    const double half = 0.5 * (1 << (kLevels - 1));
+  // Coarsest nodes along an axis, [begin, end): from -window_ on in steps.
+  struct NodeRange {
+    int begin;
+    int end;
+    std::size_t size() const {
+      return static_cast<std::size_t>(std::max(0, end - begin));
+    }
+  };
+
+  // Those that bring some point onto the grid, of so many cells.
+  NodeRange NodesOnGrid(int Cell::*axis, int size) const {
+    int low = std::numeric_limits<int>::max();
+    int high = std::numeric_limits<int>::lowest();
+    for (const std::vector<Cell>& cells : cells_) {
+      for (const Cell& cell : cells) {
+        low = std::min(low, cell.*axis);
+        high = std::max(high, cell.*axis);
+      }
+    }
+    const std::int64_t first =
+        std::max<std::int64_t>(0, std::int64_t{window_} - high + kStride - 1);
+    const std::int64_t last =
+        window_ + std::min<std::int64_t>(window_, std::int64_t{size} - 1 - low);
+    if (last < 0) return {0, 0};
+    return {static_cast<int>(first / kStride),
+            static_cast<int>(last / kStride + 1)};
+  }
+
+  // By node, a row of columns after the other: whether some pose of it may be
+  // within reach, m, of a viewpoint.
+  std::vector<char> NearNodes(double reach, const NodeRange& columns,
+                              const NodeRange& rows) const {
+    std::vector<char> is_near(columns.size() * rows.size(),
+                              std::isfinite(reach) ? 0 : 1);
+    if (is_near.empty() || !std::isfinite(reach)) return is_near;
+    const double size = kStride * grid_.resolution;
+    const auto middle = [&](int node, int axis) {
+      return center_[axis] +
+             (node * kStride - window_ + 0.5 * kStride) * grid_.resolution;
+    };
     // From the middle of a node its corners are so far.
-    const double half_diagonal = std::sqrt(2.0) * half * grid_.resolution;
-    const Eigen::Vector2d middle(center_[0] + (x + half) * grid_.resolution,
-                                 center_[1] + (y + half) * grid_.resolution);
-    return std::any_of(grid_.viewpoints.begin(), grid_.viewpoints.end(),
-                       [&](const Viewpoint& viewpoint) {
-                         return (viewpoint.position - middle).norm() <=
-                                reach + half_diagonal;
-                       });
+    const double radius = reach + std::sqrt(0.5) * size;
+    const auto clamped = [](double node, const NodeRange& range) {
+      return static_cast<int>(std::clamp<double>(node, range.begin, range.end));
+    };
+    for (const Viewpoint& viewpoint : grid_.viewpoints) {
+      const Eigen::Vector2d at =
+          (viewpoint.position - Eigen::Vector2d(middle(0, 0), middle(0, 1))) /
+          size;
+      const double far = radius / size + 1.0;
+      const int last_row = clamped(at.y() + far, rows);
+      const int last_column = clamped(at.x() + far, columns);
+      for (int i = clamped(at.y() - far, rows); i < last_row; ++i) {
+        for (int j = clamped(at.x() - far, columns); j < last_column; ++j) {
+          const Eigen::Vector2d node(middle(j, 0), middle(i, 1));
+          if ((viewpoint.position - node).norm() <= radius) {
+            is_near[static_cast<std::size_t>(i - rows.begin) * columns.size() +
+                    static_cast<std::size_t>(j - columns.begin)] = 1;
+          }
+        }
+      }
+    }
+    return is_near;
   }
 
   // Whether all of the node lies beside one of the peaks.
@@ -733,7 +822,8 @@ void ScanMatcher::BuildLevels() const {
 std::vector<ScoredPose> ScanMatcher::Peaks(
     const std::vector<Eigen::Vector2d>& points, const Pose2& center,
     double translation_window, double rotation_window, double minimum_score,
-    double share, int max_peaks, double reach) const {
+    double share, int max_peaks, double reach,
+    const std::function<bool()>& stop) const {
   if (reference_.empty() || points.empty()) return {};
   if (levels_.empty()) BuildLevels();
   const PeakGrid grid{
@@ -741,8 +831,8 @@ std::vector<ScoredPose> ScanMatcher::Peaks(
       origin_, options_.grid_resolution,   viewpoints_};
   PeakSearch search(grid, points, center, translation_window, rotation_window,
                     minimum_score);
-  search.OpenAll(reach);
-  return search.Run(share, max_peaks);
+  search.OpenAll(reach, stop);
+  return search.Run(share, max_peaks, stop);
 }
 
 ScanAgreement ScanMatcher::Compare(const std::vector<ScanPoint>& scan,
@@ -838,52 +928,92 @@ Pose2 ScanMatcher::Search(const std::vector<ScanPoint>& scan,
   }
   if (points.empty()) return center;
 
+  points = Spread(points);
+
   const double resolution = options_.grid_resolution;
   const int rotations =
       static_cast<int>(std::ceil(rotation_window / options_.rotation_step));
   const int steps = static_cast<int>(
       std::ceil(translation_window / options_.search_step - 1e-9));
-  Pose2 best = center;
-  // Where nothing fits at all the prediction stands.
-  double best_score = 0.0;
+  const Eigen::Vector2d shift = (center.head<2>() - origin_) / resolution;
+  const double normalization = 1.0 / (kMostScore * points.size());
   std::vector<Eigen::Vector2d> rotated(points.size());
-  const double normalization = 1.0 / (255.0 * points.size());
-  for (int k = -rotations; k <= rotations; ++k) {
-    const double offset =
-        rotations > 0 ? k * (rotation_window / rotations) : 0.0;
-    const double theta = center[2] + offset;
+  const auto angle = [&](int k) {
+    return rotations > 0 ? k * (rotation_window / rotations) : 0.0;
+  };
+  const auto rotate = [&](int k) {
+    const double theta = center[2] + angle(k);
     const double c = std::cos(theta) / resolution;
     const double s = std::sin(theta) / resolution;
-    const Eigen::Vector2d shift = (center.head<2>() - origin_) / resolution;
     for (std::size_t i = 0; i < points.size(); ++i) {
       rotated[i] =
           shift + Eigen::Vector2d(c * points[i].x() - s * points[i].y(),
                                   s * points[i].x() + c * points[i].y());
     }
+  };
+  const int side = 2 * steps + 1;
+  std::vector<double> penalties;
+  penalties.reserve(static_cast<std::size_t>(side) * side);
+  for (int iy = -steps; iy <= steps; ++iy) {
+    for (int ix = -steps; ix <= steps; ++ix) {
+      penalties.push_back(
+          0.03 *
+          std::hypot(ix * options_.search_step, iy * options_.search_step) /
+          0.5);
+    }
+  }
+  // The score of a pose of the lattice, whose points are rotated; something
+  // below `least` when it is less than that.
+  const auto value_at = [&](int k, int ix, int iy, double least) {
+    // Ties go to the pose nearest to the prediction.
+    const double share =
+        1.0 - 0.05 * std::abs(angle(k)) / DegToRad(30.0) -
+        penalties[static_cast<std::size_t>(iy + steps) * side + (ix + steps)];
+    const double cx = ix * options_.search_step / resolution;
+    const double cy = iy * options_.search_step / resolution;
+    int sum = 0;
+    for (std::size_t begin = 0; begin < rotated.size(); begin += kBoundBlock) {
+      const std::size_t end = std::min(begin + kBoundBlock, rotated.size());
+      const int most =
+          sum + kMostScore * static_cast<int>(rotated.size() - begin);
+      const double bound = most * normalization * share;
+      if (bound < least) return bound;
+      for (std::size_t i = begin; i < end; ++i) {
+        const int column = static_cast<int>(rotated[i].x() + cx);
+        const int row = static_cast<int>(rotated[i].y() + cy);
+        if (static_cast<unsigned>(column) <
+                static_cast<unsigned>(field_columns_) &&
+            static_cast<unsigned>(row) < static_cast<unsigned>(field_rows_)) {
+          sum +=
+              field_[static_cast<std::size_t>(row) * field_columns_ + column];
+        }
+      }
+    }
+    return sum * normalization * share;
+  };
+  // What the best pose has at least: that of the best of a few.
+  double least = 0.0;
+  for (int k = -rotations; k <= rotations; k += kFewRotations) {
+    rotate(k);
+    for (int iy = -steps; iy <= steps; iy += kFewSteps) {
+      for (int ix = -steps; ix <= steps; ix += kFewSteps) {
+        least = std::max(least, value_at(k, ix, iy, least));
+      }
+    }
+  }
+  Pose2 best = center;
+  // Where nothing fits at all the prediction stands.
+  double best_score = 0.0;
+  for (int k = -rotations; k <= rotations; ++k) {
+    rotate(k);
     for (int iy = -steps; iy <= steps; ++iy) {
       for (int ix = -steps; ix <= steps; ++ix) {
-        const double dx = ix * options_.search_step;
-        const double dy = iy * options_.search_step;
-        const double cx = dx / resolution;
-        const double cy = dy / resolution;
-        int sum = 0;
-        for (const Eigen::Vector2d& point : rotated) {
-          const int column = static_cast<int>(point.x() + cx);
-          const int row = static_cast<int>(point.y() + cy);
-          if (static_cast<unsigned>(column) <
-                  static_cast<unsigned>(field_columns_) &&
-              static_cast<unsigned>(row) < static_cast<unsigned>(field_rows_)) {
-            sum +=
-                field_[static_cast<std::size_t>(row) * field_columns_ + column];
-          }
-        }
-        // Ties go to the pose nearest to the prediction.
-        const double value = sum * normalization *
-                             (1.0 - 0.05 * std::abs(offset) / DegToRad(30.0) -
-                              0.03 * std::hypot(dx, dy) / 0.5);
-        if (value > best_score) {
+        const double value = value_at(k, ix, iy, std::max(least, best_score));
+        if (value > best_score && value >= least) {
           best_score = value;
-          best = Pose2(center[0] + dx, center[1] + dy, theta);
+          best = Pose2(center[0] + ix * options_.search_step,
+                       center[1] + iy * options_.search_step,
+                       center[2] + angle(k));
         }
       }
     }

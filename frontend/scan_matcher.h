@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -127,12 +128,14 @@ class ScanMatcher {
   /// `max_peaks` at most. The score is the mean over the points: 1 on a
   /// surface, 0 where the reference has not looked, negative where it has
   /// looked through. Positions farther than `reach`, m, from all viewpoints
-  /// are left out. Branch and bound: exact on its lattice.
+  /// are left out. Branch and bound: exact on its lattice. `stop` (may be null)
+  /// is asked now and then; once it has returned true there are no peaks.
   std::vector<ScoredPose> Peaks(
       const std::vector<Eigen::Vector2d>& points, const Pose2& center,
       double translation_window, double rotation_window, double minimum_score,
       double share, int max_peaks,
-      double reach = std::numeric_limits<double>::infinity()) const;
+      double reach = std::numeric_limits<double>::infinity(),
+      const std::function<bool()>& stop = nullptr) const;
 
   /// Least distance of two peaks, m, and rad.
   static constexpr double kPeakDistance = 0.6;

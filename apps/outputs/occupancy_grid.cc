@@ -247,7 +247,11 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
     high = high.cwiseMax(laser.head<2>());
   }
   OccupancyGrid grid(low, high, options);
-  for (std::size_t i = 0; i < poses.size(); ++i) {
+  const std::size_t step =
+      options.max_scans == 0
+          ? 1
+          : (poses.size() + options.max_scans - 1) / options.max_scans;
+  for (std::size_t i = 0; i < poses.size(); i += step) {
     grid.AddScan(scans[i], poses[i]);
   }
   return grid;

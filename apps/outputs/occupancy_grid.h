@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <ostream>
@@ -31,6 +32,8 @@ struct OccupancyOptions {
   double occupied_share = 0.25;
   /// Rim of unknown cells around what was seen.
   int border = 10;
+  /// Most scans that rays are cast for, in even steps through the log; 0: all.
+  std::size_t max_scans = 0;
   /// Most cells that the grid may have (width times height).
   std::int64_t max_cells = 100'000'000;
 };
@@ -105,9 +108,9 @@ class OccupancyGrid {
   std::vector<Ray> rays_;
 };
 
-/// The grid of all scans, one pose (map frame) per scan; poses that are not
-/// finite are passed over. Throws as the constructor does, also when there is
-/// nothing to be seen.
+/// The grid of all scans, or of OccupancyOptions::max_scans, one pose (map
+/// frame) per scan; poses that are not finite are passed over. Throws as the
+/// constructor does, also when there is nothing to be seen.
 OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
                                 const std::vector<Pose2>& poses,
                                 const OccupancyOptions& options);

@@ -32,12 +32,21 @@ using std::filesystem::path;
 // Of a grid on which rooms are found, m.
 constexpr double kPlanResolution = 0.05;
 constexpr double kCoarsestPlanResolution = 0.1;
+// Scans whose rays the grid of a run that was interrupted has: who pressed
+// Ctrl-C waits.
+constexpr std::size_t kMostScansOfAPart = 4000;
 
 std::vector<Pose2> Poses(const SolveOutcome& outcome) {
   std::vector<Pose2> poses;
   poses.reserve(outcome.trajectory.size());
   for (const TimedPose& timed : outcome.trajectory) poses.push_back(timed.pose);
   return poses;
+}
+
+OccupancyOptions GridOptions(const SolveOutcome& outcome) {
+  OccupancyOptions options = outcome.occupancy;
+  if (outcome.summary.partial) options.max_scans = kMostScansOfAPart;
+  return options;
 }
 
 }  // namespace
@@ -50,7 +59,7 @@ class SharedParts {
     std::call_once(grid_once_, [&] {
       try {
         grid_ = MakeOccupancyGrid(*outcome.scans, Poses(outcome),
-                                  outcome.occupancy);
+                                  GridOptions(outcome));
       } catch (const Error& error) {
         no_grid_ = error.what();
       }
@@ -93,7 +102,7 @@ class SharedParts {
  private:
   void FindRooms(const SolveOutcome& outcome) {
     // Too fine a grid has holes, too coarse a one no doors.
-    OccupancyOptions options = outcome.occupancy;
+    OccupancyOptions options = GridOptions(outcome);
     if (options.resolution >= 0.5 * kPlanResolution &&
         options.resolution <= kCoarsestPlanResolution) {
       std::string reason;

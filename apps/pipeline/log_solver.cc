@@ -477,7 +477,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
   {
     const Stopwatch watch;
     double em_seconds = 0.0;
-    refiner_.Finish();
+    refiner_.Finish([&context] { return context.IsStopped(); });
     TakeSettled(scans, Settled(), &em_seconds);
     if (!refiner_.late_ties().empty() && !result.interrupted) {
       TakeAnew(scans, &em_seconds);

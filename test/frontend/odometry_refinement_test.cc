@@ -592,6 +592,8 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
   OdometryRefinementOptions options = Options();
   options.tracking.max_open_keys = 30;
   OdometryRefiner refiner(options);
+  // Is interrupted while it looks for the part.
+  OdometryRefiner stopped(options);
   constexpr int kCarried = 70;
   std::vector<Pose2> truths;
   std::vector<RefinedScan> refined;
@@ -608,8 +610,15 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
     scan.timestamp = 100.0 + 0.2 * i + (i < kCarried ? 0.0 : 40.0);
     scan.odometry = odometry;
     refiner.Process(scan);
+    stopped.Process(scan);
     refined = TakeAll(&refiner, std::move(refined));
   }
+  int asked = 0;
+  stopped.Finish([&asked] { return ++asked > 3; });
+  EXPECT_GT(asked, 3);
+  EXPECT_TRUE(stopped.late_ties().empty());
+  ASSERT_EQ(stopped.loose().size(), 1u);
+  EXPECT_FALSE(stopped.loose()[0].found);
   refiner.Finish();
   refined = TakeAll(&refiner, std::move(refined));
   EXPECT_EQ(refined[kCarried].tie, TrackTie::kLoose);

@@ -273,6 +273,24 @@ TEST(OccupancyGridTest, CellsAreAlignedAndHoldBothCorners) {
   EXPECT_EQ(grid.height(), 1 + 4);
 }
 
+TEST(OccupancyGridTest, SoManyScansInEvenSteps) {
+  std::vector<Scan> scans;
+  std::vector<Pose2> poses;
+  for (int i = 0; i < 5; ++i) {
+    scans.push_back(MakeScan(0.0, 1.0, {2.0f}));
+    poses.emplace_back(0.5, i + 0.5, 0.0);
+  }
+  OccupancyOptions options = Coarse();
+  EXPECT_EQ(Drawing(MakeOccupancyGrid(scans, poses, options)),
+            "..#\n..#\n..#\n..#\n..#\n");
+  options.max_scans = 3;
+  EXPECT_EQ(Drawing(MakeOccupancyGrid(scans, poses, options)),
+            "..#\n   \n..#\n   \n..#\n");
+  options.max_scans = 5;
+  EXPECT_EQ(Drawing(MakeOccupancyGrid(scans, poses, options)),
+            "..#\n..#\n..#\n..#\n..#\n");
+}
+
 TEST(OccupancyGridTest, TooManyCellsAreRefusedWithWhatWouldDo) {
   OccupancyOptions options;
   options.max_cells = 1000000;

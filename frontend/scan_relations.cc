@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <utility>
 
@@ -76,27 +77,40 @@ std::vector<ScanPoint> Reference(const Submap& submap,
 
 // At most `most` of the submaps near a place, given nearest first: the nearest
 // half, and others in even steps of time, so that every visit has its share.
+// Those that it was matched with before come first: where many are near, the
+// steps fall on others whenever a pose moves a little.
 std::vector<int> Spread(const std::vector<std::pair<double, int>>& near,
-                        int most) {
+                        int most, const std::function<bool(int)>& is_known) {
   std::vector<int> chosen, others;
   for (const auto& [distance, submap] : near) {
     const bool is_nearest = static_cast<int>(near.size()) <= most ||
                             static_cast<int>(chosen.size()) < (most + 1) / 2;
     (is_nearest ? chosen : others).push_back(submap);
   }
-  std::sort(others.begin(), others.end());
   if (others.empty()) return chosen;
-  const std::size_t room = static_cast<std::size_t>(most) - chosen.size();
-  for (std::size_t i = 0; i < room; ++i) {
-    chosen.push_back(others[(2 * i + 1) * others.size() / (2 * room)]);
+  std::sort(others.begin(), others.end());
+  std::size_t room = static_cast<std::size_t>(most) - chosen.size();
+  std::vector<int> unknown;
+  for (const int submap : others) {
+    if (room > 0 && is_known(submap)) {
+      chosen.push_back(submap);
+      --room;
+    } else {
+      unknown.push_back(submap);
+    }
+  }
+  for (std::size_t i = 0; i < std::min(room, unknown.size()); ++i) {
+    chosen.push_back(unknown[(2 * i + 1) * unknown.size() / (2 * room)]);
   }
   return chosen;
 }
 
-// For each submap the places to match with it, ascending.
-std::vector<std::vector<int>> Assign(const std::vector<Submap>& submaps,
-                                     const std::vector<Pose2>& poses,
-                                     const ScanRelationOptions& options) {
+// For each submap the places to match with it, ascending. `is_known`: whether
+// a submap and a place were matched before.
+std::vector<std::vector<int>> Assign(
+    const std::vector<Submap>& submaps, const std::vector<Pose2>& poses,
+    const ScanRelationOptions& options,
+    const std::function<bool(int submap, int place)>& is_known) {
   const auto cell = [&](const Pose2& pose) {
     return std::make_pair(
         static_cast<long>(std::floor(pose[0] / options.radius)),
@@ -126,7 +140,10 @@ std::vector<std::vector<int>> Assign(const std::vector<Submap>& submaps,
       }
     }
     std::sort(near.begin(), near.end());
-    for (const int i : Spread(near, options.max_submaps)) keys[i].push_back(k);
+    const auto was_matched = [&](int submap) { return is_known(submap, k); };
+    for (const int i : Spread(near, options.max_submaps, was_matched)) {
+      keys[i].push_back(k);
+    }
   }
   return keys;
 }
@@ -173,7 +190,10 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
                           "one pose a place");
   }
   const std::vector<Submap> submaps = Submaps(places_, options_.submap_size);
-  const std::vector<std::vector<int>> keys = Assign(submaps, poses, options_);
+  const std::vector<std::vector<int>> keys =
+      Assign(submaps, poses, options_, [this](int submap, int place) {
+        return attempts_[static_cast<std::size_t>(submap)].count(place) > 0;
+      });
 
   MatchPrior prior;
   prior.information =

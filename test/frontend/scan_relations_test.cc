@@ -136,6 +136,21 @@ TEST_F(ScanRelationsTest, VisitsShareWhatAPlaceIsMatchedWith) {
   EXPECT_GE(last_visit, 9);
 }
 
+// Where a place has more submaps than it is matched with, those that it was
+// matched with stay, whoever else comes near or goes.
+TEST_F(ScanRelationsTest, VisitsThatWereMatchedAreNotMatchedAnew) {
+  Drive(testing::Room(10.0, 6.0), /*visits=*/12);
+  options_.max_submaps = 6;
+  ScanMatchFinder finder(places_, options_);
+  finder.Find(truth_);
+  const std::int64_t all = finder.num_tried();
+  // The last visits: some of their submaps were 4 m away, just near enough.
+  std::vector<Pose2> poses = truth_;
+  for (std::size_t i = 9 * 8; i < poses.size(); ++i) poses[i][0] += 1e-6;
+  finder.Find(poses);
+  EXPECT_LT(finder.num_tried(), all / 20);
+}
+
 TEST_F(ScanRelationsTest, SameForAnyNumberOfThreads) {
   Drive(testing::Room(10.0, 6.0));
   const std::vector<Pose2> poses = Drifted(Pose2(0.1, 0.1, 0.01));

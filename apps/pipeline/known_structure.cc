@@ -496,11 +496,13 @@ std::optional<Pose2> KnownStructureBinder::PlacePlan(
     for (const double turn : turns) {
       for (const ScoredPose& peak :
            matcher.Peaks(part, Pose2(center.x(), center.y(), turn), window,
-                         kTurnWindow, kLeastScore, kScoreShare, kMostPeaks)) {
+                         kTurnWindow, kLeastScore, kScoreShare, kMostPeaks,
+                         std::numeric_limits<double>::infinity(), stop)) {
         peaks.push_back(peak);
       }
     }
     for (const ScoredPose& peak : peaks) {
+      if (stop && stop()) return std::nullopt;
       const bool is_known =
           std::any_of(places.begin(), places.end(), [&](const Place& other) {
             const Eigen::Vector2d there =

@@ -16,6 +16,7 @@ namespace {
 constexpr double kLeastLength = 0.3;
 constexpr std::size_t kMostLines = 20000;
 constexpr double kAbsurdCoordinate = 1e7;
+constexpr double kMostLength = 1e5;  // of all lines, m
 constexpr int kShownLayers = 20;
 
 // $INSUNITS in metres; 0 for what no building is drawn in.
@@ -97,6 +98,14 @@ class DxfReader {
     if (lines_.empty()) {
       throw Error(name_, 0, "has lines of less than 0.3 m only",
                   "walls, and the drawing's unit in $INSUNITS");
+    }
+    double length = 0.0;
+    for (const PlanLine& line : lines_) {
+      length += (line.end - line.begin).norm();
+    }
+    if (length > kMostLength) {
+      throw Error(name_, 0, "has more than 100 km of lines",
+                  "walls of a building, and the drawing's unit in $INSUNITS");
     }
     if (notes != nullptr) {
       if (!has_unit_) {

@@ -150,6 +150,34 @@ TEST_F(StatementTest, SaysWhereThereIsNoWall) {
                              HasSubstr("both points are at one wall")));
 }
 
+// A drawing has a frame, or a second building far away: neither memory nor time
+// may grow with that distance.
+TEST_F(StatementTest, WhatIsFarAwayInThePlanDoesNotCount) {
+  MakeWalls(
+      {Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi), Pose2(1.0, 5.0, 0.3),
+       Pose2(-3.0, 3.0, 0.5 * kPi), Pose2(5.0, -1.5, 0.0)},
+      0.02);
+  KnownStructure known;
+  const PoseTransform elsewhere(Pose2(100.0, -50.0, 0.65));
+  for (std::size_t i = 0; i < walls_.size(); ++i) {
+    const PoseTransform wall(Wall(i));
+    PlanLine line;
+    line.begin = elsewhere.Point(wall.Point(Eigen::Vector2d(-2.0, 0.0)));
+    line.end = elsewhere.Point(wall.Point(Eigen::Vector2d(2.0, 0.0)));
+    known.plan.push_back(line);
+  }
+  for (const double far : {5e3, -1e6}) {
+    PlanLine line;
+    line.begin = Eigen::Vector2d(far, far);
+    line.end = Eigen::Vector2d(far + 3.0, far);
+    known.plan.push_back(line);
+  }
+  KnownStructureBinder binder(known, registry_, pose_, &graph_);
+  EXPECT_EQ(binder.TieToPlan(), static_cast<int>(walls_.size()));
+  EXPECT_THAT(binder.Notes(),
+              Contains(HasSubstr("agrees with 20.0 m of 20.0 m")));
+}
+
 // The first half of a drive, which closes no loop.
 class PlanTest : public ::testing::Test {
  protected:

@@ -102,6 +102,8 @@ TEST(PlanDxfTest, RefusesWhatIsNone) {
               HasSubstr("is no coordinate"));
   EXPECT_THAT(WhyNot(Drawing(Line("WALLS", "0", "0", "1e9", "0"))),
               HasSubstr("absurdly far"));
+  EXPECT_THAT(WhyNot(Drawing(Line("WALLS", "0", "0", "2e5", "0"))),
+              HasSubstr("more than 100 km"));
   EXPECT_THAT(WhyNot(Drawing(Line("WALLS", "0", "0", "1", "0"), "3")),
               HasSubstr("no unit of a building"));
 }

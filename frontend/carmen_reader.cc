@@ -156,42 +156,47 @@ double Median(std::vector<double> values) {
 // flat wall 8 m away fills less than a tenth of the beams to within 1.5 cm.
 double SaturatedRange(const std::vector<Scan>& scans, double limit) {
   constexpr double kSmallest = 7.5;
-  constexpr int kBins = 20000;         // of 1 cm
+  constexpr int kMostBins = 20000;     // of 1 cm
   constexpr int kHalfPile = 15;        // bins
   constexpr int kBelow = 100;          // bins
   constexpr int kTop = 2 * kHalfPile;  // bins
   constexpr std::int64_t kMinimum = 20;
-  std::vector<std::int64_t> histogram(kBins, 0);
-  std::int64_t total = 0;
   const auto bin_of = [](float range) {
     return static_cast<int>(std::lround(range * 100.0));
   };
+  std::vector<std::int64_t> histogram;
+  std::int64_t total = 0;
   for (const Scan& scan : scans) {
     for (const float range : scan.ranges) {
       if (!(range > 0.0f && range < limit)) continue;
       ++total;
       const int bin = bin_of(range);
-      if (bin < kBins) ++histogram[bin];
+      if (bin >= kMostBins) continue;
+      if (bin >= static_cast<int>(histogram.size())) {
+        histogram.resize(static_cast<std::size_t>(bin) + 1, 0);
+      }
+      ++histogram[bin];
     }
   }
+  const int bins = static_cast<int>(histogram.size());
   const std::int64_t enough = std::max(kMinimum, total / 1000);
-  const auto sum = [&histogram](int first, int last) {
+  const auto sum = [&histogram, bins](int first, int last) {
     std::int64_t result = 0;
-    for (int i = std::max(first, 0); i <= std::min(last, kBins - 1); ++i)
+    for (int i = std::max(first, 0); i <= std::min(last, bins - 1); ++i)
       result += histogram[i];
     return result;
   };
   std::int64_t window = 0;
-  int top = kBins - 1;
+  int top = bins - 1;
   for (; top >= 0; --top) {
     // Readings in [top, top + kTop).
     window += histogram[top];
-    if (top + kTop < kBins) window -= histogram[top + kTop];
+    if (top + kTop < bins) window -= histogram[top + kTop];
     if (window >= enough) break;
   }
   if (top < 0) return 0.0;
   const auto first = histogram.begin() + std::max(0, top - kHalfPile);
-  const auto last = histogram.begin() + std::min(kBins, top + kTop);
+  const auto last = histogram.begin() + std::min(bins, top + kTop);
   const int peak =
       static_cast<int>(std::max_element(first, last) - histogram.begin());
   if (peak < kSmallest * 100.0) return 0.0;

@@ -19,6 +19,7 @@ namespace plumbline {
 namespace {
 
 constexpr std::size_t kChunk = std::size_t{1} << 18;
+constexpr std::size_t kLeastChunk = std::size_t{1} << 12;
 // Of as many bytes at once without any other it is plain that no text comes.
 constexpr std::size_t kManyZeros = std::size_t{1} << 14;
 
@@ -48,6 +49,10 @@ class StoredBytes {
   std::size_t size() const { return end_ - begin_; }
   void Consume(std::size_t count) { begin_ += count; }
   std::int64_t bytes_read() const { return bytes_read_; }
+  // How many bytes it is worth to unpack at a time.
+  std::size_t chunk() const {
+    return std::clamp(buffer_.size(), kLeastChunk, kChunk);
+  }
 
   // Reads on until at least `count` bytes are there; false when the end comes
   // first.
@@ -142,6 +147,7 @@ class InputStream::Unpacker {
 
   const std::string& damage() const { return damage_; }
   std::int64_t bytes_read() const { return bytes_->bytes_read(); }
+  std::size_t chunk() const { return bytes_->chunk(); }
 
   static std::unique_ptr<Unpacker> Create(std::unique_ptr<StoredBytes> bytes);
 
@@ -417,8 +423,10 @@ bool InputStream::Fill() {
     end_ -= begin_;
     begin_ = 0;
   }
-  if (buffer_.size() < end_ + kChunk)
-    buffer_.resize(std::max(end_ + kChunk, 2 * buffer_.size()));
+  const std::size_t wanted = end_ + unpacker_->chunk();
+  if (buffer_.size() < wanted) {
+    buffer_.resize(std::max(wanted, 2 * buffer_.size()));
+  }
   const std::size_t count =
       unpacker_->Unpack(buffer_.data() + end_, buffer_.size() - end_);
   end_ += count;

@@ -5,16 +5,15 @@
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/command_line.h>
 #include <plumbline/core/error.h>
-#include <unistd.h>
 
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "scratch_folder.h"
 
 DEFINE_bool(structure, true, "");
 DEFINE_int32(num_threads, 1, "");
@@ -23,25 +22,6 @@ DEFINE_double(link_radius, 10.0, "");
 DEFINE_string(input, "", "");
 
 namespace {
-
-// Of this process alone, and gone with it.
-class ScratchFile {
- public:
-  ScratchFile()
-      : path_(std::filesystem::temp_directory_path() /
-              ("plumbline_flags_fuzz_" + std::to_string(getpid()))) {}
-  ~ScratchFile() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-  std::string Write(const std::string& text) const {
-    std::ofstream(path_, std::ios::binary) << text;
-    return path_.string();
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 void Require(bool holds) {
   if (!holds) std::abort();
@@ -64,10 +44,11 @@ bool NamesFiles(const std::string& text) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
                                       std::size_t size) {
-  static const ScratchFile file;
+  static const plumbline::ScratchFolder folder("flags");
   const std::string text(reinterpret_cast<const char*>(data), size);
   if (NamesFiles(text)) return 0;
-  CheckAccepted(plumbline::ReadCommandLine({"--flagfile=" + file.Write(text)}));
+  CheckAccepted(plumbline::ReadCommandLine(
+      {"--flagfile=" + folder.Write("flags", text)}));
   if (text.find('\0') == std::string::npos) {
     std::vector<std::string> words;
     std::istringstream lines(text);

@@ -31,6 +31,10 @@ void Solve(const plumbline::Log& log, plumbline::RawFeatures features) {
   // A round of EM on the way.
   options.em_every = 4;
   options.odometry.key_distance = 0.05;
+  // Jumps of odometry are what most mutations make: the wide searches that
+  // follow would take nearly all of the time.
+  options.odometry.max_search_translation = 0.6;
+  options.odometry.tracking.max_local_search = 0.8;
   plumbline::LogSolver solver(BuiltIns(), options);
   const plumbline::LogSolverResult result = solver.Run(log);
   if (result.trajectory.size() != log.scans.size()) std::abort();

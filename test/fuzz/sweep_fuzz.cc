@@ -4,38 +4,16 @@
 #include <plumbline/apps/sweep/sweep.h>
 #include <plumbline/apps/sweep/sweep_grid.h>
 #include <plumbline/core/error.h>
-#include <unistd.h>
 
 #include <cstdint>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "scratch_folder.h"
+
 namespace {
-
-// Of this process alone, and gone with it.
-class ScratchFolder {
- public:
-  ScratchFolder()
-      : path_(std::filesystem::temp_directory_path() /
-              ("plumbline_sweep_fuzz_" + std::to_string(getpid()))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  std::string Write(const std::string& text) const {
-    std::ofstream(path_ / "sweep.json", std::ios::binary) << text;
-    return path_.string();
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 // More runs than this take longer to list than a run of the fuzzer.
 constexpr std::size_t kMostRuns = 1000;
@@ -74,10 +52,10 @@ void ReadSweep(const std::string& folder) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
                                       std::size_t size) {
-  static const ScratchFolder folder;
+  static const plumbline::ScratchFolder folder("sweep");
   const std::string text(reinterpret_cast<const char*>(data), size);
-  const std::string path = folder.Write(text);
-  Try([&] { ReadSweep(path); });
+  folder.Write("sweep.json", text);
+  Try([&] { ReadSweep(folder.path()); });
   Try([&] { plumbline::Numbers(text, true, "fuzz"); });
   // Ranges may be long.
   if (size < 200) Try([&] { plumbline::ParseGrid(text); });

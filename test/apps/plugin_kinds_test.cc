@@ -100,6 +100,16 @@ TEST_F(PluginKindsTest, LogReader) {
                     HasSubstr("carmen")));
 }
 
+TEST_F(PluginKindsTest, WhateverOneThrowsEndsTheRunWithAMessage) {
+  std::ofstream(folder_ / "throws.log") << "#plain throws\n";
+  std::string output;
+  EXPECT_EQ(Solve("--input=" + (folder_ / "throws.log").string() +
+                      " --output_dir=" + (folder_ / "out").string(),
+                  &output),
+            3);
+  EXPECT_THAT(output, HasSubstr("an exception of an unknown type"));
+}
+
 TEST_F(PluginKindsTest, AreListedUnderTheirFlags) {
   std::string output;
   ASSERT_EQ(Solve("--list_plugins", &output), 0) << output;

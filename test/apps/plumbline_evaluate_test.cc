@@ -210,6 +210,18 @@ TEST_F(EvaluateTest, BadInput) {
           &output),
       2);
   EXPECT_THAT(output, HasSubstr("none.tum: cannot be opened"));
+  // A device has no end.
+  Write("truth.json",
+        R"({"format":"plumbline-truth","version":1,"orientations_deg":[0],
+            "walls":[],"poses":[[1,0,0,0],[2,4,4,0]]})");
+  for (const std::string& endless :
+       {Flag("truth", "truth.json") + " --map=/dev/zero",
+        Flag("map", "truth.json") + " --truth=/dev/zero",
+        Flag("trajectory", "path.tum") + " --relations=/dev/zero",
+        Flag("relations", "true.relations") + " --trajectory=/dev/zero"}) {
+    EXPECT_EQ(Run(endless, &output), 2) << endless;
+    EXPECT_THAT(output, HasSubstr("/dev/zero:")) << endless;
+  }
 }
 
 TEST_F(EvaluateTest, Usage) {

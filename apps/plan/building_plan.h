@@ -64,6 +64,8 @@ struct PlanDoor {
 
   /// m.
   double width() const { return (end - begin).norm(); }
+  /// Wider than leaves are: drawn without one.
+  bool is_passage() const { return width() > 1.3; }
 };
 
 /// A straight wall between two faces.

@@ -567,6 +567,33 @@ TEST_F(FloorPlanTest, DxflibReadsRooms) {
   EXPECT_NEAR(lengths[3], 4.0, 1e-6);
 }
 
+// A passage has no leaf, and what was seen through a window is not measured.
+TEST_F(FloorPlanTest, PassagesAndDimensionsOfABuilding) {
+  FloorPlan plan = PlanWithRooms();
+  const std::string before = Svg(plan);
+  EXPECT_THAT(before, Not(HasSubstr("stroke-dasharray")));
+  plan.building.doors[0].end =
+      plan.building.doors[0].begin + Eigen::Vector2d(0.0, 2.0);
+  FloorPlanWall beyond;
+  beyond.begin = {60.0, 0.0};
+  beyond.end = {60.0, 5.0};
+  plan.walls.push_back(beyond);
+  const std::string svg = Svg(plan);
+  EXPECT_THAT(svg, HasSubstr("stroke-dasharray"));
+  const auto of_building = [](const std::string& text) {
+    const auto begin = text.find("<g id=\"dimensions\"");
+    const auto end = text.find(" m</text>", begin);
+    return text.substr(text.rfind('>', end), end - text.rfind('>', end));
+  };
+  EXPECT_EQ(of_building(svg), of_building(before));
+  DxfReader reader;
+  DL_Dxf dxf;
+  std::istringstream drawing(Dxf(plan));
+  ASSERT_TRUE(dxf.in(drawing, &reader));
+  EXPECT_EQ(reader.arcs["DOORS"].size(), 1u);
+  EXPECT_EQ(reader.lines["DOORS"].size(), 2u);
+}
+
 TEST_F(FloorPlanTest, PaperOfTheDxfStandsAsThePlanDoes) {
   FloorPlan plan;
   plan.walls.resize(1);

@@ -16,6 +16,12 @@ namespace {
 // of a second.
 constexpr std::size_t kSubmapsAtOnce = 16;
 
+// A place with more submaps near it than this was visited many times over, and
+// is matched with this share of max_submaps: twenty visits hold each other with
+// fewer each than two do.
+constexpr std::size_t kMany = 40;
+constexpr double kShareOfMany = 0.7;
+
 // Places [begin, end).
 struct Submap {
   int begin = 0;
@@ -141,7 +147,11 @@ std::vector<std::vector<int>> Assign(
     }
     std::sort(near.begin(), near.end());
     const auto was_matched = [&](int submap) { return is_known(submap, k); };
-    for (const int i : Spread(near, options.max_submaps, was_matched)) {
+    const int most =
+        near.size() <= kMany
+            ? options.max_submaps
+            : std::max(1, static_cast<int>(kShareOfMany * options.max_submaps));
+    for (const int i : Spread(near, most, was_matched)) {
       keys[i].push_back(k);
     }
   }

@@ -623,10 +623,19 @@ MAP = json.dumps({
 TUM = "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n"
 RELATIONS = "1 2 1 0 0 0 0 0\n"
 FLAGS = "# flags\n--seed=3\n--nostructure\n--link_radius=5\n"
+CONSTRAINTS = "# walls\nsame 1,0 3,0\ndistance 1,0 1,3 3.05 sigma=0.05 hard\n"
 WORLD = "wall 0 0 10 0\nwall 10 0 10 8\nwall 10 8 0 8\nwall 0 8 0 0\npath 2 2 8 2 8 6 2 6\n"
 WORDS = [b"nan", b"inf", b"-1", b"1e400", b"1e-400", b"99999999999999999999",
          b"2147483647", b"", b"x", b"\xff\xfe", b"\x00", b"{", b"[", b"\"",
          b"--", b"=", b"+0.5", b"0x10", b"1e308", b"-0"]
+
+
+def drawing():
+    """Three walls as DXF."""
+    text = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n6\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n"
+    for line in ((0, 0, 4, 0), (4, 0, 4, 3), (0, 3, 4, 3)):
+        text += "0\nLINE\n8\nWALLS\n10\n%d\n20\n%d\n11\n%d\n21\n%d\n" % line
+    return text + "0\nENDSEC\n0\nEOF\n"
 
 
 def spoil(text, rng):
@@ -691,6 +700,12 @@ def bad_inputs(binaries, root, count, rng):
         "log": lambda: solve("--input=" + write("bad.log", spoil(log, rng))),
         "flags": lambda: solve("--input=" + good_log, "--outputs=none",
                                "--flagfile=" + write("flags", spoil(FLAGS, rng))),
+        "plan": lambda: solve("--input=" + good_log, "--plan=" + write(
+            "plan.dxf", spoil(drawing(), rng))),
+        "constraints": lambda: solve("--input=" + good_log, "--constraints=" + write(
+            "constraints", spoil(CONSTRAINTS, rng))),
+        "inspect": lambda: [os.path.join(binaries, "plumbline_inspect"),
+                            write("inspected.log", spoil(log, rng))],
         "truth": lambda: evaluate(trajectory=TUM, truth=spoil(TRUTH, rng), map=MAP),
         "map": lambda: evaluate(trajectory=TUM, truth=TRUTH, map=spoil(MAP, rng)),
         "relations": lambda: evaluate(trajectory=TUM, relations=spoil(RELATIONS, rng)),
@@ -713,7 +728,7 @@ def bad_inputs(binaries, root, count, rng):
             continue
         status = result.returncode
         statuses[status] = statuses.get(status, 0) + 1
-        explained = status == 0 or "expected" in result.stderr
+        explained = status == 0 or "expected" in result.stderr + result.stdout
         if status not in (0, 1, 2) or not explained:
             shutil.copytree(folder, os.path.join(root, "found_%d" % i))
             finding("%s %d: status %d: %s" % (name, i, status, result.stderr[:300]))

@@ -136,6 +136,19 @@ TEST_F(ScanRelationsTest, VisitsShareWhatAPlaceIsMatchedWith) {
   EXPECT_GE(last_visit, 9);
 }
 
+// Many visits hold each other with fewer relations each.
+TEST_F(ScanRelationsTest, ManyVisitsAreMatchedWithFewerEach) {
+  Drive(testing::Room(10.0, 6.0), /*visits=*/30);
+  options_.max_submaps = 6;
+  std::vector<int> count(places_.size(), 0);
+  for (const ScanRelation& relation :
+       FindScanRelations(places_, truth_, options_)) {
+    ++count[relation.to];
+  }
+  // From the middle of the room all 30 submaps of either half are near.
+  for (const int i : {3, 4}) EXPECT_LE(count[i], 4) << i;
+}
+
 // Where a place has more submaps than it is matched with, those that it was
 // matched with stay, whoever else comes near or goes.
 TEST_F(ScanRelationsTest, VisitsThatWereMatchedAreNotMatchedAnew) {

@@ -38,7 +38,7 @@ struct AxialComponent {
   double length = 0.0;
 };
 
-/// Options of telling a building's directions from clutter. Angles in rad.
+/// Options for telling a building's directions from clutter. Angles in rad.
 struct AxialMixtureOptions {
   /// A sample nearer than this to a direction belongs to it, and no further
   /// direction is made of it.

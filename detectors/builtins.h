@@ -5,8 +5,8 @@
 
 namespace plumbline {
 
-/// Registers the structure detectors of this folder. Does nothing for what is
-/// there already.
+/// Registers the structure detectors of this folder. Detectors that are
+/// registered already stay.
 void RegisterBuiltinDetectors(Registry* registry);
 
 /// RegisterBuiltinRelations and RegisterBuiltinDetectors: all that a program

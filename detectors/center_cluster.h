@@ -25,9 +25,9 @@ struct CenterClusterOptions {
 /// (expected (0, 0)) from the circles.
 ///
 /// A circle that no live constraint ties to a common centre yet joins the
-/// nearest one within the gate, one that is there already or a new one. Of
-/// concentric circles of the same radius one is probably the other seen twice;
-/// that is left to whoever makes circles.
+/// nearest one within the gate, one that is there already or a new one.
+/// Concentric circles of the same radius are probably one circle found twice;
+/// telling that is left to whoever makes circles.
 ///
 /// Centres of single circles say nothing on their own and are there to be seen
 /// in a row by line_ransac on the next level (core/method.md, Table 1).

@@ -31,18 +31,18 @@ class ClosureCandidates {
   /// The walls are not owned and must outlive the candidates.
   explicit ClosureCandidates(const WallGraph* walls) : walls_(walls) {}
 
-  /// Adds that the walls `first` and `second` may be one; `match.along` is
-  /// along the second. Of a pair that is there the narrower search stays, or
-  /// from searches of one width the larger evidence. False when the walls are
-  /// one already.
+  /// Adds the candidate that the walls `first` and `second` are one;
+  /// `match.along` is along the second. Of two candidates for a pair the one
+  /// from the narrower search stays, or with equal widths the one with more
+  /// evidence. False when the walls are one already.
   bool Add(int first, int second, const WallMatch& match, double search,
            double evidence);
 
   /// The candidates of the narrowest searches: up to `width`, m, or a little
   /// wider than the narrowest where that is more, the largest evidence first.
-  /// Those whose walls the ones before make one already are left out. Pairs
-  /// that were broken before do not make wider ones wait, and are not counted
-  /// on for others. Counts into `scope`.
+  /// Candidates whose walls earlier ones have already made one are left out.
+  /// Pairs that were broken before neither hold up wider searches nor make
+  /// other candidates redundant. Counts into `scope`.
   std::vector<ClosureCandidate> Choose(double width,
                                        const DetectionScope& scope) const;
 

@@ -13,17 +13,16 @@ namespace plumbline {
 /// Common part of line_ransac and circle_ransac. Both look for lines and
 /// circles, so that neither takes one for the other, and propose their own.
 ///
-/// Points that support a curve of the graph (a live structure constraint ties
-/// them), those that are left over of it and its outliers (a broken one does)
-/// make no further curve, but may join one. A point
-/// that is connected with the support of a curve of the detector's kind joins
-/// it when it is within the gate; when it supports another curve already,
-/// within half the gate where they run alongside (less than min_corner apart),
-/// within sigma where they cross (the corner of two walls). A curve of the
-/// detector's kind whose points all lie on another one goes (pieces that the
-/// solver has brought together). Only virtual curves without measurements do.
-/// This is repeated until nothing is found, so applying the result and
-/// detecting again gives an empty transaction.
+/// Points that support a curve of the graph (tied by a live structure
+/// constraint), its leftovers and its outliers (tied by a broken one) start no
+/// further curve, but may join one. A point that is connected with the support
+/// of a curve of the detector's kind joins it when it is within the gate; when
+/// it supports another curve already, within half the gate where they run
+/// alongside (less than min_corner apart), within sigma where they cross (the
+/// corner of two walls). A curve of the detector's kind whose points all lie on
+/// another one goes (pieces that the solver has brought together). Only virtual
+/// curves without measurements do. This is repeated until nothing is found, so
+/// applying the result and detecting again gives an empty transaction.
 Transaction DetectCurves(const Graph& graph, const Registry& registry,
                          const DetectionScope& scope, CurveKind kind,
                          const std::string& source,

@@ -20,26 +20,26 @@ struct CurveSearchOptions {
   /// Tolerance of the building, of a point against its curve: what the
   /// constraints hold it with.
   double sigma = 0.02;
-  /// How near to a curve a connected point joins it, and to another curve a
-  /// curve is the same. Wider than sigma: points are off by their measurements
-  /// too. Bends of less than half of it do not count.
+  /// Distance from a curve within which a connected point joins it, and within
+  /// which another curve is the same. Wider than sigma: points are off by their
+  /// measurements too. Bends of less than half of it do not count.
   double gate = 0.1;
   /// Log10 of the expected number of curves of the kind that 1,000 points would
   /// show by chance, at which one is accepted. Well below one: EM looks many
   /// times, and what is left over each time is different.
   double max_log_false_alarms = -1.0;
-  /// Points that support a curve are connected with each other past at most so
-  /// many points that do not.
+  /// Points that support a curve are connected with each other past at most
+  /// this many points that do not.
   int max_gap_points = 2;
   /// A line is cut where it has no point for this length, or for three times
   /// its usual spacing where that is longer.
   double max_gap = 1.0;
   int min_line_points = 4;
   int min_circle_points = 5;
-  /// The points of a circle reach over at least this angle; on a shorter arc
-  /// they are on a line as well.
+  /// The points of a circle span at least this angle: on a shorter arc a line
+  /// fits them as well.
   double min_arc = DegToRad(90.0);
-  /// Lines that touch at a smaller angle are one that drift has bent.
+  /// Lines that touch at a smaller angle are one line that drift has bent.
   double min_corner = DegToRad(15.0);
   /// Larger circles are not looked for.
   double max_radius = 50.0;
@@ -49,7 +49,7 @@ struct CurveSearchOptions {
   int reach = 8;
 };
 
-/// A curve and what tells that it is there.
+/// A curve and the evidence for it.
 struct FoundCurve {
   PlanarCurve curve;
   /// Indices of the points that support it, ascending.

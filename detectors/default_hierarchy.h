@@ -20,11 +20,10 @@ constexpr double kPointsLoopTolerance = 3e-4;
 ///   walls    orientation_mixture / orientation_relation
 ///   circles  center_cluster
 ///
-/// What a type is, its role says (FeatureTraits); one that the detectors of
-/// level 0 do not read counts as nothing. The hierarchies of several types are
-/// laid over each other, level by level. Empty when no type has structure of
-/// its own (poses). Throws Error when the built-in detectors are not
-/// registered.
+/// The role of a type (FeatureTraits) tells what it is; types that no detector
+/// of level 0 reads are passed over. The hierarchies of several types are
+/// merged level by level. Empty when no type has structure of its own (poses).
+/// Throws Error when the built-in detectors are not registered.
 HierarchySpec DefaultHierarchy(
     const std::vector<const FeatureType*>& raw_feature_types,
     const Registry& registry);

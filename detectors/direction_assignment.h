@@ -19,11 +19,11 @@ struct DirectionAssignmentOptions {
   /// Largest chi-square (1 degree of freedom) of an innovation that is
   /// accepted.
   double gate = 9.0;
-  /// Share of a wall's own error that may speak for a tie: a short wall that is
-  /// well measured to lie beside a direction waits, although it is no evidence
-  /// against it.
+  /// Share of a wall's own error that may count in favour of a tie: a short
+  /// wall that is clearly measured to be off a direction waits, although it is
+  /// no evidence against it.
   double own_share = 0.35;
-  /// A direction is left when its innovation is beyond this.
+  /// A wall leaves its direction when the innovation is beyond this.
   double breaking_gate = 16.0;
   /// Two directions are two only when the chi-square of their difference (1
   /// degree of freedom) is at least this: the price of a further direction.
@@ -36,7 +36,7 @@ struct DirectionAssignmentOptions {
   double margin = 2.3;
   /// Nor are directions two when they differ by less than this.
   double min_separation = DegToRad(0.4);
-  /// Walls that are less well known relative to a direction wait.
+  /// Walls whose angle to a direction is known less well than this wait.
   double max_uncertainty = DegToRad(12.0);
   /// Fewest walls, and sum of their lengths (m), that make a new direction.
   int min_support = 3;
@@ -106,10 +106,10 @@ struct DirectionAssignment {
 /// explain its walls better: walls that each lie within their own gate can
 /// contradict it together (score test of a further parameter, the turn of one
 /// part of the walls against the other); parts that then differ from no other
-/// direction are joined with it. Walls that could be of several, or of
-/// which too little is known, are left.
+/// direction are joined with it. Walls that fit several directions, or of which
+/// too little is known, stay untied.
 ///
-/// Without a given direction all walls are such as may found one.
+/// Without a given direction any wall may found one.
 ///
 /// `network` holds the measurements. `stop` (may be null) is asked now and
 /// then; once it has returned true the assignment is unfinished.

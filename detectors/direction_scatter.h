@@ -15,18 +15,18 @@ namespace plumbline {
 struct DirectionScatterOptions {
   /// Shorter walls are left out, m: their own errors are known to be large.
   double min_length = 2.5;
-  /// The longest walls, at most so many, make the pairs: bounds the cost.
+  /// At most this many of the longest walls make the pairs: bounds the cost.
   std::size_t max_walls = 120;
-  /// Standard deviation to which the measurements know the difference of a
-  /// pair, and its largest value (modulo a right angle): farther off it is
-  /// meant to be.
+  /// Largest standard deviation with which the measurements know the difference
+  /// of a pair, and its largest value modulo a right angle: beyond it is
+  /// intended.
   double max_uncertainty = DegToRad(0.3);
   double max_difference = DegToRad(3.0);
   /// The share of the pairs, the most parallel ones, that speaks. The others
   /// may belong to two directions: with two corridors that meet at a small
   /// angle half of all pairs do.
   double share = 0.25;
-  /// Fewer pairs say nothing: `prior` is the result.
+  /// With fewer pairs the result is `prior`.
   std::size_t min_pairs = 6;
   double prior = DegToRad(0.2);
   /// Bounds of the result.

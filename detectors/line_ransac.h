@@ -17,11 +17,11 @@ namespace plumbline {
 /// connected as PointGraph says.
 class LineRansac : public StructureDetector {
  public:
-  /// Options as those of the search for curves.
+  /// Takes the options of the search for curves.
   explicit LineRansac(const CurveSearchOptions& options);
 
   const std::string& name() const override;
-  /// As many as it takes to be found.
+  /// As many points as it takes to find one.
   int minimum_support() const override { return options_.min_line_points; }
   Transaction Detect(const Graph& graph, const Registry& registry,
                      const DetectionScope& scope) const override;

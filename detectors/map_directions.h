@@ -26,7 +26,7 @@ struct MapDirections {
   DirectionNetwork network;
   /// Node of each feature with a direction.
   std::map<FeatureId, std::size_t> nodes;
-  /// The constraints that the links are of.
+  /// The constraints that the links were made from.
   std::vector<ConstraintId> constraints;
   /// Whether poses that saw the walls are part of the map.
   bool has_sightings = false;

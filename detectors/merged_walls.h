@@ -16,10 +16,10 @@ struct WallPiece {
   double end = 0.0;
 };
 
-/// The one wall that several pieces are: in line with their mean (offsets
-/// weighted by length, directions by its cube, as a long piece knows its
-/// direction best), from the first end to the last. A single piece comes back
-/// as it is. Throws Error for an empty list.
+/// The single wall that several pieces make up: in line with their mean
+/// (offsets weighted by length, directions by its cube, as a long piece knows
+/// its direction best), from the first end to the last. A single piece comes
+/// back as it is. Throws Error for an empty list.
 WallPiece UnitePieces(const std::vector<WallPiece>& pieces);
 
 /// A wall as outputs show it.

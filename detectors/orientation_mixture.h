@@ -28,9 +28,9 @@ struct OrientationMixtureOptions {
   /// How directions are told from clutter. `gate` also decides which features
   /// join an orientation.
   AxialMixtureOptions mixture;
-  /// How far the direction of a wall's visible part may be off its own, for a
-  /// wall of 1 m, rad; it falls with length^1.5. Panels, frames and cupboards
-  /// are in every look: on real logs walls agree only so well.
+  /// How far the direction of a wall's visible part may be off the wall's own,
+  /// rad, for a wall of 1 m; it falls with length^1.5. Panels, frames and
+  /// cupboards are in every look: on real logs walls agree only so well.
   double own_direction_noise = DegToRad(2.0);
   /// How walls whose directions the measurements tie to each other are
   /// assigned (its sigma is the one above), how parallel they are whatever

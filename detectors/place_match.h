@@ -52,9 +52,9 @@ struct PlaceMatchOptions {
   /// A place whose turn is known worse than this (standard deviation, rad) is
   /// not looked for: any wall could be any other.
   double max_turn = DegToRad(12.0);
-  /// Displacements from two pairs of walls each that are tried at most: the
-  /// longest walls of the second place are paired until there are so many.
-  /// Places of logs that hang together need some hundred.
+  /// Most displacements, each from two pairs of walls, that are tried: the
+  /// longest walls of the second place are paired until there are this many.
+  /// Places of coherent logs need some hundred.
   int max_tried_pairs = 2000;
 };
 
@@ -76,7 +76,7 @@ struct WallMatch {
 struct PlaceMatch {
   /// Why there are no matches.
   enum class Outcome {
-    /// There are.
+    /// There are matches.
     kMatched,
     /// All walls that could be one are one already.
     kNoNews,
@@ -92,8 +92,8 @@ struct PlaceMatch {
   /// Of this comparison.
   Outcome outcome = Outcome::kMatched;
   /// Moves the second place onto the first: x, y (m) of the pivot, and the turn
-  /// about it (rad); the most probable one given the matches below. Directions
-  /// that no match says anything about stay at zero.
+  /// about it (rad); the most probable one given the matches below. Components
+  /// that no match constrains stay at zero.
   Eigen::Vector3d displacement = Eigen::Vector3d::Zero();
   /// Matches that all explanations which are nearly as good agree on, in the
   /// order of (second, first). Empty: nothing can be said.

@@ -10,7 +10,8 @@
 
 namespace plumbline {
 
-/// Options: which walls make a rectangle, and how tightly they are tied to it.
+/// Options for which walls make a rectangle, and how tightly they are tied to
+/// it.
 struct RectangleOptions {
   /// Tolerance of a wall against its side: across it, m, and in direction, rad.
   double sigma = 0.05;

@@ -9,7 +9,7 @@
 
 namespace plumbline {
 
-/// Options: which walls are taken for one, and how tightly they are tied.
+/// Options for which walls are taken for one, and how tightly they are tied.
 struct SameWallOptions {
   /// Tolerance of a wall seen twice: across (m) and direction (rad).
   double sigma_offset = 0.05;

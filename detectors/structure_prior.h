@@ -46,7 +46,7 @@ struct PriorAngle {
 ///     angle 60 0.05                        angle and tolerance, degrees
 ///     relation orientation_orientation 0.02 deg
 ///     relation segment_orientation 0.3 deg
-///     relation segment_rectangle 0.05 m 0.3 deg   a tolerance a row
+///     relation segment_rectangle 0.05 m 0.3 deg   a tolerance per row
 ///     relation line_orientation no         not expected
 ///
 /// Tolerances are standard deviations. With angles, only these are looked for.
@@ -66,9 +66,9 @@ StructurePrior ReadStructurePrior(std::istream& input, const std::string& name,
 /// Writes a prior that ReadStructurePrior reads as the same.
 void WriteStructurePrior(const StructurePrior& prior, std::ostream& output);
 
-/// Makes it count: relations in the options of EM, angles and their tolerances
-/// in the parameters of the detector orientation_relation, where they take the
-/// place of those that are there.
+/// Applies a prior: relations to the options of EM, angles and their tolerances
+/// to the parameters of the detector orientation_relation, in place of those
+/// that are set there.
 void ApplyStructurePrior(
     const StructurePrior& prior, EmOptions* options,
     std::map<std::string, DetectorParameters>* detector_parameters);

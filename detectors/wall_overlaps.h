@@ -11,10 +11,10 @@
 
 namespace plumbline {
 
-/// Overlap of two walls where they stand in the map; nothing when
-/// they do not: when their directions differ by more than their lengths and the
-/// tolerance allow, when they do not lie side by side, or when they are farther
-/// apart than SameWallOptions::known_offset.
+/// Overlap of two walls where they stand in the map; nothing when their
+/// directions differ by more than their lengths and the tolerance allow, when
+/// they do not lie side by side, or when they are farther apart than
+/// SameWallOptions::known_offset.
 std::optional<WallMatch> LieOnEachOther(const PlaceWall& first,
                                         const PlaceWall& second,
                                         const SameWallOptions& options);

@@ -11,11 +11,11 @@ namespace plumbline {
 /// Ways from wall to wall along measurement links: how far the robot went, at
 /// least, between looking at one and at the other.
 ///
-/// Closures that hold two directions are links too: the way round a loop that
-/// is closed adds nothing to what its ends do not know of each other. A closure
-/// holds two directions when the surroundings of its walls, up to
-/// `closure_links` measurement links away, have another wall in common across
-/// them: then nothing is free to move between the two visits.
+/// Closures that hold two directions are links too: the way round a closed loop
+/// adds no uncertainty between its ends. A closure holds two directions when
+/// the surroundings of its walls, up to `closure_links` measurement links away,
+/// have another wall in common across them: then nothing is free to move
+/// between the two visits.
 class WallWays {
  public:
   class Search;
@@ -26,8 +26,8 @@ class WallWays {
   /// there is none. `search` may be of any call before, of this thread.
   std::vector<double> From(int wall, Search* search) const;
 
-  /// Of each wall, the number of the part in which there are ways between all:
-  /// the smallest index in it.
+  /// For each wall the number of its connected part, that is the smallest index
+  /// in the part.
   std::vector<std::size_t> Parts() const;
 
  private:

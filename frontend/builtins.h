@@ -5,8 +5,8 @@
 
 namespace plumbline {
 
-/// Registers the log readers of this folder. Does nothing for what is there
-/// already.
+/// Registers the log readers of this folder. Readers that are registered
+/// already stay.
 void RegisterBuiltinLogReaders(Registry* registry);
 
 }  // namespace plumbline

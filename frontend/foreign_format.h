@@ -6,10 +6,10 @@
 
 namespace plumbline {
 
-/// What a file that is no log is, by its first bytes: "a PCD point cloud", "a
-/// PDF document", "a trajectory (TUM)". Empty when it is nothing that is known
-/// for certain, so that it may still be a log. 512 bytes and the first line
-/// that is no comment are enough.
+/// Describes a file that is no log by its first bytes: "a PCD point cloud", "a
+/// PDF document", "a trajectory (TUM)". Empty when the format is not known for
+/// certain, so that it may still be a log. 512 bytes and the first line that is
+/// no comment are enough.
 std::string ForeignFormat(std::string_view prefix);
 
 }  // namespace plumbline

@@ -42,7 +42,7 @@ struct KeyScan {
   Eigen::Vector2d laser = Eigen::Vector2d::Zero();
   /// Angle between beams, rad.
   double angle_step = 0.0;
-  /// Times that the laser is noisier than usual (RangeNoiseScale).
+  /// Factor by which the laser is noisier than usual (RangeNoiseScale).
   double noise_scale = 1.0;
 };
 
@@ -73,8 +73,8 @@ struct KeyScanRecord {
   std::vector<PointMatch> points;
 };
 
-/// What grows a graph from key scans: the part of the front-end that depends on
-/// the kind of raw features. Only the last robot pose is kept; what the poses
+/// Grows a graph from key scans: the part of the front-end that depends on the
+/// kind of raw features. Only the last robot pose is kept; what the poses
 /// before it knew is in the measurements between features (core/method.md,
 /// section 7).
 class GraphBuilder {
@@ -95,8 +95,8 @@ class GraphBuilder {
   /// Takes the robot's pose back from the graph after a solve.
   void ReadRobot() { robot_.Read(); }
 
-  /// What it knows between two key scans, for another one of the same kind and
-  /// options with a graph that is as this one's.
+  /// Writes what it knows between two key scans, to be read by another one of
+  /// the same kind and options on an equal graph.
   virtual void WriteState(StateWriter* state) const;
   virtual void ReadState(StateReader* state);
 
@@ -122,8 +122,8 @@ class GraphBuilder {
   GraphBuilder(Graph* graph, const Registry& registry)
       : graph_(graph), registry_(registry), robot_(graph) {}
 
-  /// To be called before BeginScan with what AddScan got: takes the robot and
-  /// its links to the key scan `scan.since`, if that is given.
+  /// To be called before BeginScan with the argument of AddScan: takes the
+  /// robot and its links back to the key scan `scan.since` if one is given.
   void Place(const KeyScan& scan);
 
   /// Begins a key scan: the first starts at `start`, for others the robot goes

@@ -43,8 +43,8 @@ struct JointAdjustmentOptions {
   double min_reported_factor = 0.04;
   /// Rounds of taking votes and weights anew, each followed by a solve.
   int rounds = 3;
-  /// After that places that have come near each other are matched, and all is
-  /// repeated, this often at most, while a pose moves by more than this, m.
+  /// Then places that have come near each other are matched, and all of it is
+  /// repeated at most this often while a pose moves by more than this, m.
   int max_passes = 5;
   double settled_distance = 0.05;
   /// Places of the first so many records stay where they are: the map that the
@@ -53,7 +53,7 @@ struct JointAdjustmentOptions {
   /// The result does not depend on it.
   int num_threads = 1;
 
-  /// For a laser that is so many times noisier (RangeNoiseScale).
+  /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale) {
     points.ScaleToNoise(scale);
     relations.matcher.ScaleToNoise(scale);
@@ -76,8 +76,8 @@ std::vector<Pose2> KeyPosesOfPlaces(const Graph& graph,
 /// small angles need it; covariances of walls would come out too wide with it.
 void ReportVoteVariances(double excess, Graph* graph);
 
-/// Joint adjustment of poses, walls and structure: the last word of the scans
-/// on the map (ours; core/method.md, section 7, ends with finding the scans
+/// Joint adjustment of poses, walls and structure to all scans (not in the
+/// paper, whose method, core/method.md, section 7, ends with finding the scans
 /// again on a map that stays as it is).
 ///
 /// The poses of key scans, which the front-end had marginalized out one by
@@ -107,8 +107,8 @@ class JointAdjustment {
                   const JointAdjustmentOptions& options,
                   std::function<bool()> stop = nullptr);
 
-  /// Goes on with what WriteState of another one wrote, made with the same
-  /// scans, records and options, on a graph that is as that one's was.
+  /// Goes on from what WriteState of another one wrote that was made with the
+  /// same scans, records and options, on an equal graph.
   JointAdjustment(Graph* graph, SolverSession* session,
                   const Registry& registry, const std::vector<Scan>& scans,
                   const std::vector<RefinedScan>& refined,
@@ -186,10 +186,10 @@ class JointAdjustment {
                                              Transaction* change) const;
   void Match();
   void Vote();
-  // Others have taken all its returns.
+  // Drops walls whose returns have all gone to others.
   void DropWallsWithoutVotes();
   void Reweigh();
-  // To the tolerance of the session when `is_last`, coarsely on the way there.
+  // Solves to the tolerance of the session when `is_last`, else coarsely.
   void Solve(bool is_last);
 
   Graph* graph_;

@@ -49,7 +49,7 @@ void AppendKeyScans(const KeyScanArchive& archive, std::string* text);
 
 /// Reads them from the text of a map.json. Throws Error that names `name` and
 /// the place for text that is no JSON, a map without key scans (of a graph, or
-/// of an earlier version) and numbers that cannot be.
+/// of an earlier version) and impossible numbers.
 KeyScanArchive ReadKeyScans(const std::string& text, const std::string& name);
 
 }  // namespace plumbline

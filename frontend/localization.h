@@ -18,7 +18,7 @@ struct Localization {
   Eigen::Matrix3d observation_information = Eigen::Matrix3d::Zero();
 };
 
-/// Something recognized, linearized at a pose of the robot: observation minus
+/// A recognized feature, linearized at a pose of the robot: observation minus
 /// expectation, its derivative with respect to the pose (map frame), and its
 /// weight (inverse covariance of the error).
 struct LinearizedObservation {

@@ -14,8 +14,8 @@
 
 namespace plumbline {
 
-/// What a log does not say about its laser, or says wrongly, and what of it is
-/// to be read.
+/// What a log does not say, or says wrongly, about its laser, and which part of
+/// it is to be read.
 struct LaserOptions {
   /// Direction of the first beam in the laser's frame, rad. Unset: from the
   /// log, or by its format.
@@ -30,11 +30,11 @@ struct LaserOptions {
   /// Topic of the odometry; "tf": the transform of odom to the robot; "none":
   /// without odometry. Empty: the only one there is, else tf, else without.
   std::string odometry_topic;
-  /// Called with what the log holds once it was read, also when it is refused
-  /// then. May be empty.
+  /// Called with what the log holds once it was read, even when it is then
+  /// refused. May be empty.
   std::function<void(const std::vector<LogTopic>& topics)> on_topics;
-  /// Asked while a folder is read: true ends the input there. And how much of
-  /// it was read, bytes. Of a single file these are the InputStream's. May be
+  /// Asked while a folder is read: true ends the input there. Below, told how
+  /// much was read, bytes. A single file has those of its InputStream. May be
   /// empty.
   std::function<bool()> stop;
   std::function<void(std::int64_t done, std::int64_t size)> progress;

@@ -27,7 +27,8 @@ struct MapBuilderOptions {
   /// linked to, and of the new ones of its own scan.
   int links_per_feature = 5;
   int links_within_scan = 3;
-  /// Two pieces of one scan are one wall only when they are in line to this, m.
+  /// Two pieces of one scan are one wall only when they are in line to within
+  /// this, m.
   double same_scan_offset = 0.05;
   /// Standard deviation of a segment's position along itself in the scan that
   /// makes it a feature, m. The position is chosen there, so it is small.
@@ -56,8 +57,8 @@ class MapBuilder final : public GraphBuilder {
 
   void AddScan(const KeyScan& scan) override;
 
-  /// Takes a key scan by what was made of it: `motion` since the last one
-  /// (ignored for the first, which starts at `start`), and what it saw.
+  /// Takes a key scan as it was processed: `motion` since the last one (ignored
+  /// for the first, which starts at `start`), and what it saw.
   void AddKeyScan(int scan, const UncertainPose2& motion,
                   const std::vector<SegmentObservation>& observations,
                   const Pose2& start);

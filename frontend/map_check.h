@@ -11,15 +11,15 @@
 
 namespace plumbline {
 
-/// When a part of a trajectory contradicts the rest.
+/// Options for when a part of a trajectory contradicts the rest.
 struct MapCheckOptions {
   ScanPointsOptions points;
   ScanMatcherOptions matcher;
   /// Way between the scans that are looked at, m.
   double spacing = 1.2;
-  /// A scan is compared with those that were made this near, m, and so much way
-  /// before or after it, m: on another visit. So many at most, the nearest
-  /// ones, and at least.
+  /// A scan is compared with scans of other visits: within this distance, m,
+  /// and at least this much way before or after it, m. The nearest ones, at
+  /// most and at least this many.
   double radius = 4.0;
   double least_way = 15.0;
   int max_others = 12;
@@ -31,12 +31,12 @@ struct MapCheckOptions {
   double max_intruders = 0.3;
   double max_seen_through = 0.4;
   int min_returns = 15;
-  /// Scans in a row that contradict, one in between left out, before it is
-  /// said.
+  /// Contradicting scans in a row, gaps of one allowed, before they are
+  /// reported.
   int min_scans = 3;
   int num_threads = 0;
 
-  /// For a laser that is so many times noisier (RangeNoiseScale).
+  /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale) {
     points.ScaleToNoise(scale);
     matcher.ScaleToNoise(scale);

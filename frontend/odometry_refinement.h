@@ -18,8 +18,8 @@
 
 namespace plumbline {
 
-/// How far wheel odometry is believed (one standard deviation). Wide: the
-/// public logs turn away by degrees a metre and by tens of degrees in corners.
+/// How far wheel odometry is trusted (one standard deviation). Wide: the public
+/// logs turn away by degrees a metre and by tens of degrees in corners.
 struct OdometryNoise {
   /// m, and m a metre travelled.
   double translation = 0.01;
@@ -48,8 +48,8 @@ struct MatchDrift {
   double rotation_per_root_radian = DegToRad(0.7);
 };
 
-/// When the track of the scans is lost, and how its tie to what was before is
-/// found again.
+/// Options for when the track of the scans is lost, and how its tie to the
+/// earlier track is found again.
 struct TrackingOptions {
   /// Shares of the returns that stand where the reference has looked through,
   /// and of the reference's points that the scan looks through, from which on
@@ -78,7 +78,7 @@ struct TrackingOptions {
   /// begins.
   double max_blind_way = 1.5;
   double max_blind_turn = DegToRad(40.0);
-  /// A tie by odometry alone is believed up to this way, m, when there was
+  /// A tie by odometry alone is accepted up to this way, m, when there was
   /// neither a gap nor a contradiction.
   double max_odometry_way = 3.0;
   /// What a tie needs: scans of the track, share of returns that lie on what
@@ -93,7 +93,7 @@ struct TrackingOptions {
   double max_tie_seen_through = 0.15;
   double min_tie_known = 0.4;
   int min_tie_hits = 15;
-  /// What a tie needs that was looked for in all that was ever seen, where many
+  /// What a tie needs that was found in everything seen so far, where many
   /// places look alike and the right one need not be among them.
   double min_global_support = 0.96;
   double min_global_inliers = 0.65;
@@ -128,7 +128,7 @@ struct OdometryRefinementOptions {
   double max_clutter = 0.1;
   double clutter_distance = 0.05;
   double clutter_rotation = DegToRad(1.5);
-  /// Scans after that in which clutter is doubted and stays out of the
+  /// Scans after that in which clutter is distrusted and kept out of the
   /// reference.
   int clutter_memory = 20;
   ScanMatcherOptions matcher;
@@ -140,7 +140,7 @@ struct OdometryRefinementOptions {
   /// Key scans that a new scan is matched with.
   int window = 12;
   /// Share of matched returns below which a match is looked for again, more
-  /// widely, and below which it is not believed.
+  /// widely, and below which it is rejected.
   double good_inlier_ratio = 0.8;
   double minimum_inlier_ratio = 0.4;
   /// Fewer returns than this are not matched.
@@ -159,7 +159,7 @@ struct OdometryRefinementOptions {
   /// far show it.
   double range_sigma = 0.0;
 
-  /// For a laser that is so many times noisier (RangeNoiseScale).
+  /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale) {
     points.ScaleToNoise(scale);
     matcher.ScaleToNoise(scale);
@@ -172,13 +172,13 @@ enum class TrackTie {
   kNone,
   /// Lost, and found again on what had been seen before.
   kMatched,
-  /// By odometry over a short way, which nothing speaks against.
+  /// By odometry over a short way that nothing contradicts.
   kOdometry,
   /// Unknown: where the track lies is a guess from odometry.
   kLoose,
 };
 
-/// What became of one scan.
+/// Result for one scan.
 struct RefinedScan {
   /// Pose of the robot in the refined odometry's frame, which starts at the
   /// raw odometry's first pose and drifts.
@@ -205,7 +205,7 @@ struct SettledScan {
   std::vector<ScanPoint> points;
 };
 
-/// A part of the track that hangs on the rest by a thread.
+/// A part of the track that is weakly tied to the rest.
 struct LooseTrack {
   /// Last scan before it that is sure, and its own last one, or the first one
   /// that was found again.
@@ -217,8 +217,8 @@ struct LooseTrack {
   bool found = false;
 };
 
-/// What was found when all scans were in: where a part of the track that was
-/// settled as loose hangs on what was before it.
+/// A tie found once all scans were in, for a part of the track that was settled
+/// as loose.
 struct LateTie {
   /// First scan of the part; its RefinedScan::tie was kLoose.
   int scan = 0;
@@ -262,8 +262,8 @@ class OdometryRefiner {
   /// Whether no tie is open and all that is settled was taken out.
   bool IsSettled() const { return open_ == nullptr && settled_.empty(); }
 
-  /// What it knows between two scans while IsSettled, for another one with the
-  /// same options.
+  /// Writes what it knows between two scans while IsSettled, to be read by
+  /// another one with the same options.
   void WriteState(StateWriter* state);
   void ReadState(StateReader* state);
 
@@ -275,17 +275,17 @@ class OdometryRefiner {
   int refusals() const { return refusals_; }
   /// Tracks that were lost, and those of them that were tied again.
   int losses() const { return losses_; }
-  /// Where the track hangs by a thread, in the order of scans. What hangs by a
-  /// guess ends where the next such part begins.
+  /// Weakly tied parts of the track, in the order of scans. A part that is tied
+  /// by a guess ends where the next such part begins.
   const std::vector<LooseTrack>& loose() const { return loose_; }
 
   /// Noise of the laser's ranges (standard deviation, m): what the options say,
   /// or what the scans so far show, 0 while they are too few.
   double range_sigma() const;
-  /// Times that the laser is noisier than usual, as it is allowed for now.
+  /// Factor by which the laser is noisier than usual, as presently allowed for.
   double noise_scale() const { return noise_scale_; }
 
-  /// Calls `trace` with a line on each decision that was not plain.
+  /// Calls `trace` with a line on each decision that was not clear-cut.
   void SetTrace(std::function<void(const std::string&)> trace) {
     trace_ = std::move(trace);
   }

@@ -8,8 +8,8 @@
 
 namespace plumbline {
 
-/// The records that places begin with: one in `stride` (at least 1), and where
-/// the robot was lost. Throws Error when the stride is less than 1.
+/// The records that places begin with: every `stride`-th (at least 1), and
+/// those where the robot was lost. Throws Error when the stride is less than 1.
 std::vector<std::size_t> PlaceBegins(const std::vector<KeyScanRecord>& records,
                                      int stride);
 

@@ -23,8 +23,8 @@ struct PointAssociationOptions {
   double max_angle = DegToRad(30.0);
   /// Uncertainty of a point's own place in its neighbourhood, m.
   double feature_sigma = 0.03;
-  /// Nothing is learnt of a point's place along its surface: the standard
-  /// deviation that stands for it, m.
+  /// A point's place along its surface is not observed: the standard deviation
+  /// that stands for it, m.
   double along_sigma = 50.0;
 };
 
@@ -34,8 +34,8 @@ struct PointObservation {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   /// m^2; wide along the surface that the point is on.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();
-  /// Part of the information that counts: points on one surface share its
-  /// error, so together they say what the surface says.
+  /// Share of the information that counts: points on one surface share its
+  /// error, so together they weigh as much as the surface.
   double share = 1.0;
 };
 

@@ -24,8 +24,8 @@ struct PoseRecoveryOptions {
   double outlier_chi_square = 9.21;
   /// Solves, each followed by taking variances and weights anew.
   int rounds = 10;
-  /// What is stated of the drift of matching counts as much as so many
-  /// residuals when its factors are estimated.
+  /// The stated drift of matching counts as much as this many residuals when
+  /// its factors are estimated.
   double prior_redundancy = 3.0;
   /// Bounds of the factors of variances.
   double min_variance_factor = 1e-4;
@@ -37,8 +37,8 @@ struct RecoveredPoses {
   /// The features of the places, in the order of the log; none when nothing was
   /// done.
   std::vector<FeatureId> places;
-  /// Factors of the variances of what matches tell, of their drift over the way
-  /// and over turns (MatchDrift), and of sightings.
+  /// Factors of the variances of matches, of their drift over the way and over
+  /// turns (MatchDrift), and of sightings.
   double match_variance_factor = 1.0;
   double way_variance_factor = 1.0;
   double turn_variance_factor = 1.0;

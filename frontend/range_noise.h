@@ -20,11 +20,11 @@ double RangeNoiseScale(double range_sigma);
 
 /// Noise of a laser's ranges, as its scans show it: how far each range lies off
 /// the straight line through its two neighbours, 1 / r being linear in the
-/// cosine and sine of the bearing there. Low quantiles of these deviations say
-/// it, so that corners, edges and clutter, where lines are not straight, do not
-/// count; the smallest of what several say is taken, since ranges rounded to
-/// centimetres deviate by nothing or by much. Scans may differ in beams and
-/// steps.
+/// cosine and sine of the bearing there. It is read off low quantiles of these
+/// deviations, so that corners, edges and clutter, where lines are not
+/// straight, do not count; the smallest of several is taken, since ranges
+/// rounded to centimetres deviate by nothing or by much. Scans may differ in
+/// beams and steps.
 class RangeNoise {
  public:
   /// Counts what a scan shows. Cost: linear in its beams.
@@ -34,7 +34,7 @@ class RangeNoise {
   /// counted.
   double sigma() const;
 
-  /// Fewest deviations that say anything: those of a handful of scans.
+  /// Fewest deviations for an estimate: those of a handful of scans.
   static constexpr std::int64_t kFewest = 1000;
 
  private:

@@ -79,7 +79,7 @@ class RobotLinks {
   /// first Write.
   void Read();
 
-  /// Pose, id and links, for one with a graph that is as this one's.
+  /// Writes pose, id and links, to be read by another one on an equal graph.
   void WriteState(StateWriter* state) const;
   void ReadState(StateReader* state);
 

@@ -35,7 +35,7 @@ struct Scan {
   /// angle_step apart: in a scan taken while the robot turned, seen from where
   /// the laser was at `timestamp`. One per beam, or empty.
   std::vector<float> bearings;
-  /// Line of the log that it stood on, or number of its message, from 1.
+  /// Line of the log that it was on, or number of its message, from 1.
   int line = 0;
 
   /// Direction of a beam in the laser's frame, rad.

@@ -34,7 +34,7 @@ struct ScanMatcherOptions {
   double search_step = 0.15;
   double rotation_step = DegToRad(1.0);
 
-  /// For a laser that is so many times noisier (RangeNoiseScale).
+  /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale) { point_sigma *= scale; }
 };
 
@@ -62,7 +62,7 @@ struct MatchResult {
   double cost = 0.0;
 };
 
-/// A place that returns of a reference were seen from.
+/// A place from which returns of a reference were seen.
 struct Viewpoint {
   /// Of the laser, in the reference's frame, m.
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
@@ -141,10 +141,10 @@ class ScanMatcher {
   static constexpr double kPeakDistance = 0.6;
   static constexpr double kPeakRotation = DegToRad(12.0);
 
-  /// What the scan and the reference say of each other at this pose. `laser`:
-  /// position of the laser in the robot's frame, m. Without viewpoints nothing
-  /// of the reference is free. `intruders`, if not null, gets one entry per
-  /// return: whether it is an intruder.
+  /// Compares the scan with the reference at this pose. `laser`: position of
+  /// the laser in the robot's frame, m. Without viewpoints nothing of the
+  /// reference is free. `intruders`, if not null, gets one entry per return:
+  /// whether it is an intruder.
   ScanAgreement Compare(const std::vector<ScanPoint>& scan, const Pose2& pose,
                         const Eigen::Vector2d& laser,
                         std::vector<bool>* intruders = nullptr) const;

@@ -9,7 +9,7 @@
 
 namespace plumbline {
 
-/// How odometry is made of scans alone.
+/// Options for making odometry from scans alone.
 struct ScanOdometryOptions {
   /// How far a robot of the usual kind may have left its steady course between
   /// two scans: per second.
@@ -30,18 +30,18 @@ struct ScanOdometryOptions {
   double max_turn = DegToRad(360.0);
   ScanPointsOptions points;
   ScanMatcherOptions matcher;
-  /// Asked now and then; true ends the work there. May be empty.
+  /// Polled regularly; true ends the work there. May be empty.
   std::function<bool()> stop;
   /// Called with scans done and all of them. May be empty.
   std::function<void(std::size_t, std::size_t)> progress;
 };
 
-/// What came of it.
+/// Figures of AddScanOdometry.
 struct ScanOdometryReport {
   /// Scans that no match could place: they go on as the robot went before.
   std::size_t unmatched = 0;
-  /// The gyroscope's part: turn rate = scale * rate + bias, rad/s, fitted to
-  /// the scans' own turns, and the share of their variance that it explains.
+  /// The model of the gyroscope, turn rate = scale * rate + bias, rad/s, fitted
+  /// to the scans' own turns, and the share of their variance that it explains.
   bool used_yaw_rates = false;
   double yaw_scale = 1.0;
   double yaw_bias = 0.0;

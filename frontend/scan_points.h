@@ -26,7 +26,7 @@ struct ScanPointsOptions {
   /// point has no normal.
   double normal_tolerance = 0.04;
 
-  /// For a laser that is so many times noisier (RangeNoiseScale).
+  /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale) { normal_tolerance *= scale; }
 };
 
@@ -58,9 +58,11 @@ inline ScanPoint Moved(const ScanPoint& point, const PoseTransform& transform) {
 void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
                        std::vector<ScanPoint>* points);
 
-/// What stands by itself in front of the rest: a leg, a person, a chair.
+/// Options for what stands by itself in front of the rest: a leg, a person, a
+/// chair.
 struct ClutterOptions {
-  /// Widest, m, and so far at least what is beside it lies behind it, m.
+  /// Largest width, m, and least distance by which its surroundings lie behind
+  /// it, m.
   double max_width = 0.6;
   double min_depth = 0.15;
   /// Ranges of neighbouring returns differ by more than this where one thing

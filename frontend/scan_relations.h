@@ -14,7 +14,7 @@
 
 namespace plumbline {
 
-/// Options: which scans are matched with each other, and which matches stay.
+/// Options for which scans are matched with each other, and which matches stay.
 struct ScanRelationOptions {
   ScanMatcherOptions matcher;
   /// Consecutive places that make one submap.
@@ -36,7 +36,7 @@ struct ScanRelationOptions {
   /// were matched or tried are matched anew.
   double retry_distance = 0.1;
   double retry_rotation = DegToRad(1.5);
-  /// The first so many places are not matched with each other.
+  /// The first this many places are not matched with each other.
   int num_held = 0;
   /// The result does not depend on it.
   int num_threads = 1;
@@ -86,8 +86,8 @@ class ScanMatchFinder {
   /// All relations at these poses: one per place, in one frame, good to within
   /// the matcher's initial radius where scans overlap. They come in the order
   /// of submaps, then of places. Cost: linear in the places. `stop` (may be
-  /// null) is asked now and then by the calling thread; once it has returned
-  /// true no more is matched, and what comes is not whole.
+  /// null) is polled regularly by the calling thread; once it has returned true
+  /// no more is matched, and the result is incomplete.
   std::vector<ScanRelation> Find(const std::vector<Pose2>& poses,
                                  const std::function<bool()>& stop = nullptr);
 
@@ -98,7 +98,8 @@ class ScanMatchFinder {
   /// with a bent submap keeps it bent.
   void TrustPoses();
 
-  /// What it remembers, for another finder with the same places and options.
+  /// Writes what it remembers, to be read by another finder with the same
+  /// places and options.
   void WriteState(StateWriter* state) const;
   void ReadState(StateReader* state);
 

@@ -41,7 +41,7 @@ struct SegmentExtractionOptions {
   /// rad.
   double angle_bias_sigma = DegToRad(0.4);
 
-  /// For a laser that is so many times noisier (RangeNoiseScale).
+  /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale) {
     split_distance *= scale;
     max_end_sigma *= scale;

@@ -19,8 +19,8 @@ namespace plumbline {
 Pose2 BuildingFrame(const Graph& graph, const std::vector<Pose2>& path);
 
 /// A feature moved rigidly: its anchor, its position and its angles. Throws
-/// Error for types of which it is not known how they move: those that neither
-/// begin with a position, nor refer to an anchor, nor are made of angles.
+/// Error for types that it does not know how to move: those that neither begin
+/// with a position, nor refer to an anchor, nor consist of angles.
 Feature Moved(const Pose2& by, Feature feature);
 
 /// A copy of a graph with all features moved, under the same ids. Measurements

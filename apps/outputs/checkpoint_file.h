@@ -12,7 +12,7 @@
 namespace plumbline {
 
 /// The state of a run in the middle of its work, kept in a file until the run
-/// has ended, so that one that was killed can be gone on with.
+/// has ended, so that one that was killed can be resumed.
 ///
 /// The file says what the state depends on (program, input, flags) and has a
 /// digest of its own content. It is replaced whole, and nothing that is not
@@ -35,9 +35,9 @@ class CheckpointFile {
   /// file is damaged, or when it is no checkpoint.
   std::optional<std::string> Read();
 
-  /// Writes `state()` if so much time has passed since the last one, or since
-  /// this was made, and writing takes less than 2 % of the time. Throws Error
-  /// when it cannot be written, or something else has the file's name.
+  /// Writes `state()` if `every` has passed since the last one, or since this
+  /// was made, and writing takes less than 2 % of the time. Throws Error when
+  /// it cannot be written, or something else has the file's name.
   void Offer(const std::function<std::string()>& state);
 
   /// Removes the file if it is as this object has read or written it last.

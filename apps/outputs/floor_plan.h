@@ -15,7 +15,7 @@
 
 namespace plumbline {
 
-/// Options of a plan: which walls are one, and what is drawn.
+/// Options for which walls of a plan are one, and what is drawn.
 struct FloorPlanOptions {
   /// Faces whose directions differ by more are never one, rad.
   double merge_angle = DegToRad(3.0);
@@ -46,7 +46,7 @@ struct FloorPlanWall {
   Eigen::Vector2d end = Eigen::Vector2d::Zero();
   /// Index into FloorPlan::directions, or -1 for none.
   int direction = -1;
-  /// What was merged into it, ascending.
+  /// The features that were merged into it, ascending.
   std::vector<FeatureId> features;
 };
 

@@ -9,10 +9,10 @@
 namespace plumbline {
 
 /// Writes a plan as a DXF drawing (ASCII, AutoCAD 2000: the oldest version that
-/// carries units) in metres, map frame: walls as LINE on one layer a direction
-/// (FloorPlanLayerName), what stands between two faces as SOLID on WALL-SOLID,
-/// round things as CIRCLE on COLUMNS, the robot's way as LWPOLYLINE on
-/// ROBOT-PATH, which is frozen. The same plan gives the same bytes.
+/// carries units) in metres, map frame: walls as LINE on one layer per
+/// direction (FloorPlanLayerName), what stands between two faces as SOLID on
+/// WALL-SOLID, round things as CIRCLE on COLUMNS, the robot's way as LWPOLYLINE
+/// on ROBOT-PATH, which is frozen. The same plan gives the same bytes.
 ///
 /// A plan with rooms has them as closed LWPOLYLINE with their number and area
 /// as TEXT on ROOMS, walls as closed LWPOLYLINE on WALLS, doors as LINE and ARC

@@ -23,7 +23,7 @@ struct DrawnWall {
   std::vector<FeatureId> members;
 };
 
-/// A round thing, m, map frame.
+/// A circle, m, map frame.
 struct DrawnCircle {
   double x = 0.0;
   double y = 0.0;
@@ -53,8 +53,8 @@ struct DrawnEllipse {
   FeatureId id = kNoId;
 };
 
-/// A map as a person wants to see it. Whatever has a number that is not finite,
-/// or lies more than 10,000 km from the origin, is passed over.
+/// Content of a picture of a map. Whatever has a number that is not finite, or
+/// lies more than 10,000 km from the origin, is passed over.
 struct MapDrawing {
   std::vector<DrawnWall> walls;
   std::vector<DrawnCircle> circles;
@@ -63,7 +63,7 @@ struct MapDrawing {
   /// Where walls of different visits were found to be one: x, y (m, map frame),
   /// direction of the wall (rad). A thin mark across the wall.
   std::vector<Pose2> closures;
-  /// Drawn thin, over everything; what they are of, for the legend.
+  /// Drawn thin, over everything; below, what they show, for the legend.
   std::vector<DrawnEllipse> ellipses;
   std::string ellipses_title;
   /// Drawn thin and light under the walls.

@@ -63,7 +63,7 @@ class OccupancyGrid {
   /// kOccupied, kFree or kUnknown; column from the left (x), row from the
   /// bottom (y).
   std::uint8_t Pixel(int column, int row) const;
-  /// The same of a whole row, a byte each from the left.
+  /// Pixels of a whole row from the left, one byte per cell.
   void Row(int row, std::string* pixels) const;
 
   /// Columns, rows, and the side of a cell, m.

@@ -62,7 +62,7 @@ class OutputFolder {
   const std::filesystem::path& staging();
 
   /// The error of a writer as if it had written to the folder itself: the
-  /// staging folder's name is nothing to the reader of the message.
+  /// staging folder's name means nothing to the reader of the message.
   Error InPlace(const Error& error) const;
 
   /// Removes leftovers of earlier runs and puts all staged files in place,
@@ -74,8 +74,7 @@ class OutputFolder {
   Changes Commit(const std::map<std::string, std::string>& digests,
                  const std::function<void()>& before_step = nullptr);
 
-  /// Names of what processes that are gone left behind, removed by the
-  /// constructor.
+  /// Names of leftovers of processes that are gone, removed by the constructor.
   const std::vector<std::string>& cleaned() const { return cleaned_; }
 
  private:

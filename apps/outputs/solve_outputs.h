@@ -49,13 +49,13 @@ struct SolveOutcome : SolvedRun {
   double ellipse_sigmas = 0.0;
   /// Makes the map without structure, for the report; may be null.
   std::function<MapWithoutStructure()> without_structure;
-  /// How broken constraints were broken, as far as it is known: for the report.
+  /// How constraints were broken, as far as it is known: for the report.
   BreakRecords breaks;
   /// Makes the key scans that map.json keeps; null for a graph.
   std::function<KeyScanArchive()> key_scans;
   /// Complete but for the times and memory of writing.
   Summary summary;
-  /// What several files show, made by the first that does: for the writers.
+  /// Parts that several files show, made by the first writer that needs them.
   std::shared_ptr<SharedParts> parts;
 
   SolveOutcome();
@@ -65,11 +65,11 @@ struct SolveOutcome : SolvedRun {
   const BuildingPlan* BuildingIfMade() const;
 };
 
-/// So many logs can be solved together.
+/// Most logs that can be solved together.
 inline constexpr std::size_t kMostLogs = 50;
 
 /// Registers the output writers of this folder. They take a SolveOutcome and no
-/// other SolvedRun. Does nothing for what is there already.
+/// other SolvedRun. Writers that are registered already stay.
 void RegisterBuiltinOutputWriters(Registry* registry);
 
 /// Names that a list selects: "default", "all", "none", names, and names with a

@@ -130,9 +130,9 @@ struct Summary {
 
   /// Of a log only: how the track of the robot hangs together.
   struct Tracking {
-    /// A part of the track that hangs on the rest by a guess or a single match:
-    /// time stamps of the last scan before it that is sure and of its own last
-    /// one (of the first one that was matched), s, and what happened.
+    /// A part of the track that is tied to the rest by a guess or a single
+    /// match: time stamps of the last scan before it that is sure and of its
+    /// own last one (of the first one that was matched), s, and what happened.
     struct Loose {
       double begin = 0.0;
       double end = 0.0;

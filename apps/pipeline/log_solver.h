@@ -29,19 +29,19 @@
 
 namespace plumbline {
 
-/// Means by which the final trajectory and map are adjusted.
+/// How the final trajectory and map are adjusted.
 enum class Refinement {
-  /// The trajectory is what it was when each scan came in.
+  /// Every pose stays as it was when its scan came in.
   kNone,
   /// Every scan is found again on the final map.
   kMap,
-  /// And then poses, walls and structure are adjusted jointly.
+  /// Then poses, walls and structure are adjusted jointly, too.
   kFull,
 };
 
 /// Options of turning a log into a map.
 struct LogSolverOptions {
-  /// What a kind cannot do is off, whatever the options below say.
+  /// What this kind cannot do is off, whatever the options below say.
   RawFeatures features = RawFeatures::kSegments;
   /// Find structure. False: measurements only.
   bool structure = true;
@@ -85,7 +85,7 @@ struct LogSolverOptions {
   /// What is known of the building beforehand; needs structure and full
   /// refinement of segments.
   KnownStructure known;
-  /// Scans after which a run can be gone on with before all are in: EM and the
+  /// Scans after which a run can be resumed before all are in: EM and the
   /// minimizer start anew there, and what was broken may be proposed again. 0:
   /// never.
   int scans_per_stage = 20000;
@@ -139,7 +139,7 @@ struct LogSolverResult {
   /// replay the log in another way (without_structure.h).
   std::vector<RefinedScan> refined;
   std::vector<KeyScanRecord> records;
-  /// How what is broken in the map was broken.
+  /// How each broken constraint of the map was broken.
   BreakRecords breaks;
   /// Noise of the laser's ranges (standard deviation, m), and the factor by
   /// which the options' distances were larger for it.
@@ -171,17 +171,16 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
 ///     for (...) robot = solver.AddScan(scan);    // the map so far: graph()
 ///     const LogSolverResult result = solver.Finish();
 ///
-/// Run does all of it for a log that is there. A solver solves one log.
+/// Run does all of it for a log in memory. A solver solves one log.
 ///
-/// A run that was killed can be gone on with. What is between two stages is
-/// little: the map, what the front-end made of the scans, and counts; the
-/// minimizer and EM start anew in each stage, whether it was gone on with or
-/// not. So a stage depends on these bytes alone (RunControl::checkpoint), and
-/// Resume ends with the bytes of a run that was never interrupted. What is lost
-/// is the stage that was under way. The stages: taking so many scans each;
-/// finding their structure; closing loops and finding scans again; adjusting
-/// poses; making walls anew; adjusting both; finding structure in these; the
-/// end.
+/// A run that was killed can be resumed. The state between two stages is small:
+/// the map, what the front-end made of the scans, and counts; the minimizer and
+/// EM start anew in each stage, whether the run was resumed or not. So a stage
+/// depends on these bytes alone (RunControl::checkpoint), and Resume ends with
+/// the bytes of a run that was never interrupted. Only the stage that was under
+/// way is lost. The stages: taking scans_per_stage scans each; finding their
+/// structure; closing loops and finding scans again; adjusting poses; making
+/// walls anew; adjusting both; finding structure in these; the end.
 class LogSolver {
  public:
   /// The registry must outlive the solver and have the built-ins. Throws Error
@@ -194,12 +193,12 @@ class LogSolver {
   /// scan is kept until Finish. Throws Error after Finish or Run.
   Pose2 AddScan(Scan scan);
 
-  /// A pose for every scan so far, found again on the map as it stands (with
+  /// The pose of every scan so far, found again on the present map (with
   /// Refinement::kNone as it was when the scan came in). Cost: linear in the
   /// scans. Throws Error after Finish or Run: the result has it.
   std::vector<Pose2> Trajectory() const;
 
-  /// Does what is left once all scans are in. Throws Error when called again.
+  /// Completes the map once all scans are in. Throws Error when called again.
   LogSolverResult Finish(const RunControl& control = {});
 
   /// AddScan for each scan of the log, which is not copied, then Finish: the

@@ -21,7 +21,7 @@ enum class RawFeatures {
   kPoints,
 };
 
-/// All that depends on the kind of raw features. A further kind is a further
+/// Everything that depends on the kind of raw features. A new kind is a new
 /// profile.
 struct RawFeatureProfile {
   RawFeatures kind = RawFeatures::kSegments;

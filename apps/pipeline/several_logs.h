@@ -23,8 +23,8 @@ struct SeveralLogsOptions {
   LogSolverOptions solver;
   TrackPlacementOptions placement;
   /// By log: where its first scan is in the frame of the first log's map, if
-  /// somebody knows it roughly (TrackPlacementOptions::start_distance). May be
-  /// shorter than the list of logs.
+  /// roughly known (TrackPlacementOptions::start_distance). May be shorter than
+  /// the list of logs.
   std::vector<std::optional<Pose2>> starts;
   /// The map of earlier logs (map.json), in whose frame all is then, starts
   /// included, and which every log has to be placed in. Null: none. Not owned.
@@ -35,7 +35,7 @@ struct SeveralLogsOptions {
   bool localize_only = false;
 };
 
-/// What became of one log.
+/// Result for one log.
 struct LogInMap {
   /// Index of its map, and its scans among that map's: [begin, end).
   std::size_t map = 0;

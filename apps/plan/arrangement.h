@@ -11,11 +11,11 @@
 
 namespace plumbline {
 
-/// What lies along a border, m.
+/// Lengths along a border by what lies there, m.
 struct BorderLengths {
   /// By Mark.
   std::array<double, 4> metres = {0.0, 0.0, 0.0, 0.0};
-  /// Sum of metres times what they hold (WallProfile::holds).
+  /// Integral of WallProfile::holds over the border, m.
   double holds = 0.0;
 
   /// Length with a mark, m.
@@ -24,7 +24,7 @@ struct BorderLengths {
   double length() const {
     return metres[0] + metres[1] + metres[2] + metres[3];
   }
-  /// Adds those of another border.
+  /// Adds the lengths of another border.
   void Add(const BorderLengths& other) {
     for (std::size_t i = 0; i < 4; ++i) metres[i] += other.metres[i];
     holds += other.holds;
@@ -51,13 +51,13 @@ struct ArrangementEdge {
 /// The faces into which drawn lines cut the plane.
 struct Arrangement {
   std::vector<Polygon> faces;
-  /// What was seen of each, m^2.
+  /// Free and unknown area of each face, m^2.
   std::vector<double> free;
   std::vector<double> unknown;
   std::vector<ArrangementEdge> edges;
 };
 
-/// Cuts the plane. The same lines give the same faces in the same order.
+/// Cuts the plane along lines. The same lines give the same faces in order.
 Arrangement Arrange(const std::vector<DrawnLine>& drawn,
                     const SpaceGrid& space);
 

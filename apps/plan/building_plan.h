@@ -14,7 +14,7 @@
 
 namespace plumbline {
 
-/// What makes a room, a door and a wall.
+/// Options for what makes a room, a door and a wall.
 struct BuildingPlanOptions {
   WallLineOptions lines;
   DoorOptions doors;
@@ -23,14 +23,14 @@ struct BuildingPlanOptions {
   double min_wall = 2.0;
   /// Lines of walls are drawn on by at most this to meet others, m.
   double reach = 6.0;
-  /// Narrower openings are no doors, m.
+  /// Least width of a door, m.
   double min_door = 0.5;
-  /// Least share of a room that was seen free.
+  /// Least share of a room's area that was seen to be free.
   double min_free = 0.4;
   /// Least share of a room's border that is wall or door.
   double min_closed = 0.4;
-  /// Most of it through which the laser looked where there is neither: what
-  /// stands opposite each other in the open encloses nothing.
+  /// Largest share of the border that is neither and that the laser looked
+  /// through: walls that face each other in the open enclose nothing.
   double max_open = 0.5;
 };
 
@@ -78,7 +78,7 @@ struct PlanWall {
   double right = 0.0;
 };
 
-/// Corners of a wall, against the clock, m.
+/// Corners of a wall, counterclockwise, m.
 Ring BodyOf(const PlanWall& wall);
 
 /// "room" or "corridor", as files have it.
@@ -92,17 +92,18 @@ struct BuildingPlan {
   std::vector<PlanWall> walls;
 };
 
-/// Makes a plan of what a robot saw.
+/// Makes the plan of a building from what a robot saw.
 ///
 /// Lines of walls (FindWallLines) are drawn on to an arrangement of faces. A
 /// minimum cut says which faces lie within the building: free and unknown space
 /// against borders where there is no wall. Faces without a wall between them
-/// are one room; an opening as wide as a door in a wall does not join them.
+/// are one room; a wall with an opening of the width of a door still separates
+/// them.
 ///
-/// `walls`: faces that are known; `directions`: of the building, rad, the most
-/// important first, empty when there are none; `path`: poses of the robot in
-/// the order of time. All in the map frame. A space without walls around it is
-/// no room: the plan of an open field is empty.
+/// `walls`: known faces; `directions`: of the building, rad, the most important
+/// first, empty when there are none; `path`: poses of the robot in the order of
+/// time. All in the map frame. A space without walls around it is not a room:
+/// the plan of an open field is empty.
 ///
 /// Method: cells of an arrangement of wall lines with an energy minimization
 /// after Ochmann et al., "Automatic reconstruction of parametric building

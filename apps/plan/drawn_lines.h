@@ -10,10 +10,10 @@
 
 namespace plumbline {
 
-/// What a place on a line of walls is.
+/// What is found at a place on a line of walls.
 enum class Mark : std::uint8_t { kUnknown, kOpen, kWall, kDoor };
 
-/// What is known along a line, a sample every few centimetres.
+/// What is known along a line, sampled every few centimetres.
 struct WallProfile {
   /// Between samples, m.
   static constexpr double kStep = 0.05;
@@ -21,8 +21,8 @@ struct WallProfile {
   /// Where the first sample begins, along the line, m.
   double begin = 0.0;
   std::vector<Mark> marks;
-  /// How much each sample keeps apart what lies on its sides: 1 for a wall, -1
-  /// for nothing at all.
+  /// How strongly each sample separates its two sides: 1 for a wall, -1 for
+  /// nothing at all.
   std::vector<double> holds;
   /// Samples that lie in a row of occupied cells along the line.
   std::vector<bool> in_row;
@@ -39,7 +39,7 @@ struct WallProfile {
   double MiddleOf(int i) const { return begin + (i + 0.5) * kStep; }
 };
 
-/// A line of walls as far as it is drawn, m along it.
+/// The drawn part of a line of walls, m along it.
 struct DrawnLine {
   WallLine line;
   double from = 0.0;
@@ -47,11 +47,11 @@ struct DrawnLine {
   WallProfile profile;
 };
 
-/// What is a door.
+/// Options for what is a door.
 struct DoorOptions {
   /// Openings up to this width in a wall are doors, m, ...
   double narrow = 1.2;
-  /// ... from this width on they are none, and in between more or less.
+  /// ... wider than this they are not, and in between to a degree.
   double wide = 3.0;
 };
 

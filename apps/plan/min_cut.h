@@ -16,13 +16,13 @@ class MinCut {
  public:
   explicit MinCut(std::size_t num_nodes);
 
-  /// Adds to what a label of `node` costs.
+  /// Adds to the costs of the labels of `node`.
   void AddNodeCost(std::size_t node, double if_false, double if_true);
-  /// Adds to what different labels of two nodes cost.
+  /// Adds to the cost of different labels at two nodes.
   void AddEdgeCost(std::size_t a, std::size_t b, double if_different);
 
-  /// The labels; of several of equal cost the one with the fewest true. Call it
-  /// once.
+  /// The optimal labels; among equal costs those with the fewest true. To be
+  /// called once.
   std::vector<bool> Solve();
 
  private:

@@ -10,10 +10,10 @@ namespace plumbline {
 /// Corners in order; the last is joined to the first, which is not repeated.
 using Ring = std::vector<Eigen::Vector2d>;
 
-/// Area that a ring encloses, positive against the clock.
+/// Area that a ring encloses, positive when it runs counterclockwise.
 double SignedArea(const Ring& ring);
 
-/// A plane figure, m: the shell runs against the clock, holes with it.
+/// A plane figure, m: the shell runs counterclockwise, holes clockwise.
 struct Polygon {
   Ring shell;
   std::vector<Ring> holes;
@@ -22,7 +22,7 @@ struct Polygon {
   double Area() const;
   /// m, holes included.
   double Perimeter() const;
-  /// True inside of the shell and outside of all holes; either on the border.
+  /// True inside the shell and outside all holes; undefined on the border.
   bool Contains(const Eigen::Vector2d& point) const;
 };
 
@@ -38,23 +38,23 @@ std::vector<Polygon> FacesOf(const std::vector<StraightPiece>& pieces);
 /// left out. One polygon for each connected part, the largest first.
 std::vector<Polygon> UnionOf(const std::vector<Polygon>& polygons);
 
-/// The polygon drawn in (negative) or out by `distance`, m, with sharp corners:
+/// The polygon shrunk (negative) or grown by `distance`, m, with sharp corners:
 /// one polygon for each part that is left, the largest first.
 std::vector<Polygon> Offset(const Polygon& polygon, double distance);
 
-/// What two polygons have in common, the largest part first. Polygons that
-/// cross themselves are mended first.
+/// The intersection of two polygons, the largest part first. Polygons that
+/// cross themselves are repaired first.
 std::vector<Polygon> IntersectionOf(const Polygon& a, const Polygon& b);
 
-/// What is left of `a` without `b`, the largest part first.
+/// The part of `a` outside of `b`, the largest piece first.
 std::vector<Polygon> DifferenceOf(const Polygon& a, const Polygon& b);
 
 /// A point as far from the border as can be, to 10 cm: where a label goes. The
 /// origin for an empty polygon.
 Eigen::Vector2d InnerPoint(const Polygon& polygon);
 
-/// The polygon, mended where its border crosses itself: the largest part; empty
-/// when nothing of any area is left.
+/// The polygon, repaired where its border crosses itself: the largest part;
+/// empty when nothing with an area is left.
 Polygon Mended(const Polygon& polygon);
 
 }  // namespace plumbline

@@ -7,12 +7,12 @@
 
 namespace plumbline {
 
-/// What a region of a building is.
+/// Options for what makes a region of a building.
 struct RegionOptions {
   /// What the border of the building costs for each metre without a wall, in
   /// m^2 of unknown or free space on the wrong side of it.
   double border_cost = 0.3;
-  /// Regions are joined when what lies between them holds less than this
+  /// Regions are joined when their border separates them by less than this
   /// (WallProfile::holds, mean over the border).
   double holds_apart = 0.3;
   /// Regions with a lower share of wall than this between them are one: an
@@ -22,11 +22,11 @@ struct RegionOptions {
   /// wider by this factor, it ends.
   double corridor_width = 3.0;
   double widening = 1.5;
-  /// What is smaller, m^2, or narrower, m, is no region of its own and goes to
-  /// the neighbor from which least keeps it apart.
+  /// What is smaller, m^2, or narrower, m, is not a region of its own and goes
+  /// to the neighbor that it is least separated from.
   double min_area = 2.0;
   double min_width = 0.8;
-  /// So are spaces that were not seen, behind furniture, narrower than this, m.
+  /// The same goes for unseen spaces behind furniture narrower than this, m.
   double pocket_width = 0.9;
 };
 

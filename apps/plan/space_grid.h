@@ -8,7 +8,7 @@
 
 namespace plumbline {
 
-/// What a laser found at a place.
+/// What a laser saw at a place.
 enum class Space : std::uint8_t { kUnknown, kFree, kOccupied };
 
 /// A raster of the space that was seen, row by row from the bottom.
@@ -19,7 +19,7 @@ struct SpaceGrid {
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();
   int width = 0;
   int height = 0;
-  /// width * height of them.
+  /// width * height cells.
   std::vector<Space> cells;
 
   /// Unknown outside of the raster.

@@ -17,15 +17,15 @@ struct KnownWall {
   Eigen::Vector2d end = Eigen::Vector2d::Zero();
 };
 
-/// What makes a line of walls.
+/// Options for what makes a line of walls.
 struct WallLineOptions {
   /// Directions that differ by less are one, rad.
   double same_direction = DegToRad(3.0);
   /// A row of occupied cells is a piece of wall from this length on, m, ...
   double min_length = 0.5;
-  /// ... with no longer gaps than this, m.
+  /// ... with no gap longer than this, m.
   double max_gap = 0.3;
-  /// Cells this near to a piece, m, are explained by it.
+  /// A piece explains cells within this distance of it, m.
   double cell_distance = 0.1;
   /// Faces of one wall are no farther apart, m: the thickest wall.
   double max_thickness = 0.3;
@@ -33,7 +33,7 @@ struct WallLineOptions {
   double in_line_gap = 4.0;
 };
 
-/// Pieces of wall in one straight line, both faces of it, plan frame, m.
+/// Pieces of wall in one straight line, with both faces; map frame, m.
 struct WallLine {
   /// In the middle of the wall.
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();
@@ -46,10 +46,10 @@ struct WallLine {
   double high = 0.0;
   /// Metres of wall.
   double weight = 0.0;
-  /// False: drawn from the end of another line to close a space, without
-  /// anything that speaks for a wall.
+  /// False: drawn from the end of another line to close a space, without any
+  /// evidence of a wall.
   bool is_wall = true;
-  /// It has exactly one of the building's directions.
+  /// Its direction is exactly one of the building's.
   bool is_aligned = false;
 
   /// Unit vector to the left of `along`.

@@ -30,8 +30,8 @@ struct BagMessage {
   std::size_t topic = 0;
   /// When it was recorded, ns since the epoch of the recording's clock.
   std::int64_t time = 0;
-  /// Packed fields, valid until the next call of Next(); empty where nobody
-  /// wanted them.
+  /// Packed fields, valid until the next call of Next(); empty for topics that
+  /// are not wanted.
   std::string_view data;
 };
 
@@ -53,8 +53,8 @@ class BagSource {
  public:
   virtual ~BagSource() = default;
 
-  /// Says whose messages' data are worth reading. Set before the first Next();
-  /// all when it is not.
+  /// Selects the topics whose data are read, all by default. To be called
+  /// before the first Next().
   void SetWanted(std::function<bool(const BagTopic&)> wanted) {
     wanted_ = std::move(wanted);
   }
@@ -78,7 +78,7 @@ class BagSource {
   bool IsWanted(const BagTopic& topic) const {
     return topic.unreadable.empty() && (!wanted_ || wanted_(topic));
   }
-  /// Counts a message or its lack; the position is that of the message at hand.
+  /// Counts a message, or the lack of one, at the present position.
   void Skip(const std::string& reason, std::int64_t count = 1) {
     skips_.Add(reason, position_, count);
   }

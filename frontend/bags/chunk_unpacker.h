@@ -7,7 +7,7 @@
 
 namespace plumbline {
 
-/// What a compressed chunk came to.
+/// Result of unpacking a compressed chunk.
 struct UnpackedChunk {
   std::string bytes;
   /// Stored bytes up to the end of the compressed stream.
@@ -22,9 +22,9 @@ struct UnpackedChunk {
 /// "zstd".
 bool IsKnownCompression(std::string_view compression);
 
-/// Unpacks the stream that `stored` begins with, up to `limit` bytes; what is
-/// more is damage. Checksums in the stream are tested. Never throws but for
-/// lack of memory.
+/// Unpacks the stream that `stored` begins with, up to `limit` bytes; more than
+/// that counts as damage. Checksums in the stream are tested. Throws for lack
+/// of memory only.
 UnpackedChunk UnpackChunk(std::string_view compression, std::string_view stored,
                           std::size_t limit);
 

@@ -24,10 +24,10 @@ class ChunkedBag : public BagSource {
 
   /// The file.
   InputStream* input() const { return input_; }
-  /// The chunk at hand, what of it is left; empty when there is none.
+  /// What is left of the present chunk; empty when there is none.
   MemoryBytes* chunk() { return &chunk_; }
 
-  /// Makes what was unpacked the chunk at hand.
+  /// Makes unpacked data the present chunk.
   void SetChunk(UnpackedChunk unpacked) {
     unpacked_ = std::move(unpacked.bytes);
     chunk_ = MemoryBytes(unpacked_);

@@ -7,8 +7,8 @@
 
 namespace plumbline {
 
-/// The unsigned number that `size` bytes of `bytes` from `offset` on are, the
-/// least significant first. They must be there.
+/// The unsigned number in `size` bytes of `bytes` from `offset` on, the least
+/// significant byte first. They must be there.
 inline std::uint64_t LittleEndian(std::string_view bytes, std::size_t offset,
                                   std::size_t size) {
   std::uint64_t value = 0;

@@ -14,8 +14,8 @@ bool LooksLikeMcap(std::string_view prefix);
 
 /// The messages of an MCAP file (mcap.dev/spec), chunks plain, lz4 or zstd, or
 /// none at all. The file is read from its beginning to the end of its data: the
-/// index is not needed, and what it says is not believed. A chunk whose
-/// checksum is wrong is passed over whole. `input` must outlive the source.
+/// index is neither needed nor trusted. A chunk whose checksum is wrong is
+/// passed over whole. `input` must outlive the source.
 std::unique_ptr<BagSource> OpenMcap(InputStream* input);
 
 }  // namespace plumbline

@@ -19,7 +19,7 @@ enum class MessageEncoding {
 };
 
 /// Reads the fields of a message one after another. A read beyond the end of
-/// the message gives zeros and makes ok() false for good: nothing throws.
+/// the message gives zeros and makes ok() false for good; nothing is thrown.
 class MessageDecoder {
  public:
   /// `bytes` must stay valid. For kCdr the first 4 bytes say the byte order;
@@ -39,7 +39,7 @@ class MessageDecoder {
   /// The next field, of that type, without a terminating zero.
   std::string String();
   /// Number of elements of a sequence whose elements take at least
-  /// `element_size` bytes; 0, and ok() false, when so many cannot follow.
+  /// `element_size` bytes; 0, and ok() false, when the message is too short.
   std::size_t SequenceSize(std::size_t element_size);
   /// Passes over `count` numbers of 8 bytes.
   void SkipFloat64(std::size_t count);

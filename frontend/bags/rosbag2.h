@@ -16,10 +16,10 @@ namespace plumbline {
 bool LooksLikeSqlite(std::string_view prefix);
 
 /// The messages of a .db3 file of a ROS 2 bag. The database is opened for
-/// reading only, and its tables are not believed to be in order. Where `input`
-/// is no plain file (a pipe, or compressed) it goes to a temporary file first.
-/// `input` must outlive the source. Throws Error when the file is no such
-/// database.
+/// reading only, and its tables are not trusted to be in order. Where `input`
+/// is no plain file (a pipe, or compressed) it is copied to a temporary file
+/// first. `input` must outlive the source. Throws Error when the file is no
+/// such database.
 std::unique_ptr<BagSource> OpenRosbag2Sqlite(InputStream* input);
 
 /// Whether the folder `path` is a ROS 2 bag: has a metadata.yaml, or files

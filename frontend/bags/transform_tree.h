@@ -11,7 +11,7 @@
 
 namespace plumbline {
 
-/// A rigid motion in space: what maps a point of a frame to its parent's.
+/// A rigid motion in space that maps points of a frame into its parent.
 struct Pose3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   /// m
@@ -24,8 +24,8 @@ Pose3 Inverse(const Pose3& pose);
 /// The way from a (share 0) to b (share 1): straight, turning evenly.
 Pose3 Interpolate(const Pose3& a, const Pose3& b, double share);
 
-/// What a message has; false when a number is not finite or absurd or the
-/// quaternion is not of unit length (1 % off is allowed for, and made good).
+/// Converts a message; false when a number is not finite or absurd, or the
+/// quaternion is not of unit length (1 % off is accepted and normalized).
 bool ToPose3(const Pose3Message& message, Pose3* pose);
 
 /// The frames of /tf and /tf_static over time. Names are taken without a slash

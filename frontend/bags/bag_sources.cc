@@ -1,0 +1,316 @@
+#include <plumbline/core/error.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/frontend/bags/bag_sources.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr double kNanoseconds = 1e9;  // in a second
+// Between the time stamps of two sources and the times at which their messages
+// were recorded the delays differ by less, s, or their clocks do.
+constexpr double kClockDifference = 0.5;
+
+template <typename T>
+T MedianOf(std::vector<T> values) {
+  const auto middle =
+      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// By how much messages are recorded later than they are stamped, ns. Times for
+// which nobody sets a stamp say nothing: they are all the same.
+template <typename Raw>
+bool DelayOf(const std::vector<Raw>& messages, std::int64_t* delay) {
+  std::vector<std::int64_t> delays;
+  std::size_t standing = 0;
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    delays.push_back(messages[i].received - messages[i].stamp);
+    if (i > 0 && messages[i].stamp == messages[i - 1].stamp) ++standing;
+  }
+  if (delays.empty() || 2 * standing > messages.size() ||
+      (messages.size() == 1 && messages[0].stamp == 0)) {
+    return false;
+  }
+  *delay = MedianOf(std::move(delays));
+  return true;
+}
+
+class SourceChooser {
+ public:
+  SourceChooser(const std::string& name, const LaserOptions& options,
+                BagMessages* messages, Log* log)
+      : name_(name), options_(options), messages_(messages), log_(log) {}
+
+  BagSources Choose() {
+    ChooseScans();
+    ChooseOdometry();
+    UseClock();
+    return std::move(sources_);
+  }
+
+ private:
+  [[noreturn]] void Refuse(const std::string& what,
+                           const std::string& expected) const {
+    throw Error(name_, 0, what, expected);
+  }
+
+  void ChooseScans() {
+    const std::string candidates = messages_->ListOf(BagTopicKind::kScan);
+    if (messages_->is_ambiguous) {
+      for (BagStream& stream : messages_->streams) {
+        if (stream.kind == BagTopicKind::kScan) {
+          stream.seen.why_not = "several topics have scans";
+        }
+      }
+      Refuse("has laser scans on several topics: " + candidates,
+             "--scan_topic with one of them");
+    }
+    if (!options_.scan_topic.empty()) {
+      const auto named = std::find_if(
+          messages_->topics.begin(), messages_->topics.end(),
+          [&](const BagTopic& t) { return IsNamed(t, options_.scan_topic); });
+      if (named == messages_->topics.end() ||
+          KindOf(*named) != BagTopicKind::kScan) {
+        Refuse((named == messages_->topics.end()
+                    ? "has no topic " + options_.scan_topic
+                    : "has messages of type " + named->type + " on " +
+                          options_.scan_topic) +
+                   "; it has " + messages_->Contents(),
+               candidates.empty() ? "a bag with sensor_msgs/LaserScan"
+                                  : "--scan_topic with one of " + candidates);
+      }
+    }
+    if (messages_->scans.empty()) {
+      Refuse("has no laser scan that can be used; it has " +
+                 messages_->Contents() + messages_->Losses(),
+             "messages of type sensor_msgs/LaserScan");
+    }
+    BagStream& stream = messages_->streams[messages_->scan_topic];
+    stream.seen.use = "scans";
+    log_->scan_message = stream.seen.name;
+    for (BagStream& other : messages_->streams) {
+      if (other.kind == BagTopicKind::kScan && &other != &stream &&
+          other.seen.messages > 0) {
+        other.seen.why_not = "another topic was chosen";
+      }
+    }
+  }
+
+  void ChooseOdometry() {
+    const std::string& wanted = options_.odometry_topic;
+    std::vector<std::size_t> candidates;
+    for (std::size_t i = 0; i < messages_->streams.size(); ++i) {
+      const BagStream& stream = messages_->streams[i];
+      if (stream.kind == BagTopicKind::kOdometry && !stream.poses.empty()) {
+        candidates.push_back(i);
+      }
+    }
+    const std::string list = messages_->ListOf(BagTopicKind::kOdometry);
+    if (wanted == "none") return;
+    if (!wanted.empty() && wanted != "tf") {
+      const auto named =
+          std::find_if(messages_->topics.begin(), messages_->topics.end(),
+                       [&](const BagTopic& t) { return IsNamed(t, wanted); });
+      if (named == messages_->topics.end() ||
+          KindOf(*named) != BagTopicKind::kOdometry || candidates.empty()) {
+        Refuse((named == messages_->topics.end() ? "has no topic " + wanted
+                : KindOf(*named) != BagTopicKind::kOdometry
+                    ? "has messages of type " + named->type + " on " + wanted
+                    : "has no odometry that can be used on " + wanted) +
+                   "; it has " + messages_->Contents() + messages_->Losses(),
+               "--odometry_topic with " +
+                   (list.empty() ? std::string("tf or none")
+                                 : "one of " + list + ", tf or none"));
+      }
+    }
+    if (wanted != "tf" && candidates.size() > 1) {
+      for (const std::size_t i : candidates) {
+        messages_->streams[i].seen.why_not = "several topics have odometry";
+      }
+      Refuse("has odometry on several topics: " + list,
+             "--odometry_topic with one of them, tf or none");
+    }
+    if (wanted != "tf" && candidates.size() == 1) {
+      odometry_ = &messages_->streams[candidates[0]];
+      odometry_->seen.use = "odometry";
+      log_->odometry_source = odometry_->seen.name;
+      sources_.base = odometry_->child_frame;
+      return;
+    }
+    ChooseTransform();
+  }
+
+  // The frames from the laser to the root, odom -> base -> ... -> laser, and
+  // where odometry ties in.
+  void ChooseTransform() {
+    const std::vector<std::string> chain =
+        messages_->tree.ChainOf(messages_->frames[0]);
+    for (std::size_t i = 1; i < chain.size(); ++i) {
+      std::string low = chain[i];
+      std::transform(low.begin(), low.end(), low.begin(),
+                     [](unsigned char c) { return std::tolower(c); });
+      if (low.find("odom") == std::string::npos ||
+          !messages_->tree.IsMoving(chain[i - 1])) {
+        continue;
+      }
+      sources_.base = chain[i - 1];
+      sources_.motion.SetTransform(&messages_->tree, chain[i], chain[i - 1]);
+      log_->odometry_source = "tf " + chain[i] + " -> " + chain[i - 1];
+      messages_->NoteTransformsUsed("odometry");
+      return;
+    }
+    if (options_.odometry_topic == "tf") {
+      Refuse(
+          "has no transform of a moving robot in a frame called odom above "
+          "the laser's frame '" +
+              messages_->frames[0] + "'; tf has " +
+              (messages_->tree.empty() ? "nothing"
+                                       : messages_->tree.Describe()),
+          "such a transform, or --odometry_topic=none");
+    }
+  }
+
+  // Which clock counts, and how the other sources' differ.
+  void UseClock() {
+    std::int64_t delay = 0;
+    const bool is_stamped = DelayOf(messages_->scans, &delay);
+    if (!is_stamped) {
+      log_->notes.push_back(
+          "scans have no time stamps of their own: the times "
+          "at which they were recorded are used");
+      for (BagScan& scan : messages_->scans) scan.stamp = scan.received;
+    }
+    const auto align = [&](const std::string& topic, auto* messages) {
+      std::int64_t own = 0;
+      if (!DelayOf(*messages, &own)) {
+        for (auto& message : *messages) message.stamp = message.received;
+        own = 0;
+        log_->notes.push_back(topic +
+                              " has no time stamps of its own: the times at "
+                              "which it was recorded are used");
+        if (!is_stamped) return;
+      }
+      // From its clock to the scans'.
+      const std::int64_t difference = own - (is_stamped ? delay : 0);
+      if (std::abs(static_cast<double>(difference)) <
+          kClockDifference * kNanoseconds) {
+        return;
+      }
+      for (auto& message : *messages) message.stamp += difference;
+      char text[160];
+      std::snprintf(text, sizeof text,
+                    "is stamped by another clock than the scans: %.3f s are "
+                    "added",
+                    static_cast<double>(difference) / kNanoseconds);
+      log_->notes.push_back(topic + " " + text);
+    };
+    if (odometry_ != nullptr) {
+      align(odometry_->seen.name, &odometry_->poses);
+      sources_.motion.SetPoses(std::move(odometry_->poses));
+    } else if (!sources_.motion.is_known()) {
+      TakeYawRates(align);
+    }
+    for (BagStream& stream : messages_->streams) stream.poses = {};
+  }
+
+  template <typename Align>
+  void TakeYawRates(const Align& align) {
+    BagStream* chosen = nullptr;
+    for (BagStream& stream : messages_->streams) {
+      if (stream.kind != BagTopicKind::kImu || stream.rates.empty()) continue;
+      if (chosen == nullptr || stream.rates.size() > chosen->rates.size()) {
+        if (chosen != nullptr)
+          chosen->seen.why_not = "another has more messages";
+        chosen = &stream;
+      } else {
+        stream.seen.why_not = "another has more messages";
+      }
+    }
+    if (chosen == nullptr) return;
+    align(chosen->seen.name, &chosen->rates);
+    std::stable_sort(chosen->rates.begin(), chosen->rates.end(),
+                     [](const BagTurnRate& a, const BagTurnRate& b) {
+                       return a.stamp < b.stamp;
+                     });
+    for (const BagTurnRate& rate : chosen->rates) {
+      log_->yaw_rates.push_back({SecondsOf(rate.stamp), rate.rate});
+    }
+    chosen->seen.use = "turn rates";
+    log_->yaw_rate_source = chosen->seen.name;
+  }
+
+  const std::string& name_;
+  const LaserOptions& options_;
+  BagMessages* messages_;
+  Log* log_;
+  // The topic of the odometry; null when there is none.
+  BagStream* odometry_ = nullptr;
+  BagSources sources_;
+};
+
+}  // namespace
+
+void BagMotion::SetPoses(std::vector<BagPose> poses) {
+  poses_ = std::move(poses);
+  std::stable_sort(
+      poses_.begin(), poses_.end(),
+      [](const BagPose& a, const BagPose& b) { return a.stamp < b.stamp; });
+}
+
+void BagMotion::SetTransform(const TransformTree* tree, std::string odom,
+                             std::string base) {
+  tree_ = tree;
+  odom_ = std::move(odom);
+  base_ = std::move(base);
+}
+
+Pose2 BagMotion::At(std::int64_t time) const {
+  if (tree_ != nullptr) {
+    Pose3 pose;
+    tree_->Lookup(odom_, base_, time, &pose);
+    return PoseInPlane(pose);
+  }
+  if (poses_.empty()) return Pose2::Zero();
+  const auto after = std::upper_bound(
+      poses_.begin(), poses_.end(), time,
+      [](std::int64_t t, const BagPose& pose) { return t < pose.stamp; });
+  if (after == poses_.begin()) return poses_.front().pose;
+  const BagPose& before = *(after - 1);
+  if (after == poses_.end() || before.stamp == time) return before.pose;
+  const double share = static_cast<double>(time - before.stamp) /
+                       static_cast<double>(after->stamp - before.stamp);
+  Pose2 difference = after->pose - before.pose;
+  difference[2] = NormalizeAngle(difference[2]);
+  Pose2 pose = before.pose + share * difference;
+  pose[2] = NormalizeAngle(pose[2]);
+  return pose;
+}
+
+std::int64_t BagMotion::DistanceTo(std::int64_t time) const {
+  if (poses_.empty()) return 0;
+  const auto after = std::lower_bound(
+      poses_.begin(), poses_.end(), time,
+      [](const BagPose& pose, std::int64_t t) { return pose.stamp < t; });
+  std::int64_t distance = -1;
+  if (after != poses_.end()) distance = after->stamp - time;
+  if (after != poses_.begin()) {
+    const std::int64_t back = time - (after - 1)->stamp;
+    if (distance < 0 || back < distance) distance = back;
+  }
+  return distance;
+}
+
+BagSources ChooseBagSources(const std::string& name,
+                            const LaserOptions& options, BagMessages* messages,
+                            Log* log) {
+  return SourceChooser(name, options, messages, log).Choose();
+}
+
+}  // namespace plumbline

@@ -1,0 +1,63 @@
+#ifndef PLUMBLINE_FRONTEND_BAGS_BAG_SOURCES_H_
+#define PLUMBLINE_FRONTEND_BAGS_BAG_SOURCES_H_
+
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/bags/bag_messages.h>
+#include <plumbline/frontend/log_reader.h>
+#include <plumbline/frontend/scan.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// The robot's poses over time by the odometry of a bag: messages of a topic,
+/// or a transform. Times are ns on the scans' clock.
+class BagMotion {
+ public:
+  /// Poses of a topic, in any order.
+  void SetPoses(std::vector<BagPose> poses);
+  /// The transform of `base` in `odom`; the tree is not owned.
+  void SetTransform(const TransformTree* tree, std::string odom,
+                    std::string base);
+
+  /// Whether there is any odometry.
+  bool is_known() const { return tree_ != nullptr || !poses_.empty(); }
+
+  /// The pose at a time, interpolated; the first and last hold before and after
+  /// them. Zero without odometry.
+  Pose2 At(std::int64_t time) const;
+
+  /// Time to the nearest pose of a topic, ns; 0 for a transform and without
+  /// odometry.
+  std::int64_t DistanceTo(std::int64_t time) const;
+
+ private:
+  // Ascending.
+  std::vector<BagPose> poses_;
+  const TransformTree* tree_ = nullptr;
+  std::string odom_;
+  std::string base_;
+};
+
+/// What the log of a bag is made from.
+struct BagSources {
+  /// Name of the robot's own frame, as odometry has it; may be empty.
+  std::string base;
+  BagMotion motion;
+};
+
+/// Chooses the topics or transforms that scans, odometry and turn rates come
+/// from (frontend/bags.md), and brings their times to the scans' clock. Notes
+/// the choice in the figures of the topics and in the log; moves poses and turn
+/// rates out of `messages`, which must outlive the result. Throws Error, with a
+/// list of what is there, when there is no scan, or more than one topic that
+/// could be meant and no option says which.
+BagSources ChooseBagSources(const std::string& name,
+                            const LaserOptions& options, BagMessages* messages,
+                            Log* log);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_BAGS_BAG_SOURCES_H_

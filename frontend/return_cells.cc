@@ -1,0 +1,143 @@
+#include <plumbline/frontend/return_cells.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace plumbline {
+
+std::int64_t CellKey(std::int64_t column, std::int64_t row) {
+  // Unsigned, since a negative column cannot be shifted.
+  return static_cast<std::int64_t>(
+      static_cast<std::uint64_t>(column) << 32 |
+      (static_cast<std::uint64_t>(row) & 0xffffffffu));
+}
+
+void LineFit::Solve(Eigen::Vector2d* mean, Eigen::Vector2d* direction,
+                    double* across, double* along) const {
+  *mean = sum / n;
+  const double sxx = xx / n - mean->x() * mean->x();
+  const double sxy = xy / n - mean->x() * mean->y();
+  const double syy = yy / n - mean->y() * mean->y();
+  const double angle = 0.5 * std::atan2(2.0 * sxy, sxx - syy);
+  const double radical = std::hypot(0.5 * (sxx - syy), sxy);
+  *direction = {std::cos(angle), std::sin(angle)};
+  *across = std::max(0.0, 0.5 * (sxx + syy) - radical);
+  *along = 0.5 * (sxx + syy) + radical;
+}
+
+void ReturnCells::Clear() {
+  cells_.clear();
+  cell_of_.clear();
+}
+
+void ReturnCells::Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
+                      std::size_t scan) {
+  const auto column =
+      static_cast<std::int64_t>(std::floor(point.x() / cell_size_));
+  const auto row =
+      static_cast<std::int64_t>(std::floor(point.y() / cell_size_));
+  const auto inserted = cell_of_.try_emplace(CellKey(column, row),
+                                             static_cast<int>(cells_.size()));
+  if (inserted.second) cells_.emplace_back();
+  Cell& cell = cells_[inserted.first->second];
+  cell.sum += point;
+  cell.view -= ray;
+  ++cell.returns;
+  if (cell.scans.empty() || cell.scans.back() != scan) {
+    cell.scans.push_back(scan);
+  }
+}
+
+void ReturnCells::Finish() {
+  FillBuckets();
+  FitDirections();
+}
+
+void ReturnCells::FillBuckets() {
+  bucket_of_.clear();
+  buckets_.clear();
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    Cell& cell = cells_[i];
+    cell.mean = cell.sum / cell.returns;
+    const auto inserted = bucket_of_.try_emplace(
+        BucketKey(cell.mean, 0, 0), static_cast<int>(buckets_.size()));
+    if (inserted.second) {
+      buckets_.emplace_back();
+      buckets_.back().middle =
+          bucket_size_ * ((cell.mean / bucket_size_).array().floor() + 0.5);
+    }
+    cell.bucket = inserted.first->second;
+    buckets_[cell.bucket].entries.push_back({cell.mean, static_cast<int>(i)});
+  }
+  num_slots_ = 0;
+  for (Bucket& bucket : buckets_) {
+    bucket.around = BucketsAround(bucket.middle);
+    bucket.FillLocal();
+    bucket.first_slot = num_slots_;
+    num_slots_ += bucket.x.size();
+  }
+}
+
+std::int64_t ReturnCells::BucketKey(const Eigen::Vector2d& point, int dx,
+                                    int dy) const {
+  return CellKey(
+      static_cast<std::int64_t>(std::floor(point.x() / bucket_size_)) + dx,
+      static_cast<std::int64_t>(std::floor(point.y() / bucket_size_)) + dy);
+}
+
+std::array<int, 9> ReturnCells::BucketsAround(
+    const Eigen::Vector2d& point) const {
+  std::array<int, 9> around;
+  int k = 0;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const auto found = bucket_of_.find(BucketKey(point, dx, dy));
+      around[k++] = found == bucket_of_.end() ? -1 : found->second;
+    }
+  }
+  return around;
+}
+
+void ReturnCells::Use(int index) {
+  Cell& cell = cells_[index];
+  if (cell.used) return;
+  cell.used = true;
+  used_up_.push_back(cell.bucket);
+}
+
+void ReturnCells::DropUsed() {
+  std::sort(used_up_.begin(), used_up_.end());
+  used_up_.erase(std::unique(used_up_.begin(), used_up_.end()), used_up_.end());
+  for (const int k : used_up_) {
+    std::vector<Bucket::Entry>& entries = buckets_[k].entries;
+    entries.erase(std::remove_if(entries.begin(), entries.end(),
+                                 [this](const Bucket::Entry& entry) {
+                                   return cells_[entry.index].used;
+                                 }),
+                  entries.end());
+    buckets_[k].FillLocal();
+  }
+  used_up_.clear();
+}
+
+void ReturnCells::FitDirections() {
+  for (Cell& cell : cells_) {
+    LineFit fit;
+    int count = 0;
+    const Eigen::Vector2d origin = cell.mean;
+    VisitBuckets(origin, buckets_[cell.bucket].around, normal_radius_,
+                 [&](int index) {
+                   fit.Add(cells_[index].mean - origin, 1.0);
+                   ++count;
+                 });
+    if (count < 4) continue;
+    Eigen::Vector2d mean, direction;
+    double across, along;
+    fit.Solve(&mean, &direction, &across, &along);
+    if (along <= 0.0 || across > 0.08 * along) continue;
+    cell.direction = direction;
+    cell.straightness = along - 10.0 * across;
+  }
+}
+
+}  // namespace plumbline

@@ -1,0 +1,269 @@
+#ifndef PLUMBLINE_FRONTEND_RETURN_CELLS_H_
+#define PLUMBLINE_FRONTEND_RETURN_CELLS_H_
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <unordered_map>
+#include <vector>
+
+namespace plumbline {
+
+/// Key of a cell of a grid for hash tables.
+std::int64_t CellKey(std::int64_t column, std::int64_t row);
+
+/// Total least squares line through points with weights, m.
+struct LineFit {
+  double n = 0.0;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double xx = 0.0, xy = 0.0, yy = 0.0;
+
+  /// Adds a point.
+  void Add(const Eigen::Vector2d& p, double weight) {
+    n += weight;
+    sum += weight * p;
+    xx += weight * p.x() * p.x();
+    xy += weight * p.x() * p.y();
+    yy += weight * p.y() * p.y();
+  }
+  /// Mean of the points, direction of the line, and their variances across and
+  /// along it, m^2.
+  void Solve(Eigen::Vector2d* mean, Eigen::Vector2d* direction, double* across,
+             double* along) const;
+};
+
+/// Laser returns of many scans gathered in the cells of a grid, with searches
+/// for cells near a place or along a line. Map frame, m. Searches may run on
+/// several threads between changes.
+class ReturnCells {
+ public:
+  /// Returns gathered in one cell.
+  struct Cell {
+    /// Of their positions.
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    /// Towards the lasers that saw it.
+    Eigen::Vector2d view = Eigen::Vector2d::Zero();
+    int returns = 0;
+    /// Scans that saw it, ascending.
+    std::vector<std::size_t> scans;
+    /// Direction of the surface; zero where it is not straight.
+    Eigen::Vector2d direction = Eigen::Vector2d::Zero();
+    /// Larger for straighter surroundings; 0 where they are not straight.
+    double straightness = 0.0;
+    /// Taken by a wall: no search finds it any more.
+    bool used = false;
+    /// The bucket that it lies in.
+    int bucket = 0;
+  };
+
+  /// What a search along lines marks, kept for its memory. All 0 between two
+  /// searches.
+  struct Marks {
+    /// By slot: taken in, or never to be.
+    std::vector<std::uint8_t> is_settled;
+    /// Slots that are not 0.
+    std::vector<std::size_t> settled;
+
+    /// Marks a slot.
+    void Settle(std::size_t slot) {
+      is_settled[slot] = 1;
+      settled.push_back(slot);
+    }
+    /// Takes all marks away.
+    void Clear() {
+      for (const std::size_t slot : settled) is_settled[slot] = 0;
+      settled.clear();
+    }
+  };
+
+  /// Cells of side `cell_size`; surroundings are those within `normal_radius`,
+  /// and searches along lines bridge gaps up to `max_gap`, m.
+  ReturnCells(double cell_size, double normal_radius, double max_gap)
+      : cell_size_(cell_size),
+        normal_radius_(normal_radius),
+        bucket_size_(std::max(normal_radius, max_gap)) {}
+
+  /// Takes out everything.
+  void Clear();
+
+  /// Adds a return of a scan; `ray` points from the laser to it and has the
+  /// length 1. Scans come in ascending order.
+  void Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
+           std::size_t scan);
+
+  /// Prepares searches, and fits directions. To be called once all returns are
+  /// in.
+  void Finish();
+
+  /// The cells in the order in which they were first seen.
+  const std::vector<Cell>& cells() const { return cells_; }
+  /// Side of the buckets in which searches look, m.
+  double bucket_size() const { return bucket_size_; }
+
+  /// Calls `look(index)` with the cells within `radius` (at most bucket_size())
+  /// of a place.
+  template <typename Look>
+  void VisitNear(const Eigen::Vector2d& place, double radius,
+                 const Look& look) const {
+    VisitBuckets(place, BucketsAround(place), radius, look);
+  }
+
+  /// Prepares marks, and marks a cell.
+  void Mark(int index, Marks* marks) const {
+    marks->is_settled.resize(num_slots_, 0);
+    const Bucket& bucket = buckets_[cells_[index].bucket];
+    marks->Settle(bucket.first_slot + bucket.SlotOf(index));
+  }
+
+  /// Calls `look(index, mean, slot)` with cells that are not marked, those
+  /// within the gap (its square is given, m^2) of the cell `index` and within
+  /// `reach`, m, of a line among them. The line goes through `point` and has
+  /// the direction `direction`, which `look` must not change.
+  template <typename Look>
+  void VisitAlong(int index, double squared_gap, const Eigen::Vector2d& point,
+                  const Eigen::Vector2d& direction, double reach,
+                  const Marks& marks, const Look& look) const {
+    const Cell& cell = cells_[index];
+    // Reach of a bucket's square across the line.
+    const double half_width =
+        0.5 * bucket_size_ *
+            (std::abs(direction.x()) + std::abs(direction.y())) +
+        kRounding;
+    for (const int k : buckets_[cell.bucket].around) {
+      if (k < 0) continue;
+      const Bucket& bucket = buckets_[k];
+      const Eigen::Vector2d offset = bucket.middle - point;
+      const double across =
+          direction.x() * offset.y() - direction.y() * offset.x();
+      if (std::abs(across) > reach + half_width) continue;
+      bucket.VisitNear(cell.mean, squared_gap, direction, across, reach,
+                       marks.is_settled, look);
+    }
+  }
+
+  /// Marks a cell as taken by a wall.
+  void Use(int index);
+  /// Takes the cells that were used out of searches.
+  void DropUsed();
+
+ private:
+  static constexpr double kRounding = 1e-9;
+  // Cells that are compared at a time, and what single precision may be off by.
+  static constexpr int kBlock = 4;
+  static constexpr float kFloatMargin = 1.001f;
+
+  // Cells that have not been used up, by place.
+  struct Bucket {
+    struct Entry {
+      Eigen::Vector2d mean;
+      int index;
+    };
+    std::vector<Entry> entries;
+    Eigen::Vector2d middle;
+    // Itself and those beside it, -1 for none.
+    std::array<int, 9> around;
+    // The means once more, from the middle on, to leave out what is clearly too
+    // far away several at a time.
+    std::vector<float> x, y;
+    // Number of its first entry's slot; every place in x has one.
+    std::size_t first_slot = 0;
+
+    // Place of a cell that is among the entries.
+    std::size_t SlotOf(int index) const {
+      std::size_t slot = 0;
+      while (entries[slot].index != index) ++slot;
+      return slot;
+    }
+
+    // After every change of the entries.
+    void FillLocal() {
+      constexpr float kNowhere = 1e6f;
+      x.assign(entries.size() + kBlock, kNowhere);
+      y.assign(entries.size() + kBlock, kNowhere);
+      for (std::size_t i = 0; i < entries.size(); ++i) {
+        const Eigen::Vector2d local = entries[i].mean - middle;
+        x[i] = static_cast<float>(local.x());
+        y[i] = static_cast<float>(local.y());
+      }
+    }
+
+    // Calls `look(entry, slot)`, in their order, with those within the gap of a
+    // place and within `reach` of a line that are not settled, and some more
+    // that are not. The line has a direction and passes the middle at `across`,
+    // which is to its left.
+    template <typename Look>
+    void VisitNear(const Eigen::Vector2d& place, double squared_gap,
+                   const Eigen::Vector2d& direction, double across,
+                   double reach, const std::vector<std::uint8_t>& is_settled,
+                   const Look& look) const {
+      using Block = Eigen::Array<float, kBlock, 1>;
+      const Eigen::Vector2f local = (place - middle).cast<float>();
+      const Eigen::Vector2f along = direction.cast<float>();
+      const auto offset = static_cast<float>(across);
+      const auto per_gap = static_cast<float>(1.0 / squared_gap);
+      const auto per_reach = static_cast<float>(1.0 / reach);
+      const std::size_t count = entries.size();
+      for (std::size_t i = 0; i < count; i += kBlock) {
+        std::uint32_t settled;
+        static_assert(sizeof(settled) == kBlock);
+        std::memcpy(&settled, &is_settled[first_slot + i], sizeof(settled));
+        if (settled == 0x01010101u) continue;
+        const Eigen::Map<const Block> own_x(&x[i]);
+        const Eigen::Map<const Block> own_y(&y[i]);
+        const Block dx = own_x - local.x();
+        const Block dy = own_y - local.y();
+        const Block gaps = (dx * dx + dy * dy) * per_gap;
+        const Block offsets =
+            (offset + (along.x() * own_y - along.y() * own_x)).abs() *
+            per_reach;
+        const Block farthest = gaps.max(offsets);
+        if (farthest.minCoeff() > kFloatMargin) continue;
+        const std::size_t end = std::min<std::size_t>(i + kBlock, count);
+        for (std::size_t j = i; j < end; ++j) {
+          if (is_settled[first_slot + j] == 0 &&
+              farthest[static_cast<Eigen::Index>(j - i)] <= kFloatMargin) {
+            look(entries[j].index, entries[j].mean, first_slot + j);
+          }
+        }
+      }
+    }
+  };
+
+  std::int64_t BucketKey(const Eigen::Vector2d& point, int dx, int dy) const;
+  // The bucket of a point and those beside it; -1 for one without cells.
+  std::array<int, 9> BucketsAround(const Eigen::Vector2d& point) const;
+  void FillBuckets();
+  void FitDirections();
+
+  template <typename Look>
+  void VisitBuckets(const Eigen::Vector2d& place,
+                    const std::array<int, 9>& around, double radius,
+                    const Look& look) const {
+    for (const int bucket : around) {
+      if (bucket < 0) continue;
+      for (const typename Bucket::Entry& entry : buckets_[bucket].entries) {
+        if ((entry.mean - place).squaredNorm() <= radius * radius) {
+          look(entry.index);
+        }
+      }
+    }
+  }
+
+  const double cell_size_;
+  const double normal_radius_;
+  const double bucket_size_;
+  std::vector<Cell> cells_;
+  std::unordered_map<std::int64_t, int> cell_of_;
+  std::vector<Bucket> buckets_;
+  std::unordered_map<std::int64_t, int> bucket_of_;
+  // Buckets that hold cells which have been used.
+  std::vector<int> used_up_;
+  std::size_t num_slots_ = 0;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_RETURN_CELLS_H_

@@ -99,24 +99,11 @@ void AddPlanClaims(const std::string& shape, ExperimentResult* result) {
            false);
 }
 
-}  // namespace
-
-void RunB1(const ExperimentOptions& options, const Registry& registry,
-           ExperimentResult* result) {
-  result->title = "Loop closures in simulated buildings of several shapes";
-  result->paper =
-      "The paper closes no loops and names global data association as what "
-      "would help most.";
-  std::vector<Job> jobs;
-  for (const std::string& shape : BuildingShapes()) {
-    const auto run_trial = [shape, &options, &registry](Job* self) {
-      const BuildingTrial run = RunBuildingTrial(
-          MakeWorld(shape, self->seed, 1.0), SimulatorOptions(), self->seed,
-          registry, SolverOptions(options), options.stop);
-      if (run.is_stopped) return;
-      const ClosureEvaluation& closures = run.closures;
-      self->values = {
-          {"scans", static_cast<double>(run.scans)},
+// The figures of a trial of B1.
+std::vector<std::pair<std::string, double>> FiguresOf(
+    const BuildingTrial& run) {
+  const ClosureEvaluation& closures = run.closures;
+  return {{"scans", static_cast<double>(run.scans)},
           {"closures_right", closures.right},
           {"closures_near", closures.near},
           {"closures_wrong", closures.wrong},
@@ -146,17 +133,10 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
           {"wall_ends", run.plan.ends},
           {"wall_ends_free", run.plan.free_ends},
           {"plan_walls_twice", run.plan.double_walls}};
-      if (self->seed == options.seed) {
-        MapDrawing drawing = run.drawing;
-        drawing.title = "B1: " + shape;
-        self->maps.emplace_back(shape, drawing);
-      }
-    };
-    AddTrials(options, shape, run_trial, &jobs);
-  }
-  RunJobs(options, &jobs);
-  Collect(&jobs, result);
-  if (result->interrupted) return;
+}
+
+// What closures and walls of buildings of a shape shall be.
+void AddClosureClaims(ExperimentResult* result) {
   for (const std::string& shape : BuildingShapes()) {
     std::vector<double> without;
     for (const double wrong : Column(*result, shape, "closures_wrong")) {
@@ -166,13 +146,10 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
              result);
   }
   for (const std::string& shape : BuildingShapes()) {
-    const auto sum = [&](const char* name) {
-      const std::vector<double> values = Column(*result, shape, name);
-      return static_cast<int>(
-          std::lround(std::accumulate(values.begin(), values.end(), 0.0)));
-    };
-    const int revisits = sum("revisits");
-    const int closed = sum("revisits_closed");
+    const auto revisits =
+        static_cast<int>(std::lround(Sum(*result, shape, "revisits")));
+    const auto closed =
+        static_cast<int>(std::lround(Sum(*result, shape, "revisits_closed")));
     // Walls that were grown from all visits at once need no closure.
     if (revisits == 0) continue;
     Claim claim;
@@ -191,6 +168,36 @@ void RunB1(const ExperimentOptions& options, const Registry& registry,
     claim.holds = claim.measured.value <= kMostDrawnTwice;
     result->claims.push_back(std::move(claim));
   }
+}
+
+}  // namespace
+
+void RunB1(const ExperimentOptions& options, const Registry& registry,
+           ExperimentResult* result) {
+  result->title = "Loop closures in simulated buildings of several shapes";
+  result->paper =
+      "The paper closes no loops and names global data association as what "
+      "would help most.";
+  std::vector<Job> jobs;
+  for (const std::string& shape : BuildingShapes()) {
+    const auto run_trial = [shape, &options, &registry](Job* self) {
+      const BuildingTrial run = RunBuildingTrial(
+          MakeWorld(shape, self->seed, 1.0), SimulatorOptions(), self->seed,
+          registry, SolverOptions(options), options.stop);
+      if (run.is_stopped) return;
+      self->values = FiguresOf(run);
+      if (self->seed == options.seed) {
+        MapDrawing drawing = run.drawing;
+        drawing.title = "B1: " + shape;
+        self->maps.emplace_back(shape, drawing);
+      }
+    };
+    AddTrials(options, shape, run_trial, &jobs);
+  }
+  RunJobs(options, &jobs);
+  Collect(&jobs, result);
+  if (result->interrupted) return;
+  AddClosureClaims(result);
   for (const std::string& shape : BuildingShapes()) {
     AddPlanClaims(shape, result);
   }

@@ -246,6 +246,116 @@ void WriteSettings(const Overview& overview, std::ostringstream* output) {
   *output << "</table></div>\n";
 }
 
+constexpr char kPageHead[] = R"(<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>Sweep</title>
+<style>
+body { font-family: sans-serif; margin: 1.5em; }
+pre { background: #f4f4f4; padding: 0.7em; white-space: pre-wrap; overflow-wrap: anywhere; }
+table { border-collapse: collapse; font-size: 90%; }
+.wide { overflow-x: auto; }
+.plots { display: flex; flex-wrap: wrap; gap: 0.5em; }
+@media (max-width: 600px) { body { margin: 0.7em; } }
+th, td { border: 1px solid #cccccc; padding: 0.25em 0.6em; text-align: right; }
+th { background: #f4f4f4; position: sticky; top: 0; }
+td.words { text-align: left; }
+tr.best td { background: #fff0dd; font-weight: bold; }
+svg { max-width: 100%; height: auto; }
+</style>
+</head>
+<body>
+)";
+
+// The words of a command as a line for a shell.
+std::string CommandLine(const std::vector<std::string>& words) {
+  std::string line;
+  for (const std::string& word : words) {
+    line += (line.empty() ? "" : " ") + QuoteForShell(word);
+  }
+  return line;
+}
+
+// What was run: commands, values of the flags, trials.
+void WriteDefinition(const SweepDefinition& definition,
+                     std::ostringstream* output) {
+  *output << "<h1>Sweep</h1>\n<pre>"
+          << EscapeXml(CommandLine(definition.command)) << "</pre>\n";
+  if (!definition.evaluate.empty()) {
+    *output << "<p>and after each run, in its folder {}:</p>\n<pre>"
+            << EscapeXml(CommandLine(definition.evaluate)) << "</pre>\n";
+  }
+  *output << "<ul>\n";
+  for (const SweepAxis& axis : definition.axes) {
+    std::string values;
+    for (const std::string& value : axis.values) {
+      values += (values.empty() ? "" : ", ") + value;
+    }
+    *output << "<li>" << EscapeXml(axis.flag) << ": " << EscapeXml(values)
+            << "</li>\n";
+  }
+  *output << "</ul>\n<p>"
+          << (definition.one_at_a_time
+                  ? "One flag at a time, the others at their first values. "
+                  : "All combinations. ")
+          << definition.trials << (definition.trials == 1 ? " run" : " runs")
+          << " of each setting, seeds from " << definition.first_seed << ". "
+          << (definition.trials > 1
+                  ? "Means with 95 % confidence intervals (bootstrap)."
+                  : "One run each: no confidence intervals.")
+          << "</p>\n";
+}
+
+// The best setting, and those that are as good.
+void WriteBest(const Overview& overview, std::ostringstream* output) {
+  const SweepDefinition& definition = overview.result.definition;
+  const OverviewOptions& options = overview.options;
+  *output << "<h2>Best setting</h2>\n";
+  if (!overview.best) {
+    *output << "<p>No setting has all its runs done.</p>\n";
+    return;
+  }
+  *output << "<p>" << (options.minimize ? "Least " : "Most ")
+          << EscapeXml(options.objective) << ": "
+          << EstimateText(overview.best->mean, definition.trials)
+          << "</p>\n<pre>"
+          << EscapeXml(SettingText(
+                 definition, overview.settings[overview.best->setting].values))
+          << "</pre>\n";
+  if (overview.best->equals.empty()) return;
+  *output << "<p>As good as far as one can tell:</p>\n<pre>";
+  for (const std::size_t i : overview.best->equals) {
+    *output << EscapeXml(SettingText(definition, overview.settings[i].values))
+            << '\n';
+  }
+  *output << "</pre>\n";
+}
+
+// Plots of the figures over each flag, and heat maps over pairs of flags.
+void WritePlots(const Overview& overview, std::ostringstream* output) {
+  const SweepDefinition& definition = overview.result.definition;
+  *output << "<h2>Plots</h2>\n";
+  if (overview.num_axes() > 1 && !overview.is_table()) {
+    *output << "<p>Where a plot varies one flag, the others are those of</p>\n"
+               "<pre>"
+            << EscapeXml(SettingText(
+                   definition, overview.settings[overview.reference].values))
+            << "</pre>\n";
+  }
+  *output << Plots(overview, false);
+  if (overview.num_axes() <= 2 || definition.one_at_a_time) return;
+  std::vector<HeatMap> maps;
+  for (std::size_t row = 0; row < overview.num_axes(); ++row) {
+    for (std::size_t column = row + 1; column < overview.num_axes(); ++column) {
+      maps.push_back(
+          MakeHeatMap(overview, row, column, overview.options.figures[0]));
+    }
+  }
+  *output << HeatMapSvg(maps);
+}
+
 // Every run with every number that is not the same in all of them.
 void WriteRuns(const SweepResult& result, std::ostringstream* output) {
   constexpr std::size_t kMostCells = 200000;
@@ -370,107 +480,12 @@ std::string OverviewSvg(const SweepResult& result,
 std::string OverviewHtml(const SweepResult& result,
                          const OverviewOptions& options) {
   const Overview overview(result, options);
-  const SweepDefinition& definition = result.definition;
   std::ostringstream page;
-  page << R"(<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width">
-<title>Sweep</title>
-<style>
-body { font-family: sans-serif; margin: 1.5em; }
-pre { background: #f4f4f4; padding: 0.7em; white-space: pre-wrap; overflow-wrap: anywhere; }
-table { border-collapse: collapse; font-size: 90%; }
-.wide { overflow-x: auto; }
-.plots { display: flex; flex-wrap: wrap; gap: 0.5em; }
-@media (max-width: 600px) { body { margin: 0.7em; } }
-th, td { border: 1px solid #cccccc; padding: 0.25em 0.6em; text-align: right; }
-th { background: #f4f4f4; position: sticky; top: 0; }
-td.words { text-align: left; }
-tr.best td { background: #fff0dd; font-weight: bold; }
-svg { max-width: 100%; height: auto; }
-</style>
-</head>
-<body>
-)";
-  page << "<h1>Sweep</h1>\n<pre>";
-  std::string line;
-  for (const std::string& word : definition.command) {
-    line += (line.empty() ? "" : " ") + QuoteForShell(word);
-  }
-  page << EscapeXml(line) << "</pre>\n";
-  if (!definition.evaluate.empty()) {
-    line.clear();
-    for (const std::string& word : definition.evaluate) {
-      line += (line.empty() ? "" : " ") + QuoteForShell(word);
-    }
-    page << "<p>and after each run, in its folder {}:</p>\n<pre>"
-         << EscapeXml(line) << "</pre>\n";
-  }
-  page << "<ul>\n";
-  for (const SweepAxis& axis : definition.axes) {
-    std::string values;
-    for (const std::string& value : axis.values) {
-      values += (values.empty() ? "" : ", ") + value;
-    }
-    page << "<li>" << EscapeXml(axis.flag) << ": " << EscapeXml(values)
-         << "</li>\n";
-  }
-  page << "</ul>\n<p>"
-       << (definition.one_at_a_time
-               ? "One flag at a time, the others at their first values. "
-               : "All combinations. ")
-       << definition.trials << (definition.trials == 1 ? " run" : " runs")
-       << " of each setting, seeds from " << definition.first_seed << ". "
-       << (definition.trials > 1
-               ? "Means with 95 % confidence intervals (bootstrap)."
-               : "One run each: no confidence intervals.")
-       << "</p>\n";
-  if (!options.objective.empty()) {
-    page << "<h2>Best setting</h2>\n";
-    if (overview.best) {
-      page << "<p>" << (options.minimize ? "Least " : "Most ")
-           << EscapeXml(options.objective) << ": "
-           << EstimateText(overview.best->mean, definition.trials)
-           << "</p>\n<pre>"
-           << EscapeXml(SettingText(
-                  definition, overview.settings[overview.best->setting].values))
-           << "</pre>\n";
-      if (!overview.best->equals.empty()) {
-        page << "<p>As good as far as one can tell:</p>\n<pre>";
-        for (const std::size_t i : overview.best->equals) {
-          page << EscapeXml(
-                      SettingText(definition, overview.settings[i].values))
-               << '\n';
-        }
-        page << "</pre>\n";
-      }
-    } else {
-      page << "<p>No setting has all its runs done.</p>\n";
-    }
-  }
+  page << kPageHead;
+  WriteDefinition(result.definition, &page);
+  if (!options.objective.empty()) WriteBest(overview, &page);
   if (!options.figures.empty() && overview.num_axes() > 0) {
-    page << "<h2>Plots</h2>\n";
-    if (overview.num_axes() > 1 && !overview.is_table()) {
-      page << "<p>Where a plot varies one flag, the others are those of</p>\n"
-              "<pre>"
-           << EscapeXml(SettingText(
-                  definition, overview.settings[overview.reference].values))
-           << "</pre>\n";
-    }
-    page << Plots(overview, false);
-    if (overview.num_axes() > 2 && !definition.one_at_a_time) {
-      std::vector<HeatMap> maps;
-      for (std::size_t row = 0; row < overview.num_axes(); ++row) {
-        for (std::size_t column = row + 1; column < overview.num_axes();
-             ++column) {
-          maps.push_back(
-              MakeHeatMap(overview, row, column, options.figures[0]));
-        }
-      }
-      page << HeatMapSvg(maps);
-    }
+    WritePlots(overview, &page);
   }
   page << "<h2>Settings</h2>\n";
   WriteSettings(overview, &page);

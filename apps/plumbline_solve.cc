@@ -232,7 +232,9 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
 void TellEnd(const SolveOutcome& outcome, RunClock* clock) {
   clock->bar().Finish();
   if (FLAGS_quiet) return;
-  for (const std::string& line : ClosingLines(outcome, FLAGS_output_dir)) {
+  for (const std::string& line :
+       FLAGS_localize ? ClosingLinesInMap(outcome, FLAGS_output_dir, FLAGS_map)
+                      : ClosingLines(outcome, FLAGS_output_dir)) {
     std::printf("%s\n", line.c_str());
   }
 }
@@ -256,6 +258,33 @@ std::set<std::string> NamesOfAllOutputs(const Registry& registry) {
       FilesOfOutputs(SelectOutputs("all", registry), registry);
   names.insert(CheckpointFile::kName);
   return names;
+}
+
+// Where the files of a map go: those of the first log's map into the output
+// folder itself.
+std::string FolderOfMap(std::size_t map) {
+  return map == 0 ? "" : "map_" + std::to_string(map + 1);
+}
+
+// Removes the maps of logs that an earlier run kept apart, from this one on:
+// they are none of the present run's.
+void RemoveMapsFrom(std::size_t map, const Registry& registry) {
+  for (; map < kMostLogs; ++map) {
+    const std::filesystem::path path =
+        std::filesystem::path(FLAGS_output_dir) / FolderOfMap(map);
+    std::error_code error;
+    if (!std::filesystem::is_directory(path, error)) continue;
+    const OutputFolder::Changes changes =
+        OutputFolder(path, NamesOfAllOutputs(registry), InputFiles()).Clear();
+    if (!changes.removed.empty()) {
+      Remark("%s: removed of an earlier run: %s", path.c_str(),
+             Joined(changes.removed).c_str());
+    }
+    if (!changes.kept.empty()) {
+      Remark("%s: kept of an earlier run: %s", path.c_str(),
+             Joined(changes.kept).c_str());
+    }
+  }
 }
 
 // Says which flags that were given do nothing for this kind of input.
@@ -871,6 +900,7 @@ int SolveLog(const LogInput& input, const Registry& registry, RunClock* clock,
   clock->Begin("figures");
   TakeMap(input.name, log.scans, solver, registry, options, result, &outcome);
   WriteOutputs(&outcome, clock, folder);
+  RemoveMapsFrom(1, registry);
   live->Finish(outcome);
   TellEnd(outcome, clock);
   if (!summary.partial) checkpoint.Remove();
@@ -925,12 +955,6 @@ void AddNotes(const std::string& title, const Summary& log, Summary* summary) {
   summary->log_format = log.log_format;
   summary->scan_source = log.scan_source;
   summary->odometry_source = log.odometry_source;
-}
-
-// Where the files of a map go: those of the first log's map into the output
-// folder itself.
-std::string FolderOfMap(std::size_t map) {
-  return map == 0 ? "" : "map_" + std::to_string(map + 1);
 }
 
 // What became of each log.
@@ -1081,7 +1105,9 @@ void WriteLocalized(const EarlierMap& earlier, const Registry& registry,
   outcome.scans = &scans;
   outcome.title = title + ", in " + TitleOf(FLAGS_map);
   WriteOutputs(&outcome, clock, folder);
+  RemoveMapsFrom(1, registry);
   live->Finish(outcome);
+  TellEnd(outcome, clock);
 }
 
 // `earlier`: the map that the logs continue or are found in, or null.
@@ -1147,6 +1173,7 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
             &outcome);
     if (m == 0) {
       WriteOutputs(&outcome, clock, folder);
+      RemoveMapsFrom(solved.maps.size(), registry);
       live->Finish(outcome);
       TellEnd(outcome, clock);
       continue;
@@ -1291,6 +1318,7 @@ int SolveGraph(InputStream* input, const Registry& registry, RunClock* clock,
   };
   outcome.title = TitleOf(input->name());
   WriteOutputs(&outcome, clock, folder);
+  RemoveMapsFrom(1, registry);
   live->Finish(outcome);
   TellEnd(outcome, clock);
   return kExitSuccess;

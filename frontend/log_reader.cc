@@ -44,7 +44,10 @@ Log ReadLog(const std::string& path, const Registry& registry,
     for (const LogReaderType* known : registry.All<LogReaderType>()) {
       names += (names.empty() ? "" : ", ") + known->name;
     }
-    throw Error(input.name(), 0, "is no log of a known format",
+    // What breaks off may be one, if there were more of it.
+    throw Error(input.name(), 0,
+                "is no log of a known format" +
+                    (input.damage().empty() ? "" : ", and " + input.damage()),
                 names.empty() ? "log readers in the registry"
                               : "a log for one of the readers " + names);
   }

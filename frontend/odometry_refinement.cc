@@ -320,6 +320,16 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
   return believed;
 }
 
+bool OdometryRefiner::Leaps(const Pose2& matched, const Pose2& motion) const {
+  // Scans without times leap as they like.
+  if (track_.after_gap || track_.seconds <= 0.0) return false;
+  const double most = options_.search_translation +
+                      options_.tracking.gap_speed * track_.seconds;
+  const auto way = [](const Pose2& pose) { return pose.head<2>().norm(); };
+  return way(Between(track_.last_pose, matched)) > most &&
+         way(Between(Compose(track_.last_pose, motion), matched)) > most;
+}
+
 OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
                                                 const Pose2& motion) {
   Outcome outcome;
@@ -349,6 +359,7 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
       (sees_little && innovation > options_.tracking.max_innovation)) {
     believed = StandsUpTo(scan, prior, innovation, &match, &outcome);
   }
+  believed = believed && !Leaps(match.pose, motion);
   if (!believed) {
     ++refusals_;
     return outcome;
@@ -407,6 +418,7 @@ void OdometryRefiner::NoteMatch(const Outcome& outcome, const Pose2& motion) {
     track_.way = 0.0;
     track_.turn = 0.0;
     track_.refused = 0;
+    track_.seconds = 0.0;
     track_.after_gap = false;
   } else if (options_.match_scans) {
     track_.way += motion.head<2>().norm();
@@ -530,6 +542,7 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
   }
 
   NoteGap(seconds);
+  track_.seconds += std::max(0.0, seconds);
   if (open_ != nullptr) {
     open_->way += motion.head<2>().norm();
     open_->seconds += std::max(0.0, seconds);

@@ -100,7 +100,10 @@ struct TrackingOptions {
   /// A rival pose must be worse by this factor.
   double rival_share = 0.75;
   /// Speed at which the robot may have gone in a gap, m/s, and how far the
-  /// search near the last pose goes at most, m.
+  /// search near the last pose goes at most, m. A match that asks for a faster
+  /// move which odometry does not have, and which is longer than
+  /// search_translation by that, does not count: wheels slip, but a robot does
+  /// not leap. A scan may show another time than its stamp says.
   double gap_speed = 0.8;
   double max_local_search = 6.0;
   /// Key scans of the track at which the whole map is searched first, and after
@@ -314,6 +317,8 @@ class OdometryRefiner {
     double way = 0.0;
     double turn = 0.0;
     int refused = 0;
+    // Time since then, s.
+    double seconds = 0.0;
     // Scans for which it is known that something moves.
     int moving = 0;
     bool after_gap = false;
@@ -324,10 +329,10 @@ class OdometryRefiner {
     // The matcher is made anew from the keys.
     template <typename Archive>
     friend void Exchange(Archive& archive, Track& track) {
-      auto& [keys, matcher, last_pose, since_key, way, turn, refused, moving,
-             after_gap, last_points] = track;
+      auto& [keys, matcher, last_pose, since_key, way, turn, refused, seconds,
+             moving, after_gap, last_points] = track;
       ExchangeAll(archive, keys, last_pose, since_key, way, turn, refused,
-                  moving, after_gap, last_points);
+                  seconds, moving, after_gap, last_points);
     }
   };
   // A track whose tie to the one before is not known.
@@ -361,6 +366,8 @@ class OdometryRefiner {
   void RebuildReference(Track* track);
   // Matches the scan, which odometry moved by `motion` since the one before.
   Outcome Match(const Scan& scan, const Pose2& motion);
+  // Whether a match goes where the robot cannot have got to by itself.
+  bool Leaps(const Pose2& matched, const Pose2& motion) const;
   // The pose by odometry, as uncertain as all odometry since the last match.
   MatchPrior PriorOf(const Pose2& pose, const Pose2& motion) const;
   // The best pose of `points` near the prior's.

@@ -80,6 +80,15 @@ std::string RoomsWithoutDoor(const BuildingPlan& plan) {
          (count > kMostNamed ? ", ...)" : ")");
 }
 
+void AppendLoose(const SolveOutcome& outcome, const char* what,
+                 std::string* list) {
+  const auto loose =
+      static_cast<std::int64_t>(outcome.summary.tracking.loose.size());
+  if (loose == 0) return;
+  Append(std::string(what) + " hangs by a thread in " + Counted(loose, "place"),
+         list);
+}
+
 std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {
   const Summary& summary = outcome.summary;
   std::string list;
@@ -88,10 +97,7 @@ std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {
   } else if (summary.em_termination != EmTermination::kConvergence) {
     Append("the search for structure did not converge", &list);
   }
-  const auto loose = static_cast<std::int64_t>(summary.tracking.loose.size());
-  if (loose > 0) {
-    Append("the map hangs by a thread in " + Counted(loose, "place"), &list);
-  }
+  AppendLoose(outcome, "the map", &list);
   if (walls.refuted > 0) {
     char text[64];
     std::snprintf(text, sizeof text, " off every direction (up to %.1f m)",
@@ -102,6 +108,17 @@ std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {
   const std::string rooms = plan == nullptr ? "" : RoomsWithoutDoor(*plan);
   if (!rooms.empty()) Append(rooms, &list);
   return list;
+}
+
+// Which file shows it.
+void AppendOpen(const SolveOutcome& outcome, const std::string& folder,
+                std::vector<std::string>* lines) {
+  const std::vector<std::string>& files = outcome.summary.files;
+  for (const char* name : {"report.html", "map.svg", "map.png"}) {
+    if (std::count(files.begin(), files.end(), name) == 0) continue;
+    lines->push_back("open " + (std::filesystem::path(folder) / name).string());
+    break;
+  }
 }
 
 }  // namespace
@@ -127,12 +144,27 @@ std::vector<std::string> ClosingLines(const SolveOutcome& outcome,
   std::vector<std::string> lines = {line};
   const std::string worth = WorthALook(outcome, walls);
   if (!worth.empty()) lines.push_back("worth a look: " + worth);
-  const std::vector<std::string>& files = outcome.summary.files;
-  for (const char* name : {"report.html", "map.svg", "map.png"}) {
-    if (std::count(files.begin(), files.end(), name) == 0) continue;
-    lines.push_back("open " + (std::filesystem::path(folder) / name).string());
-    break;
+  AppendOpen(outcome, folder, &lines);
+  return lines;
+}
+
+std::vector<std::string> ClosingLinesInMap(const SolveOutcome& outcome,
+                                           const std::string& folder,
+                                           const std::string& map) {
+  std::string agreeing;
+  for (const Summary::LogInput& log : outcome.summary.logs) {
+    Append(std::to_string(log.agreeing) + " of " + Counted(log.parts, "part"),
+           &agreeing);
   }
+  std::vector<std::string> lines = {
+      folder + ": " +
+      Counted(static_cast<std::int64_t>(outcome.trajectory.size()), "pose") +
+      " in " + map + " (" + agreeing + " agree with it)"};
+  std::string worth;
+  if (outcome.summary.partial) Append("the run was interrupted", &worth);
+  AppendLoose(outcome, "the track", &worth);
+  if (!worth.empty()) lines.push_back("worth a look: " + worth);
+  AppendOpen(outcome, folder, &lines);
   return lines;
 }
 

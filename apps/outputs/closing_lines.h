@@ -17,6 +17,12 @@ namespace plumbline {
 std::vector<std::string> ClosingLines(const SolveOutcome& outcome,
                                       const std::string& folder);
 
+/// The same of a run that found the robot in an earlier map, `map`: how many
+/// poses it has there and how much of each log agreed with it.
+std::vector<std::string> ClosingLinesInMap(const SolveOutcome& outcome,
+                                           const std::string& folder,
+                                           const std::string& map);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_OUTPUTS_CLOSING_LINES_H_

@@ -79,44 +79,6 @@ bool IsDeadTemporary(const std::string& name,
   return process > 0 && kill(process, 0) != 0 && errno == ESRCH;
 }
 
-// What summary.json says of the files beside it.
-struct Manifest {
-  bool is_whole = false;
-  std::set<std::string> files;
-  // There may be several when two runs are mixed.
-  std::map<std::string, std::set<std::string>> digests;
-};
-
-Manifest ReadManifest(const fs::path& path) {
-  Manifest manifest;
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return manifest;
-  std::ifstream file(path);
-  const Json json = Json::parse(file, nullptr, false);
-  if (!json.is_object()) return manifest;
-  const auto files = json.find("files");
-  if (files != json.end() && files->is_array()) {
-    for (const Json& name : *files) {
-      if (name.is_string()) manifest.files.insert(name.get<std::string>());
-    }
-  }
-  const auto digests = json.find("sha256");
-  if (digests != json.end() && digests->is_object()) {
-    for (const auto& [name, digest] : digests->items()) {
-      for (const Json& one :
-           digest.is_array() ? digest : Json::array({digest})) {
-        if (one.is_string()) {
-          manifest.digests[name].insert(one.get<std::string>());
-        }
-      }
-    }
-  }
-  const auto partial = json.find("partial");
-  manifest.is_whole = json.contains("counts") &&
-                      (partial == json.end() || *partial == Json(false));
-  return manifest;
-}
-
 [[noreturn]] void FailToReplace(const fs::path& path, int error_number,
                                 const std::string& state) {
   throw Error(path.string(), 0,
@@ -147,6 +109,44 @@ bool MoveFile(const fs::path& from, const fs::path& target) {
 }
 
 }  // namespace
+
+// What summary.json says of the files beside it.
+struct OutputFolder::Manifest {
+  bool is_whole = false;
+  std::set<std::string> files;
+  // There may be several when two runs are mixed.
+  std::map<std::string, std::set<std::string>> digests;
+};
+
+OutputFolder::Manifest OutputFolder::ReadManifest(const fs::path& path) {
+  Manifest manifest;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return manifest;
+  std::ifstream file(path);
+  const Json json = Json::parse(file, nullptr, false);
+  if (!json.is_object()) return manifest;
+  const auto files = json.find("files");
+  if (files != json.end() && files->is_array()) {
+    for (const Json& name : *files) {
+      if (name.is_string()) manifest.files.insert(name.get<std::string>());
+    }
+  }
+  const auto digests = json.find("sha256");
+  if (digests != json.end() && digests->is_object()) {
+    for (const auto& [name, digest] : digests->items()) {
+      for (const Json& one :
+           digest.is_array() ? digest : Json::array({digest})) {
+        if (one.is_string()) {
+          manifest.digests[name].insert(one.get<std::string>());
+        }
+      }
+    }
+  }
+  const auto partial = json.find("partial");
+  manifest.is_whole = json.contains("counts") &&
+                      (partial == json.end() || *partial == Json(false));
+  return manifest;
+}
 
 OutputFolder::OutputFolder(fs::path folder, std::set<std::string> own_names,
                            std::vector<fs::path> inputs)
@@ -304,6 +304,55 @@ Error OutputFolder::InPlace(const Error& error) const {
   return Error(message.substr(0, colon), 0, message.substr(colon + 2), "");
 }
 
+std::vector<std::string> OutputFolder::Leftovers(
+    const Manifest& old, const std::set<std::string>& staged,
+    Changes* changes) const {
+  std::vector<std::string> to_remove;
+  for (const std::string& name : old.files) {
+    if (own_names_.count(name) == 0 || staged.count(name) > 0) continue;
+    const fs::path path = folder_ / name;
+    std::error_code error;
+    const fs::file_status status = fs::symlink_status(path, error);
+    if (!fs::exists(status)) continue;
+    const auto recorded = old.digests.find(name);
+    if (!fs::is_regular_file(status)) {
+      changes->kept.push_back(name + " (no regular file)");
+    } else if (IsInput(path)) {
+      changes->kept.push_back(name + " (read by this run)");
+    } else if (recorded == old.digests.end()) {
+      changes->kept.push_back(name +
+                              " (written by a version that recorded no "
+                              "digest)");
+    } else if (recorded->second.count(Sha256OfFile(path.string())) == 0) {
+      changes->kept.push_back(name + " (changed since it was written)");
+    } else {
+      to_remove.push_back(name);
+    }
+  }
+  return to_remove;
+}
+
+OutputFolder::Changes OutputFolder::Clear() {
+  Changes changes;
+  {
+    const LockedFolder lock(folder_);
+    const fs::path summary = folder_ / kSummary;
+    const Manifest old = ReadManifest(summary);
+    if (old.files.empty()) return changes;
+    changes.replaced_whole_run = old.is_whole;
+    std::error_code error;
+    for (const std::string& name : Leftovers(old, {}, &changes)) {
+      if (fs::remove(folder_ / name, error)) changes.removed.push_back(name);
+    }
+    if (!changes.kept.empty() || IsInput(summary)) return changes;
+    if (fs::remove(summary, error)) changes.removed.push_back(kSummary);
+    lock.Sync();
+  }
+  // Fails while anything else is in there.
+  rmdir(folder_.c_str());
+  return changes;
+}
+
 OutputFolder::Changes OutputFolder::Commit(
     const std::map<std::string, std::string>& digests,
     const std::function<void()>& before_step) {
@@ -347,28 +396,8 @@ OutputFolder::Changes OutputFolder::Commit(
       });
 
   // What goes is settled before anything changes.
-  std::vector<std::string> to_remove;
-  for (const std::string& name : old.files) {
-    if (own_names_.count(name) == 0 || staged_set.count(name) > 0) continue;
-    const fs::path path = folder_ / name;
-    std::error_code error;
-    const fs::file_status status = fs::symlink_status(path, error);
-    if (!fs::exists(status)) continue;
-    const auto recorded = old.digests.find(name);
-    if (!fs::is_regular_file(status)) {
-      changes.kept.push_back(name + " (no regular file)");
-    } else if (IsInput(path)) {
-      changes.kept.push_back(name + " (read by this run)");
-    } else if (recorded == old.digests.end()) {
-      changes.kept.push_back(name +
-                             " (written by a version that recorded no "
-                             "digest)");
-    } else if (recorded->second.count(Sha256OfFile(path.string())) == 0) {
-      changes.kept.push_back(name + " (changed since it was written)");
-    } else {
-      to_remove.push_back(name);
-    }
-  }
+  const std::vector<std::string> to_remove =
+      Leftovers(old, staged_set, &changes);
   for (const std::string& name : staged_set) {
     std::error_code error;
     if (name != kSummary && old.files.count(name) == 0 &&

@@ -74,11 +74,24 @@ class OutputFolder {
   Changes Commit(const std::map<std::string, std::string>& digests,
                  const std::function<void()>& before_step = nullptr);
 
+  /// Removes what an earlier run wrote, as far as it is as the run left it, its
+  /// summary.json last and only if nothing is kept, and the folder where it is
+  /// empty then. Does nothing in a folder without such a summary.
+  Changes Clear();
+
   /// Names of leftovers of processes that are gone, removed by the constructor.
   const std::vector<std::string>& cleaned() const { return cleaned_; }
 
  private:
+  struct Manifest;
+
+  static Manifest ReadManifest(const std::filesystem::path& path);
   bool IsInput(const std::filesystem::path& path) const;
+  // Files of an earlier run that are to go, unless they are `staged`; those
+  // that are not as it left them are told in `changes`.
+  std::vector<std::string> Leftovers(const Manifest& old,
+                                     const std::set<std::string>& staged,
+                                     Changes* changes) const;
   void CleanUp();
   void RemoveStaging();
 

@@ -973,6 +973,23 @@ TEST_F(SolveTest, SeveralLogs) {
             (std::set<std::string>{"summary.json", "trajectory.tum",
                                    "trajectory_2.tum"}));
 
+  // The map of a log apart does not outlive the run that made it; what somebody
+  // put there does.
+  std::ofstream(folder_ / "both/map_2/note.txt") << "mine";
+  ASSERT_EQ(
+      Solve(second + "," + first, "both", "--outputs=trajectory.tum", &output),
+      0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("both/map_2: removed of an earlier run: "
+                                "trajectory.tum, trajectory_2.tum, "
+                                "summary.json"));
+  EXPECT_EQ(Files("both/map_2"), std::set<std::string>{"note.txt"});
+  fs::remove(folder_ / "both/map_2/note.txt");
+  ASSERT_EQ(Solve(second, "both", "--outputs=trajectory.tum", &output), 0)
+      << output;
+  // An empty folder is nobody's.
+  EXPECT_THAT(output, Not(HasSubstr("map_2")));
+
   const auto refuses = [&](const std::string& input, const std::string& flags,
                            const char* why) {
     EXPECT_NE(Solve(input, "none", flags, &output), 0);
@@ -1006,6 +1023,9 @@ TEST_F(SolveTest, AnEarlierMap) {
   // Of the files that are made by default those that say something new.
   ASSERT_EQ(Solve(second, "found", flag + " --localize", &output), 0) << output;
   EXPECT_THAT(output, HasSubstr("placed in the map"));
+  EXPECT_THAT(output, HasSubstr("250 poses in " +
+                                (folder_ / "first/map.json").string() + " ("));
+  EXPECT_THAT(output, HasSubstr("found/map.svg"));
   EXPECT_EQ(Files("found"),
             (std::set<std::string>{"map.png", "map.svg", "summary.json",
                                    "trajectory.tum"}));

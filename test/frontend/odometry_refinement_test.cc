@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/frontend/odometry_refinement.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -259,6 +260,51 @@ TEST(OdometryRefinerTest, OdometryThatJumps) {
       EXPECT_TRUE(scan.pose.allFinite());
       EXPECT_TRUE(scan.since_key.covariance.allFinite());
     }
+  }
+}
+
+// Two scans of another moment among those of a slow drive: the robot does not
+// leap ahead and back.
+TEST(OdometryRefinerTest, ScansOfAnotherTimeAreNotFollowed) {
+  const Drive drive = Along(Pose2(-3.0, -2.5, 0.3),
+                            std::vector<Pose2>(30, Pose2(0.02, 0.0, 0.01)),
+                            std::vector<Pose2>(30, Pose2(0.02, 0.0, 0.01)));
+  const Pose2 ahead(0.5, 0.1, 0.1);
+  const auto largest_error = [&](double gap_speed) {
+    OdometryRefinementOptions options = Options();
+    options.tracking.gap_speed = gap_speed;
+    OdometryRefiner refiner(options);
+    double largest = 0.0;
+    for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+      const bool is_stray = i == 20 || i == 21;
+      Scan scan = MakeScan(
+          Hall(), is_stray ? Compose(drive.truth[i], ahead) : drive.truth[i],
+          FullCircle());
+      scan.odometry = drive.odometry[i];
+      scan.timestamp = 100.0 + 0.1 * static_cast<double>(i);
+      largest = std::max(
+          largest, PositionError(refiner.Process(scan).pose, drive.truth[i]));
+    }
+    return largest;
+  };
+  EXPECT_LT(largest_error(OdometryRefinementOptions().tracking.gap_speed),
+            0.05);
+  // Of a robot that could, it is believed.
+  EXPECT_GT(largest_error(100.0), 0.4);
+}
+
+// Odometry that stands still while the robot drives is corrected as before.
+TEST(OdometryRefinerTest, WheelsThatSlipAreCorrected) {
+  const std::vector<Pose2> motions(40, Pose2(0.12, 0.0, 0.02));
+  const Drive drive = Along(Pose2(-3.0, -2.5, 0.0), motions,
+                            std::vector<Pose2>(40, Pose2::Zero()));
+  OdometryRefiner refiner(Options());
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    Scan scan = MakeScan(Hall(), drive.truth[i], FullCircle());
+    scan.odometry = drive.odometry[i];
+    scan.timestamp = 100.0 + 0.1 * static_cast<double>(i);
+    ASSERT_LT(PositionError(refiner.Process(scan).pose, drive.truth[i]), 0.05)
+        << i;
   }
 }
 

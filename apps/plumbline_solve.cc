@@ -274,8 +274,15 @@ void RemoveMapsFrom(std::size_t map, const Registry& registry) {
         std::filesystem::path(FLAGS_output_dir) / FolderOfMap(map);
     std::error_code error;
     if (!std::filesystem::is_directory(path, error)) continue;
-    const OutputFolder::Changes changes =
-        OutputFolder(path, NamesOfAllOutputs(registry), InputFiles()).Clear();
+    OutputFolder::Changes changes;
+    try {
+      changes =
+          OutputFolder(path, NamesOfAllOutputs(registry), InputFiles()).Clear();
+    } catch (const Error& failure) {
+      // The run's own files are in place.
+      Remark("%s", failure.what());
+      continue;
+    }
     if (!changes.removed.empty()) {
       Remark("%s: removed of an earlier run: %s", path.c_str(),
              Joined(changes.removed).c_str());

@@ -434,11 +434,12 @@ void JointAdjustment::EstimateVariances() {
   Solve(/*is_last=*/true);
 }
 
-void ReportVoteVariances(double excess, Graph* graph) {
+void ReportVoteVariances(double excess, const Registry& registry,
+                         Graph* graph) {
   if (excess == 1.0) return;
+  const RelationType& relation = registry.GetRelation(kVoteRelation);
   for (const Constraint* vote : std::as_const(*graph).Constraints()) {
-    if (vote->type->name != kVoteRelation ||
-        vote->state != ConstraintState::kLive) {
+    if (vote->type != &relation || vote->state != ConstraintState::kLive) {
       continue;
     }
     const Eigen::VectorXd expected = vote->expected;

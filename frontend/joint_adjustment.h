@@ -74,7 +74,7 @@ std::vector<Pose2> KeyPosesOfPlaces(const Graph& graph,
 /// vote_variance_excess: the last thing that is done to a map. Solves give
 /// votes more room than their residuals ask for, since the edges of walls at
 /// small angles need it; covariances of walls would come out too wide with it.
-void ReportVoteVariances(double excess, Graph* graph);
+void ReportVoteVariances(double excess, const Registry& registry, Graph* graph);
 
 /// Joint adjustment of poses, walls and structure to all scans (not in the
 /// paper, whose method, core/method.md, section 7, ends with finding the scans

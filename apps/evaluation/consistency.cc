@@ -274,7 +274,7 @@ Consistency EvaluatePointConsistency(const Graph& graph,
   Consistency result;
   std::vector<FeatureId> ids;
   for (const Feature* feature : graph.Features()) {
-    if (feature->type->name == "point" && feature->level == 0) {
+    if (feature->type->Is(FeatureRole::kPoint) && feature->level == 0) {
       ids.push_back(feature->id);
     }
   }

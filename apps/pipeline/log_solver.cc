@@ -826,7 +826,7 @@ void LogSolver::FindStructureAgain(Context* context) {
   context->IsStopped();
   result.final_cost = session_->Cost();
   TakeTrajectory(context);
-  ReportVoteVariances(context->vote_excess, graph_.get());
+  ReportVoteVariances(context->vote_excess, registry_, graph_.get());
 }
 
 // Walls that lie near the plan pull others near.

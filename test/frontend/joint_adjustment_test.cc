@@ -341,7 +341,7 @@ TEST_F(JointAdjustmentTest, CovariancesAreReportedWithoutTheBoundOfSolves) {
     for (const Constraint* constraint : std::as_const(graph).Constraints()) {
       before[constraint->id] = constraint->information;
     }
-    ReportVoteVariances(adjustment.vote_variance_excess(), &graph);
+    ReportVoteVariances(adjustment.vote_variance_excess(), registry_, &graph);
     for (const Constraint* constraint : std::as_const(graph).Constraints()) {
       const double scale = constraint->type->name == "pose_segment_points"
                                ? adjustment.vote_variance_excess()

@@ -21,6 +21,9 @@ constexpr double kThinnestWall = 0.1;
 constexpr double kOpenSide = 0.75;
 // Narrower openings are flaws of a wall, m.
 constexpr double kFlaw = 0.3;
+// Between the ends of two walls that are offset by no more than this there is a
+// wall, too, though nothing was seen of it, m.
+constexpr double kLongestJog = 1.0;
 // A wide opening is a door when the wall between the two rooms goes on beside
 // it for so many samples.
 constexpr int kLeastJamb = 6;
@@ -335,7 +338,7 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
       ++j;
     }
     if (!open) {
-      if (on.line.is_wall) {
+      if (on.line.is_wall || (j - i) * WallProfile::kStep <= kLongestJog) {
         plan->walls.push_back(WallBetween(on, sides, i, j, space));
       }
       i = j;

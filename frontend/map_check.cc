@@ -1,9 +1,13 @@
+#include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/map_check.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -69,6 +73,117 @@ Verdict Judge(const ScanAgreement& agreement, const MapCheckOptions& options) {
   return contradicts ? Verdict::kContradicts : Verdict::kAgrees;
 }
 
+// How a scan at a pose agrees with what these key scans saw.
+class MapComparison {
+ public:
+  // All must outlive it. `poses`: by key scan.
+  MapComparison(const std::vector<Scan>& scans, const std::vector<int>& keys,
+                const std::vector<Pose2>& poses, const MapCheckOptions& options)
+      : scans_(scans), keys_(keys), poses_(poses), options_(options) {}
+
+  // `others`: distance and index of key scans, of which the nearest count.
+  ScanAgreement Compare(
+      int scan_index, const Pose2& pose,
+      std::vector<std::pair<double, std::size_t>> others) const {
+    std::sort(others.begin(), others.end());
+    if (static_cast<int>(others.size()) > options_.max_others) {
+      others.resize(static_cast<std::size_t>(options_.max_others));
+    }
+    std::vector<ScanPoint> points;
+    std::vector<ScanPoint> reference;
+    std::vector<Viewpoint> viewpoints;
+    for (const auto& [distance, j] : others) {
+      const Scan& scan = scans_[static_cast<std::size_t>(keys_[j])];
+      ExtractScanPoints(scan, options_.points, &points);
+      const PoseTransform transform(poses_[j]);
+      viewpoints.push_back(
+          {transform.Point(scan.laser_offset.head<2>()), reference.size()});
+      for (const ScanPoint& point : points) {
+        reference.push_back(Moved(point, transform));
+      }
+    }
+    ScanMatcher matcher(options_.matcher);
+    matcher.SetReference(std::move(reference), std::move(viewpoints));
+    const Scan& scan = scans_[static_cast<std::size_t>(scan_index)];
+    ExtractScanPoints(scan, options_.points, &points);
+    return matcher.Compare(points, pose, scan.laser_offset.head<2>());
+  }
+
+ private:
+  const std::vector<Scan>& scans_;
+  const std::vector<int>& keys_;
+  const std::vector<Pose2>& poses_;
+  const MapCheckOptions& options_;
+};
+
+// Whether enough of a scan lies where the map knows what is there.
+bool IsKnown(const ScanAgreement& agreement, const MapCheckOptions& options) {
+  const int known = agreement.hits + agreement.intruders;
+  return known >= options.min_returns &&
+         known >= options.agreeing_known * (known + agreement.unknown);
+}
+
+// Whether a scan agrees with the map so well that it speaks for its place.
+bool IsConfirming(const ScanAgreement& agreement,
+                  const MapCheckOptions& options) {
+  const int known = agreement.hits + agreement.intruders;
+  return IsKnown(agreement, options) &&
+         agreement.intruders <= options.agreeing_intruders * known &&
+         agreement.seen_through <=
+             options.agreeing_seen_through * agreement.seen;
+}
+
+// Way up to each of the poses, m.
+std::vector<double> Ways(const std::vector<Pose2>& poses) {
+  std::vector<double> way(poses.size(), 0.0);
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    way[k] = way[k - 1] +
+             std::min(kLongestStep, (poses[k] - poses[k - 1]).head<2>().norm());
+  }
+  return way;
+}
+
+// One pose for each `spacing` of the way.
+std::vector<std::size_t> SpreadOver(const std::vector<double>& way,
+                                    double spacing) {
+  std::vector<std::size_t> chosen;
+  for (std::size_t k = 0; k < way.size(); ++k) {
+    if (chosen.empty() || way[k] - way[chosen.back()] >= spacing) {
+      chosen.push_back(k);
+    }
+  }
+  return chosen;
+}
+
+// What the scans of two parts of a track say of each other.
+struct Evidence {
+  int compared = 0;
+  int contradicting = 0;
+  std::vector<Eigen::Vector2d> confirming;
+
+  // Standard deviation of the places in the direction where it is least, m.
+  double Spread() const {
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& place : confirming) mean += place;
+    mean /= static_cast<double>(confirming.size());
+    Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+    for (const Eigen::Vector2d& place : confirming) {
+      covariance += (place - mean) * (place - mean).transpose();
+    }
+    covariance /= static_cast<double>(confirming.size());
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance);
+    return std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
+  }
+
+  bool Confirms(const MapCheckOptions& options) const {
+    return static_cast<int>(confirming.size()) >= options.min_confirming &&
+           static_cast<double>(confirming.size()) >=
+               options.min_confirming_share * compared &&
+           contradicting <= options.max_contradicting_share * compared &&
+           Spread() >= options.min_confirming_spread;
+  }
+};
+
 }  // namespace
 
 std::vector<MapContradiction> FindContradictions(
@@ -80,20 +195,10 @@ std::vector<MapContradiction> FindContradictions(
         std::to_string(poses.size()) + " poses",
         "one for each of " + std::to_string(keys.size()) + " key scans");
   }
-  std::vector<double> way(keys.size(), 0.0);
-  std::vector<std::size_t> looked_at;
-  for (std::size_t k = 0; k < keys.size(); ++k) {
-    if (k > 0) {
-      way[k] =
-          way[k - 1] +
-          std::min(kLongestStep, (poses[k] - poses[k - 1]).head<2>().norm());
-    }
-    if (looked_at.empty() ||
-        way[k] - way[looked_at.back()] >= options.spacing) {
-      looked_at.push_back(k);
-    }
-  }
+  const std::vector<double> way = Ways(poses);
+  const std::vector<std::size_t> looked_at = SpreadOver(way, options.spacing);
   const PlaceGrid grid(poses, options.radius);
+  const MapComparison comparison(scans, keys, poses, options);
   std::vector<Verdict> verdicts(looked_at.size(), Verdict::kUnknown);
   const auto judge = [&](std::size_t i) {
     const std::size_t k = looked_at[i];
@@ -106,30 +211,8 @@ std::vector<MapContradiction> FindContradictions(
       }
     });
     if (static_cast<int>(others.size()) < options.min_others) return;
-    std::sort(others.begin(), others.end());
-    if (static_cast<int>(others.size()) > options.max_others) {
-      others.resize(static_cast<std::size_t>(options.max_others));
-    }
-    std::vector<ScanPoint> points;
-    std::vector<ScanPoint> reference;
-    std::vector<Viewpoint> viewpoints;
-    for (const auto& [distance, j] : others) {
-      const Scan& scan = scans[static_cast<std::size_t>(keys[j])];
-      ExtractScanPoints(scan, options.points, &points);
-      const PoseTransform transform(poses[j]);
-      viewpoints.push_back(
-          {transform.Point(scan.laser_offset.head<2>()), reference.size()});
-      for (const ScanPoint& point : points) {
-        reference.push_back(Moved(point, transform));
-      }
-    }
-    ScanMatcher matcher(options.matcher);
-    matcher.SetReference(std::move(reference), std::move(viewpoints));
-    const Scan& scan = scans[static_cast<std::size_t>(keys[k])];
-    ExtractScanPoints(scan, options.points, &points);
-    verdicts[i] =
-        Judge(matcher.Compare(points, poses[k], scan.laser_offset.head<2>()),
-              options);
+    verdicts[i] = Judge(
+        comparison.Compare(keys[k], poses[k], std::move(others)), options);
   };
   for (std::size_t begin = 0; begin < looked_at.size(); begin += kScansAtOnce) {
     if (stop && stop()) return {};
@@ -161,6 +244,91 @@ std::vector<MapContradiction> FindContradictions(
     }
   }
   return found;
+}
+
+std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
+                                    const std::vector<int>& keys,
+                                    const std::vector<Pose2>& trajectory,
+                                    const std::vector<TrackCut>& cuts,
+                                    const MapCheckOptions& options,
+                                    const std::function<bool()>& stop) {
+  if (trajectory.size() != scans.size()) {
+    throw PLUMBLINE_ERROR(
+        std::to_string(trajectory.size()) + " poses",
+        "one for each of " + std::to_string(scans.size()) + " scans");
+  }
+  std::vector<bool> is_confirmed(cuts.size(), false);
+  if (cuts.empty()) return is_confirmed;
+  // Of what lies between two parts.
+  constexpr std::size_t kNoPart = std::numeric_limits<std::size_t>::max();
+  const auto part_of = [&cuts](int scan) {
+    std::size_t part = 0;
+    for (const TrackCut& cut : cuts) {
+      if (scan > cut.begin && scan < cut.end) return kNoPart;
+      if (scan >= cut.end) ++part;
+    }
+    return part;
+  };
+  std::vector<Pose2> poses;
+  std::vector<std::size_t> parts;
+  for (const int key : keys) {
+    poses.push_back(trajectory[static_cast<std::size_t>(key)]);
+    parts.push_back(part_of(key));
+  }
+  const PlaceGrid grid(poses, options.radius);
+  const MapComparison comparison(scans, keys, poses, options);
+  // Key scans near a pose, by the part that they are of.
+  const auto near = [&](const Pose2& pose) {
+    std::map<std::size_t, std::vector<std::pair<double, std::size_t>>> result;
+    grid.Around(pose.head<2>(), [&](std::size_t j) {
+      const double distance = (poses[j] - pose).head<2>().norm();
+      if (distance <= options.radius && parts[j] != kNoPart) {
+        result[parts[j]].emplace_back(distance, j);
+      }
+    });
+    return result;
+  };
+  std::map<std::pair<std::size_t, std::size_t>, Evidence> evidence;
+  for (const std::size_t k : SpreadOver(Ways(poses), options.spacing)) {
+    if (parts[k] == kNoPart) continue;
+    for (auto& [part, others] : near(poses[k])) {
+      if (stop && stop()) return is_confirmed;
+      if (part == parts[k] ||
+          static_cast<int>(others.size()) < options.min_others) {
+        continue;
+      }
+      const ScanAgreement agreement =
+          comparison.Compare(keys[k], poses[k], std::move(others));
+      const bool contradicts =
+          Judge(agreement, options) == Verdict::kContradicts;
+      if (!contradicts && !IsKnown(agreement, options)) continue;
+      Evidence& of_pair = evidence[std::minmax(part, parts[k])];
+      ++of_pair.compared;
+      if (contradicts) ++of_pair.contradicting;
+      if (IsConfirming(agreement, options)) {
+        of_pair.confirming.emplace_back(poses[k].head<2>());
+      }
+    }
+  }
+  DisjointSets joined(cuts.size() + 1);
+  for (const auto& [pair, said] : evidence) {
+    if (said.Confirms(options)) joined.Join(pair.first, pair.second);
+  }
+  for (std::size_t c = 0; c < cuts.size(); ++c) {
+    bool fits = joined.Find(c) == joined.Find(c + 1);
+    for (int i = cuts[c].begin + 1; fits && i < cuts[c].end; ++i) {
+      const Pose2& pose = trajectory[static_cast<std::size_t>(i)];
+      std::vector<std::pair<double, std::size_t>> others;
+      for (const auto& [part, of_part] : near(pose)) {
+        others.insert(others.end(), of_part.begin(), of_part.end());
+      }
+      fits =
+          static_cast<int>(others.size()) >= options.min_others &&
+          IsConfirming(comparison.Compare(i, pose, std::move(others)), options);
+    }
+    is_confirmed[c] = fits;
+  }
+  return is_confirmed;
 }
 
 }  // namespace plumbline

@@ -34,6 +34,20 @@ struct MapCheckOptions {
   /// Contradicting scans in a row, gaps of one allowed, before they are
   /// reported.
   int min_scans = 3;
+  /// What it takes to believe that two parts of a track lie right to each other
+  /// (FindConfirmedTies): so many scans of either that agree with the other,
+  /// one for each `spacing`, that many of all that can be compared, and so few
+  /// that contradict it. Their places have at least this standard deviation in
+  /// every direction, m: along a corridor all agrees.
+  int min_confirming = 20;
+  double min_confirming_share = 0.8;
+  double max_contradicting_share = 0.05;
+  double min_confirming_spread = 1.0;
+  /// Shares as above, up to which a scan agrees, and share of its returns that
+  /// do not lie in the unknown.
+  double agreeing_intruders = 0.1;
+  double agreeing_seen_through = 0.2;
+  double agreeing_known = 0.5;
   int num_threads = 0;
 
   /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
@@ -59,6 +73,26 @@ struct MapContradiction {
 std::vector<MapContradiction> FindContradictions(
     const std::vector<Scan>& scans, const std::vector<int>& keys,
     const std::vector<Pose2>& poses, const MapCheckOptions& options,
+    const std::function<bool()>& stop = nullptr);
+
+/// Where a track was cut, and goes on with what one match or a guess says.
+struct TrackCut {
+  /// The last scan that is sure, and the first one of what follows; scans
+  /// between them belong to neither.
+  int begin = 0;
+  int end = 0;
+};
+
+/// Says for each cut (in the order of scans) whether the parts of the track
+/// before and behind it are seen to lie right to each other by what they have
+/// seen of the same places on the way, directly or by way of other parts, and
+/// the scans between them fit, too. `trajectory` has the pose of each scan, map
+/// frame; `keys`, `stop` and Error as above. Once `stop` has returned true no
+/// cut is confirmed.
+std::vector<bool> FindConfirmedTies(
+    const std::vector<Scan>& scans, const std::vector<int>& keys,
+    const std::vector<Pose2>& trajectory, const std::vector<TrackCut>& cuts,
+    const MapCheckOptions& options,
     const std::function<bool()>& stop = nullptr);
 
 }  // namespace plumbline

@@ -860,9 +860,12 @@ void LogSolver::CheckMap(Context* context) const {
     keys.push_back(record.scan);
     poses.push_back(result.trajectory[static_cast<std::size_t>(record.scan)]);
   }
-  for (const MapContradiction& part :
-       FindContradictions(context->scans, keys, poses, options_.check,
-                          [context] { return context->IsStopped(); })) {
+  const auto stop = [context] { return context->IsStopped(); };
+  const std::vector<MapContradiction> contradictions =
+      FindContradictions(context->scans, keys, poses, options_.check, stop);
+  // Where something is wrong no tie is taken for sure.
+  if (contradictions.empty()) DropConfirmed(keys, context);
+  for (const MapContradiction& part : contradictions) {
     LooseTrack loose;
     loose.begin = part.begin;
     loose.end = part.end;
@@ -875,6 +878,25 @@ void LogSolver::CheckMap(Context* context) const {
                    [](const LooseTrack& a, const LooseTrack& b) {
                      return a.begin < b.begin;
                    });
+}
+
+void LogSolver::DropConfirmed(const std::vector<int>& keys,
+                              Context* context) const {
+  LogSolverResult& result = context->result;
+  std::vector<TrackCut> cuts;
+  for (const LooseTrack& loose : result.loose) {
+    // A guess is one from its first scan on.
+    cuts.push_back({loose.begin, loose.found ? loose.end : loose.begin + 1});
+  }
+  const std::vector<bool> is_confirmed = FindConfirmedTies(
+      context->scans, keys, result.trajectory, cuts, options_.check,
+      [context] { return context->IsStopped(); });
+  std::vector<LooseTrack> left;
+  for (std::size_t i = 0; i < cuts.size(); ++i) {
+    if (result.loose[i].found && is_confirmed[i]) continue;
+    left.push_back(std::move(result.loose[i]));
+  }
+  result.loose = std::move(left);
 }
 
 void LogSolver::MakeGraph() {

@@ -302,6 +302,8 @@ class LogSolver {
   void TieToPlan(KnownStructureBinder* known, Context* context);
   // Tells what hangs loosely, or contradicts the rest of the map.
   void CheckMap(Context* context) const;
+  // Drops what was reported as loose and has turned out to be right.
+  void DropConfirmed(const std::vector<int>& keys, Context* context) const;
 
   // Between stages: all that is left is in the state.
   void BeginStage(Stage stage, Context* context);

@@ -111,5 +111,74 @@ TEST(FindContradictionsTest, RefusesPosesThatDoNotFit) {
   EXPECT_THROW(FindContradictions(rounds.scans, rounds.keys, {}, {}), Error);
 }
 
+// The second round hangs on the first by one match.
+TEST(FindConfirmedTiesTest, WhatManyScansShowIsSure) {
+  Rounds rounds = TwoRounds();
+  const std::vector<TrackCut> cuts = {{rounds.second - 1, rounds.second}};
+  EXPECT_EQ(
+      FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, cuts, {}),
+      std::vector<bool>{true});
+  // One scan on the way, which is off.
+  const std::vector<TrackCut> wide = {{rounds.second - 1, rounds.second + 2}};
+  EXPECT_EQ(
+      FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, wide, {}),
+      std::vector<bool>{true});
+  std::vector<Pose2> off = rounds.poses;
+  off[static_cast<std::size_t>(rounds.second)] =
+      Compose(off[static_cast<std::size_t>(rounds.second)],
+              Pose2(0.6, 0.0, DegToRad(20.0)));
+  EXPECT_EQ(FindConfirmedTies(rounds.scans, rounds.keys, off, wide, {}),
+            std::vector<bool>{false});
+}
+
+// A round that lies wrong is not sure, nor is one that saw nothing again.
+TEST(FindConfirmedTiesTest, WhatNothingShowsIsNot) {
+  Rounds rounds = TwoRounds();
+  const std::vector<TrackCut> cuts = {{rounds.second - 1, rounds.second}};
+  std::vector<Pose2> turned = rounds.poses;
+  std::vector<Pose2> away = rounds.poses;
+  for (std::size_t k = static_cast<std::size_t>(rounds.second);
+       k < turned.size(); ++k) {
+    turned[k] = Compose(Pose2(0.5, -0.8, DegToRad(35.0)), turned[k]);
+    away[k] = Compose(Pose2(40.0, 0.0, 0.0), away[k]);
+  }
+  for (const std::vector<Pose2>& poses : {turned, away}) {
+    EXPECT_EQ(FindConfirmedTies(rounds.scans, rounds.keys, poses, cuts, {}),
+              std::vector<bool>{false});
+  }
+  EXPECT_EQ(FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, cuts, {},
+                              [] { return true; }),
+            std::vector<bool>{false});
+  EXPECT_TRUE(FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, {}, {})
+                  .empty());
+  EXPECT_THROW(FindConfirmedTies(rounds.scans, rounds.keys, {}, cuts, {}),
+               Error);
+}
+
+// Along a corridor all agrees wherever it lies.
+TEST(FindConfirmedTiesTest, ACorridorSaysNothingAlongItself) {
+  const std::vector<Wall> walls = Room(80.0, 2.0);
+  Laser laser;
+  laser.sigma = 0.01;
+  laser.maximum_range = 8.0;
+  Noise noise(4);
+  Rounds rounds;
+  for (int round = 0; round < 2; ++round) {
+    if (round == 1) rounds.second = static_cast<int>(rounds.scans.size());
+    for (int i = 0; i < 100; ++i) {
+      const Pose2 pose(0.3 * i - 15.0, 0.2, 0.0);
+      rounds.keys.push_back(static_cast<int>(rounds.scans.size()));
+      rounds.scans.push_back(MakeScan(walls, pose, laser, &noise));
+      // Five metres off along the corridor.
+      rounds.poses.push_back(
+          Compose(pose, Pose2(round == 1 ? 5.0 : 0.0, 0.0, 0.0)));
+    }
+  }
+  const std::vector<TrackCut> cuts = {{rounds.second - 1, rounds.second}};
+  EXPECT_EQ(
+      FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, cuts, {}),
+      std::vector<bool>{false});
+}
+
 }  // namespace
 }  // namespace plumbline

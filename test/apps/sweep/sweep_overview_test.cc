@@ -157,15 +157,38 @@ TEST(SweepOverviewTest, ThePageOpensInABrowser) {
   OverviewOptions options;
   options.figures = {"y", "other"};
   options.objective = "y";
-  std::ofstream(folder + "/sweep.html") << OverviewHtml(
-      MakeResult({{"a", {"1", "2"}}, {"b", {"1", "2"}}, {"c", {"1", "2"}}}, 3),
-      options);
+  SweepResult result =
+      MakeResult({{"a", {"1", "2"}}, {"b", {"1", "2"}}, {"c", {"1", "2"}}}, 3);
+  result.definition.evaluate = {"/bin/judge", "{}/trajectory.tum"};
+  std::ofstream(folder + "/sweep.html") << OverviewHtml(result, options);
   browser.Open("file://" + folder + "/sweep.html");
   EXPECT_EQ(browser.Evaluate("document.querySelectorAll('svg').length"), 7);
   EXPECT_EQ(browser.Evaluate("document.querySelectorAll('tr.best').length"), 1);
   EXPECT_EQ(browser.Evaluate(
                 "document.body.scrollWidth <= document.body.clientWidth"),
             true);
+  // The whole of both tables, settings and runs, and the command that judges.
+  EXPECT_EQ(browser.Evaluate("document.querySelectorAll('tr').length"),
+            1 + 8 + 1 + 24);
+  EXPECT_THAT(browser.Evaluate("document.body.innerText").get<std::string>(),
+              HasSubstr("/bin/judge"));
+  // No plot is cut off, on a telephone neither.
+  for (const int width : {420, 1900}) {
+    browser.Call("Emulation.setDeviceMetricsOverride",
+                 {{"width", width},
+                  {"height", 900},
+                  {"deviceScaleFactor", 1},
+                  {"mobile", false}});
+    const auto of_plots = [&browser](const std::string& what) {
+      return browser.Evaluate(
+          "(() => { const boxes = [...document.querySelectorAll('.plots svg')]"
+          ".map((s) => s.getBoundingClientRect()); return " +
+          what + "; })()");
+    };
+    const double right =
+        of_plots("Math.max(...boxes.map((b) => b.right))").get<double>();
+    EXPECT_LE(right, width);
+  }
   EXPECT_THAT(browser.complaints(), IsEmpty());
   std::filesystem::remove_all(folder);
 }

@@ -47,10 +47,18 @@ constexpr double kVisitRotation = DegToRad(15.0);
 constexpr int kPeaks = 16;
 constexpr double kLeastScore = 0.25;
 constexpr double kPeakShare = 0.6;
+// No robot of a building moves faster, m/s and rad/s, but for so much, m and
+// rad: odometry has jumped.
+constexpr double kFastest = 3.0;
+constexpr double kFastestTurn = DegToRad(200.0);
+constexpr double kJumpWay = 0.3;
+constexpr double kJumpTurn = DegToRad(15.0);
 // The usual time between scans follows with this share.
 constexpr double kUsualShare = 0.05;
 // Share by which the noise of the laser has to change before it is followed.
 constexpr double kNoiseStep = 0.05;
+// Returns that lie so far from each other count one by one, m.
+constexpr double kApart = 0.15;
 // Counted returns from which on a share of them says something.
 constexpr int kLeastIntruders = 5;
 constexpr int kLeastSeenThrough = 20;
@@ -59,6 +67,13 @@ constexpr double kLeastKnown = 0.4;
 // Standard deviations of a tie: m and rad, and those that grow with the way.
 constexpr double kTieSigma = 0.03;
 constexpr double kTieAngle = DegToRad(0.5);
+// On the variances that odometry and a track's drift are given.
+constexpr double kGenerous = 4.0;
+// Motions between key scans from which on odometry's own noise is believed,
+// the least share of the usual variance and the largest chi-square of one.
+constexpr int kLeastMotions = 20;
+constexpr double kLeastOdometryScale = 0.04;
+constexpr double kUsualInnovation = 9.0;
 // Where the returns say nothing, m.
 constexpr double kOpenSigma = 2.0;
 // Of a loose one, m and rad: a weak pull that keeps the map in one frame, not a
@@ -85,6 +100,8 @@ ScanPoint PointOf(const Eigen::Vector4f& values) {
   return point;
 }
 
+double Square(double x) { return x * x; }
+
 double SeenThrough(const ScanAgreement& a) {
   return a.seen > 0 ? static_cast<double>(a.seen_through) / a.seen : 0.0;
 }
@@ -109,6 +126,25 @@ Eigen::Matrix3d RotationInto(const Pose2& pose) {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   rotation.topLeftCorner<2, 2>() << c, s, -s, c;
   return rotation;
+}
+
+// Returns that lie apart: neighbours on one surface say the same.
+int CountApart(const std::vector<ScanPoint>& points) {
+  int count = 0;
+  const ScanPoint* last = nullptr;
+  for (const ScanPoint& point : points) {
+    if (last != nullptr && (point.position - last->position).norm() < kApart) {
+      continue;
+    }
+    last = &point;
+    ++count;
+  }
+  return count;
+}
+
+// Cauchy's loss: wheels slip more often than a normal distribution says.
+double OdometryCost(double squared_innovation, double scale) {
+  return scale * std::log1p(squared_innovation / scale);
 }
 
 // How much of a scan the reference explains, at most 1.
@@ -184,8 +220,15 @@ MatchResult OdometryRefiner::MatchPoints(const std::vector<ScanPoint>& points,
     overruled.information.row(2).setZero();
     overruled.information.col(2).setZero();
     const MatchResult wide = matcher.Refine(points, found, overruled);
-    // The scan has to speak clearly for another pose than odometry's.
-    if (wide.cost < match.cost - 0.02) match = wide;
+    // The scan has to speak clearly for another pose than odometry's, and for
+    // one farther away more so than odometry speaks against it.
+    const double scale = options_.tracking.odometry_tail;
+    const double against = OdometryCost(SquaredInnovation(wide, prior), scale) -
+                           OdometryCost(SquaredInnovation(match, prior), scale);
+    if (wide.cost < match.cost - 0.02 &&
+        (match.cost - wide.cost) * CountApart(points) > against) {
+      match = wide;
+    }
   }
   return match;
 }
@@ -420,6 +463,7 @@ void OdometryRefiner::NoteMatch(const Outcome& outcome, const Pose2& motion) {
     track_.refused = 0;
     track_.seconds = 0.0;
     track_.after_gap = false;
+    track_.jumped = false;
   } else if (options_.match_scans) {
     track_.way += motion.head<2>().norm();
     track_.turn += std::abs(motion[2]);
@@ -448,6 +492,8 @@ void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
   const TrackingOptions& tracking = options_.tracking;
   if (trace_) trace_("LOST " + outcome.why);
   const double blind_way = track_.way;
+  const double blind_turn = track_.turn;
+  const bool jumped = track_.jumped;
   const bool contradicted = IsContradicted(outcome);
   const bool tiny =
       open_ != nullptr &&
@@ -463,6 +509,7 @@ void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
                      ? "nothing that the robot saw could be matched"
                      : outcome.why;
     open_->way = blind_way;
+    open_->turn = blind_turn;
     open_->seconds = std::max(0.0, seconds);
   } else {
     // What has been tracked since is too little to be a track.
@@ -478,8 +525,10 @@ void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
     open_->keys.clear();
   }
   open_->seen_through = outcome.seen_through;
-  open_->odometry_holds = open_->odometry_holds && !contradicted;
+  open_->odometry_holds = open_->odometry_holds && !contradicted && !jumped;
   open_->first = scan;
+  open_->blind_way = open_->way;
+  open_->blind_turn = open_->turn;
   open_->next_attempt = tracking.min_tie_keys;
   open_->next_global = tracking.first_global_keys;
   track_ = Track(options_.matcher);
@@ -491,6 +540,7 @@ void OdometryRefiner::BeginTrack(const Scan& scan, SettledScan* first) {
   first->points = points_;
   track_.last_pose = refined.pose;
   track_.last_points = points_;
+  key_odometry_ = scan.odometry;
   track_.keys.push_back(
       {first->index, refined.pose, points_, scan.laser_offset.head<2>()});
   RebuildReference(&track_);
@@ -507,6 +557,7 @@ void OdometryRefiner::ContinueTrack(const Scan& scan, SettledScan* next) {
   // A scan that was refused anchors nothing.
   if (!moved || (refined.odometry_only && options_.match_scans)) return;
   refined.is_key = true;
+  CompareOdometry(scan, refined);
   next->points = points_;
   // Where things move, what may move enters no reference.
   if (track_.moving > 0) {
@@ -543,8 +594,13 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
 
   NoteGap(seconds);
   track_.seconds += std::max(0.0, seconds);
+  if (motion.head<2>().norm() > kJumpWay + kFastest * std::max(0.0, seconds) ||
+      std::abs(motion[2]) > kJumpTurn + kFastestTurn * std::max(0.0, seconds)) {
+    track_.jumped = true;
+  }
   if (open_ != nullptr) {
     open_->way += motion.head<2>().norm();
+    open_->turn += std::abs(motion[2]);
     open_->seconds += std::max(0.0, seconds);
   }
   const Outcome outcome = Match(scan, motion);
@@ -733,7 +789,8 @@ void OdometryRefiner::Tie(bool last) {
               return std::vector<Visit>{{&reference, 0, 0}};
             },
             open_->keys[middle].pose, window, 0, end, open_->seen_through,
-            false, &found)) {
+            false, &found) &&
+        AgreesWithOdometry(found, middle, archive_.size() - 1)) {
       first.tie = TrackTie::kMatched;
     }
   }
@@ -747,11 +804,14 @@ void OdometryRefiner::Tie(bool last) {
     middle = (begin + end) / 2;
     if (FindInArchive(open_->keys, where, begin, end, open_->seen_through,
                       &found)) {
-      first.tie = TrackTie::kMatched;
-      const ArchivedKey& nearest = archive_[NearestOf(found, where)];
-      first.since = nearest.scan;
-      first.since_key.mean = nearest.pose;
-      part_ = nearest.part;
+      const std::size_t nearest = NearestOf(found, where);
+      const ArchivedKey& key = archive_[nearest];
+      if (AgreesWithOdometry(found, middle, nearest)) {
+        first.tie = TrackTie::kMatched;
+        first.since = key.scan;
+        first.since_key.mean = key.pose;
+        part_ = key.part;
+      }
     }
   }
   if (first.tie == TrackTie::kMatched) {
@@ -770,10 +830,13 @@ void OdometryRefiner::Tie(bool last) {
     if (!last) return;
     first.pose = start.pose;
     first.since_key.mean = Between(open_->before.keys.back().pose, start.pose);
-    if (open_->odometry_holds && open_->way <= tracking.max_odometry_way) {
+    const Eigen::Matrix3d covariance = BlindMotion().covariance;
+    if (open_->odometry_holds &&
+        covariance.topLeftCorner<2, 2>().diagonal().maxCoeff() <=
+            Square(tracking.max_odometry_sigma) &&
+        covariance(2, 2) <= Square(tracking.max_odometry_angle)) {
       first.tie = TrackTie::kOdometry;
-      first.since_key.covariance =
-          pending_.front().refined.since_key.covariance;
+      first.since_key.covariance = covariance;
     } else {
       first.tie = TrackTie::kLoose;
       first.since_key.covariance = Diagonal(kLooseSigma, kLooseAngle);
@@ -785,6 +848,72 @@ void OdometryRefiner::Tie(bool last) {
            " since " + std::to_string(first.since));
   }
   Settle(Compose(first.pose, Inverse(start.pose)), first);
+}
+
+void OdometryRefiner::CompareOdometry(const Scan& scan,
+                                      const RefinedScan& refined) {
+  const Pose2 motion = Between(key_odometry_, scan.odometry);
+  key_odometry_ = scan.odometry;
+  if (refined.odometry_only || track_.keys.empty()) return;
+  Pose2 left = refined.since_key.mean - motion;
+  left[2] = NormalizeAngle(left[2]);
+  const double innovation =
+      left.dot(OdometryCovariance(motion, options_.noise).inverse() * left);
+  // Slips and jumps are not what odometry usually does.
+  squared_innovations_ += std::min(kUsualInnovation, innovation);
+  ++compared_motions_;
+}
+
+double OdometryRefiner::OdometryVarianceScale() const {
+  if (compared_motions_ < kLeastMotions) return 1.0;
+  return std::clamp(
+      kGenerous * squared_innovations_ / (3.0 * compared_motions_),
+      kLeastOdometryScale, 1.0);
+}
+
+UncertainPose2 OdometryRefiner::BlindMotion() const {
+  Eigen::Matrix3d covariance =
+      OdometryVarianceScale() *
+      OdometryCovariance({open_->blind_way, 0.0, open_->blind_turn},
+                         options_.noise);
+  // The heading is uncertain on the way, too.
+  const double aside =
+      open_->blind_way * open_->blind_way * covariance(2, 2) / 4.0;
+  covariance.topLeftCorner<2, 2>().diagonal().array() += aside;
+  return {Between(open_->before.keys.back().pose, open_->keys.front().pose),
+          covariance};
+}
+
+bool OdometryRefiner::AgreesWithOdometry(const Hypothesis& found,
+                                         std::size_t middle,
+                                         std::size_t since) const {
+  if (!open_->odometry_holds) return true;
+  std::vector<Pose2> before;
+  for (std::size_t k = since; k < archive_.size(); ++k) {
+    // A guess lies between.
+    if (archive_[k].part != archive_.back().part) return true;
+    before.push_back(archive_[k].pose);
+  }
+  std::vector<Pose2> after;
+  for (std::size_t k = 0; k <= middle; ++k) {
+    after.push_back(open_->keys[k].pose);
+  }
+  // What neighbouring matches have in common adds up faster than a random walk.
+  const auto generous = [this](const std::vector<Pose2>& poses) {
+    UncertainPose2 way = Along(poses);
+    way.covariance *= kGenerous;
+    return way;
+  };
+  const UncertainPose2 predicted =
+      Compose(Compose(generous(before), BlindMotion()), generous(after));
+  const Pose2 from = archive_[since].pose;
+  Pose2 left = Between(from, found.pose) - predicted.mean;
+  left[2] = NormalizeAngle(left[2]);
+  const Eigen::Matrix3d covariance =
+      predicted.covariance + Diagonal(kTieSigma, kTieAngle);
+  const double innovation = left.dot(covariance.inverse() * left);
+  if (trace_) trace_("odometry against it " + std::to_string(innovation));
+  return innovation <= options_.tracking.max_innovation;
 }
 
 void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
@@ -802,15 +931,21 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
     settled_.push_back(std::move(done));
   }
   pending_.clear();
-  if (first.tie == TrackTie::kLoose || first.since >= 0) {
-    if (guessed_ >= 0) loose_[guessed_].end = open_->last_sure;
-    guessed_ = -1;
+  const bool goes_on = first.tie != TrackTie::kLoose && first.since < 0;
+  if (!goes_on || open_->blind_way > options_.tracking.max_silent_way) {
+    if (guessed_ >= 0 && !goes_on) {
+      loose_[guessed_].end = open_->last_sure;
+      guessed_ = -1;
+    }
     LooseTrack part;
     part.begin = open_->last_sure;
     part.end = open_->first;
     part.found = first.tie != TrackTie::kLoose;
-    part.why = open_->why + (part.found ? "; found again on what it saw earlier"
-                                        : "; where it went on is a guess");
+    part.why =
+        open_->why + (first.tie == TrackTie::kOdometry
+                          ? "; odometry alone tells where it went on"
+                      : part.found ? "; found again on what it saw earlier"
+                                   : "; where it went on is a guess");
     if (!part.found) {
       guessed_ = static_cast<int>(loose_.size());
       loose_of_.push_back(guessed_);
@@ -1147,7 +1282,8 @@ void OdometryRefiner::ExchangeState(StateArchive& archive) {
   ExchangeAll(archive, track_, points_, started_, count_, last_odometry_,
               last_time_, usual_step_, archive_, part_, num_parts_, loose_of_,
               wide_searches_, refusals_, losses_, loose_, guessed_, noise_,
-              noise_scale_);
+              noise_scale_, key_odometry_, squared_innovations_,
+              compared_motions_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

@@ -64,6 +64,9 @@ struct TrackingOptions {
   /// Chi-square of a match against odometry from which on contradictions count
   /// without a gap, too: people contradict, but odometry agrees.
   double max_innovation = 15.0;
+  /// Scale of Cauchy's loss on that chi-square: how much better the returns
+  /// must fit at a pose that odometry speaks against.
+  double odometry_tail = 9.0;
   /// Returns that lie 0.15 m apart or more that a match which leaves odometry
   /// by more than that has to have on what the reference has seen.
   int min_hits = 15;
@@ -78,9 +81,13 @@ struct TrackingOptions {
   /// begins.
   double max_blind_way = 1.5;
   double max_blind_turn = DegToRad(40.0);
-  /// A tie by odometry alone is accepted up to this way, m, when there was
-  /// neither a gap nor a contradiction.
-  double max_odometry_way = 3.0;
+  /// A tie by odometry alone is accepted when there was neither a gap nor a
+  /// contradiction and its standard deviations, for odometry as it was on this
+  /// log so far, are no larger than these, m and rad.
+  double max_odometry_sigma = 0.75;
+  double max_odometry_angle = DegToRad(20.0);
+  /// From this way without any match on it is reported, m.
+  double max_silent_way = 3.0;
   /// What a tie needs: scans of the track, share of returns that lie on what
   /// the reference knows of all that do not lie in the unknown, the same by
   /// the directions of surfaces too, score of the search, largest share
@@ -322,6 +329,8 @@ class OdometryRefiner {
     // Scans for which it is known that something moves.
     int moving = 0;
     bool after_gap = false;
+    // Odometry has jumped since.
+    bool jumped = false;
     // Returns of the last scan.
     std::vector<ScanPoint> last_points;
     explicit Track(const ScanMatcherOptions& options) : matcher(options) {}
@@ -330,9 +339,9 @@ class OdometryRefiner {
     template <typename Archive>
     friend void Exchange(Archive& archive, Track& track) {
       auto& [keys, matcher, last_pose, since_key, way, turn, refused, seconds,
-             moving, after_gap, last_points] = track;
+             moving, after_gap, jumped, last_points] = track;
       ExchangeAll(archive, keys, last_pose, since_key, way, turn, refused,
-                  seconds, moving, after_gap, last_points);
+                  seconds, moving, after_gap, jumped, last_points);
     }
   };
   // A track whose tie to the one before is not known.
@@ -342,9 +351,13 @@ class OdometryRefiner {
     // Last scan that is sure, first one of the track.
     int last_sure = 0;
     int first = 0;
-    // Way by odometry since the last scan that is sure, m; time, s.
+    // Way (m), turn (rad) and time (s) by odometry since the last scan that is
+    // sure; way and turn of it up to the first of the track.
     double way = 0.0;
+    double turn = 0.0;
     double seconds = 0.0;
+    double blind_way = 0.0;
+    double blind_turn = 0.0;
     // Neither a gap nor a contradiction.
     bool odometry_holds = true;
     // Share of the reference that was looked through before all this.
@@ -450,6 +463,18 @@ class OdometryRefiner {
   bool FindInArchive(const std::vector<KeyScan>& keys,
                      const std::vector<std::size_t>& where, std::size_t begin,
                      std::size_t end, double seen_through, Hypothesis* found);
+  // Takes note of how odometry's motion since the last key scan agrees with the
+  // match of this one, and begins anew.
+  void CompareOdometry(const Scan& scan, const RefinedScan& refined);
+  // Odometry's variances on this log, of those in the options.
+  double OdometryVarianceScale() const;
+  // From the last sure key scan to the first of the open track, by odometry.
+  UncertainPose2 BlindMotion() const;
+  // Whether a pose of the open track's key scan `middle` lies within what
+  // odometry and the tracks leave open since the archive's key scan `since`;
+  // true where they say nothing of it.
+  bool AgreesWithOdometry(const Hypothesis& found, std::size_t middle,
+                          std::size_t since) const;
   // Of the visit's key scans the nearest one to what was found there.
   std::size_t NearestOf(const Hypothesis& found,
                         const std::vector<std::size_t>& where) const;
@@ -522,6 +547,11 @@ class OdometryRefiner {
   // By part but the first: its entry in loose_.
   std::vector<int> loose_of_;
   std::vector<LateTie> late_ties_;
+  // Odometry at the last key scan; sum of chi-squares of the motions that were
+  // compared with matches.
+  Pose2 key_odometry_ = Pose2::Zero();
+  double squared_innovations_ = 0.0;
+  int compared_motions_ = 0;
   int wide_searches_ = 0;
   int refusals_ = 0;
   int losses_ = 0;

@@ -1,8 +1,13 @@
 #include <gtest/gtest.h>
+#include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/odometry_refinement.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "frontend/synthetic_world.h"
@@ -573,6 +578,117 @@ TEST(OdometryRefinerTest, StaleOdometryAfterAGap) {
   }
 }
 
+// A corridor of 10 m along x from the origin, with a pillar and a niche.
+std::vector<Wall> ShortCorridor(const Pose2& at) {
+  const std::vector<Wall> walls = {
+      {{0.0, -1.0}, {4.0, -1.0}},  {{4.0, -1.0}, {4.0, -1.8}},
+      {{4.0, -1.8}, {5.5, -1.8}},  {{5.5, -1.8}, {5.5, -1.0}},
+      {{5.5, -1.0}, {10.0, -1.0}}, {{0.0, 1.0}, {2.5, 1.0}},
+      {{2.5, 1.0}, {2.5, 0.6}},    {{2.5, 0.6}, {2.9, 0.6}},
+      {{2.9, 0.6}, {2.9, 1.0}},    {{2.9, 1.0}, {7.0, 1.0}},
+      {{7.0, 1.0}, {7.0, 1.7}},    {{7.0, 1.7}, {7.8, 1.7}},
+      {{7.8, 1.7}, {7.8, 1.0}},    {{7.8, 1.0}, {10.0, 1.0}}};
+  return testing::Moved(walls, at);
+}
+
+// A camera's view: 60 degrees, 5 m.
+Laser NarrowView() {
+  Laser laser;
+  laser.start_angle = DegToRad(-30.0);
+  laser.angle_step = DegToRad(0.5);
+  laser.beams = 121;
+  laser.maximum_range = 5.0;
+  laser.sigma = 0.01;
+  return laser;
+}
+
+// Along a corridor, through 8 m of an empty hall and along a second corridor
+// that looks like the first.
+struct DarkHall {
+  std::vector<Pose2> truth;
+  std::vector<RefinedScan> refined;
+  std::vector<LooseTrack> loose;
+  std::vector<std::size_t> tied;
+};
+
+DarkHall DriveThroughADarkHall(double heading_error, double jump) {
+  std::vector<Wall> walls = ShortCorridor(Pose2::Zero());
+  for (const Wall& wall : ShortCorridor({18.0, 0.0, 0.0})) {
+    walls.push_back(wall);
+  }
+  Noise noise(9);
+  DarkHall result;
+  OdometryRefiner refiner(Options());
+  Pose2 truth(0.3, 0.0, 0.0);
+  Pose2 odometry = truth;
+  for (int i = 0; i < 245; ++i) {
+    if (i > 0) {
+      Pose2 motion(0.1, 0.0, 0.0);
+      truth = Compose(truth, motion);
+      motion[2] += noise.Normal(heading_error);
+      if (truth.x() > 12.5 && truth.x() < 12.6) motion[0] += jump;
+      odometry = Compose(odometry, motion);
+    }
+    Scan scan = MakeScan(walls, truth, NarrowView(), &noise);
+    scan.timestamp = 100.0 + 0.2 * i;
+    scan.odometry = odometry;
+    result.truth.push_back(truth);
+    refiner.Process(scan);
+    result.refined = TakeAll(&refiner, std::move(result.refined));
+  }
+  refiner.Finish();
+  result.refined = TakeAll(&refiner, std::move(result.refined));
+  result.loose = refiner.loose();
+  for (std::size_t i = 0; i < result.refined.size(); ++i) {
+    if (result.refined[i].tie != TrackTie::kNone) result.tied.push_back(i);
+  }
+  return result;
+}
+
+// The second corridor looks like the first, but odometry was right all the way
+// and says that it is another one.
+TEST(OdometryRefinerTest, OdometryThatWasGoodCarriesThroughTheDark) {
+  const DarkHall drive = DriveThroughADarkHall(DegToRad(0.05), 0.0);
+  ASSERT_EQ(drive.refined.size(), drive.truth.size());
+  for (std::size_t i = 0; i < drive.refined.size(); ++i) {
+    EXPECT_LT(PositionError(drive.refined[i].pose, drive.truth[i]), 0.4) << i;
+    EXPECT_LT(HeadingError(drive.refined[i].pose, drive.truth[i]),
+              DegToRad(2.0))
+        << i;
+  }
+  ASSERT_EQ(drive.tied.size(), 1u);
+  const RefinedScan& first = drive.refined[drive.tied[0]];
+  EXPECT_EQ(first.tie, TrackTie::kOdometry);
+  // Of a long way it is told, and what is left open is more than what odometry
+  // was wrong by.
+  ASSERT_EQ(drive.loose.size(), 1u);
+  EXPECT_TRUE(drive.loose[0].found);
+  EXPECT_NE(drive.loose[0].why.find("odometry alone"), std::string::npos);
+  EXPECT_GT(std::sqrt(first.since_key.covariance(2, 2)), DegToRad(0.5));
+  EXPECT_LT(std::sqrt(first.since_key.covariance(2, 2)), DegToRad(10.0));
+}
+
+// Odometry that turns by a degree in a decimetre says nothing after 5 m, and
+// what was found in its place is told of.
+TEST(OdometryRefinerTest, OdometryThatWasBadIsNotBelievedInTheDark) {
+  const DarkHall drive = DriveThroughADarkHall(DegToRad(1.5), 0.0);
+  ASSERT_EQ(drive.refined.size(), drive.truth.size());
+  ASSERT_FALSE(drive.tied.empty());
+  EXPECT_NE(drive.refined[drive.tied[0]].tie, TrackTie::kOdometry);
+  EXPECT_FALSE(drive.loose.empty());
+}
+
+// Nor does one that jumped there.
+TEST(OdometryRefinerTest, OdometryThatJumpedInTheDarkIsNotBelieved) {
+  const DarkHall drive = DriveThroughADarkHall(DegToRad(0.05), 2.0);
+  ASSERT_EQ(drive.refined.size(), drive.truth.size());
+  ASSERT_FALSE(drive.tied.empty());
+  for (const std::size_t i : drive.tied) {
+    EXPECT_NE(drive.refined[i].tie, TrackTie::kOdometry) << i;
+  }
+  EXPECT_FALSE(drive.loose.empty());
+}
+
 // Carried into another building: nothing tells where it is, and that is said.
 TEST(OdometryRefinerTest, CarriedIntoTheUnknown) {
   const std::vector<Wall> there = Room(3.0, 5.5);
@@ -756,6 +872,48 @@ TEST(OdometryRefinerTest, PeopleWhoWalkAlong) {
   }
   refiner.Finish();
   EXPECT_TRUE(refiner.loose().empty());
+}
+
+// Only what lies within 45 degrees of ahead, up to 8 m.
+Scan Narrowed(const Scan& scan) {
+  Scan narrow = scan;
+  narrow.ranges.clear();
+  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+    const double angle =
+        scan.start_angle + static_cast<double>(i) * scan.angle_step;
+    if (std::abs(angle) > DegToRad(45.0)) continue;
+    if (narrow.ranges.empty()) narrow.start_angle = angle;
+    narrow.ranges.push_back(scan.ranges[i] < 8.0f ? scan.ranges[i] : 0.0f);
+  }
+  return narrow;
+}
+
+// A quarter of a view that turns on the spot: after a few scans that match
+// nothing, some returns fit at a pose 1.2 m and 37 degrees from odometry's
+// better than at the right one.
+TEST(OdometryRefinerTest, SomeReturnsThatFitDoNotOutweighOdometry) {
+  const char* const folder = std::getenv("PLUMBLINE_DATASETS");
+  const std::string path =
+      std::string(folder == nullptr ? "" : folder) + "/fr079.clf.bz2";
+  if (!std::ifstream(path)) GTEST_SKIP() << path << " is not there";
+  const Log log = ReadCarmenLog(path, {});
+  OdometryRefiner wide(Options());
+  OdometryRefiner narrow(Options());
+  std::vector<RefinedScan> all;
+  std::vector<RefinedScan> part;
+  for (std::size_t i = 1000; i < 1300; ++i) {
+    wide.Process(log.scans[i]);
+    narrow.Process(Narrowed(log.scans[i]));
+    all = TakeAll(&wide, std::move(all));
+    part = TakeAll(&narrow, std::move(part));
+  }
+  ASSERT_GT(part.size(), 260u);
+  for (std::size_t i = 10; i < part.size(); ++i) {
+    const Pose2 right = Between(all[i - 10].pose, all[i].pose);
+    const Pose2 seen = Between(part[i - 10].pose, part[i].pose);
+    EXPECT_LT(PositionError(seen, right), 0.5) << i;
+    EXPECT_LT(HeadingError(seen, right), DegToRad(15.0)) << i;
+  }
 }
 
 }  // namespace

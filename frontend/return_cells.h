@@ -17,9 +17,14 @@ std::int64_t CellKey(std::int64_t column, std::int64_t row);
 
 /// Total least squares line through points with weights, m.
 struct LineFit {
+  /// Sum of the weights.
   double n = 0.0;
+  /// Weighted sum of the points, m.
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  double xx = 0.0, xy = 0.0, yy = 0.0;
+  /// Weighted sum of the products of coordinates, m^2.
+  double xx = 0.0;
+  double xy = 0.0;  ///< See xx.
+  double yy = 0.0;  ///< See xx.
 
   /// Adds a point.
   void Add(const Eigen::Vector2d& p, double weight) {
@@ -158,8 +163,11 @@ class ReturnCells {
 
   // Cells that have not been used up, by place.
   struct Bucket {
+    /// A cell with returns.
     struct Entry {
+      /// Mean of its returns, m.
       Eigen::Vector2d mean;
+      /// Its number.
       int index;
     };
     std::vector<Entry> entries;

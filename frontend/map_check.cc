@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <string>
@@ -291,12 +292,21 @@ std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
   std::map<std::pair<std::size_t, std::size_t>, Evidence> evidence;
   for (const std::size_t k : SpreadOver(Ways(poses), options.spacing)) {
     if (parts[k] == kNoPart) continue;
-    for (auto& [part, others] : near(poses[k])) {
+    // The parts just before and after its own are enough to join all, and what
+    // is compared does not grow with the square of the visits.
+    auto by_part = near(poses[k]);
+    for (auto other = by_part.begin(); other != by_part.end();) {
+      const bool is_enough =
+          other->first != parts[k] &&
+          static_cast<int>(other->second.size()) >= options.min_others;
+      other = is_enough ? std::next(other) : by_part.erase(other);
+    }
+    const auto after = by_part.upper_bound(parts[k]);
+    const auto end = after == by_part.end() ? after : std::next(after);
+    auto other = after == by_part.begin() ? after : std::prev(after);
+    for (; other != end; ++other) {
       if (stop && stop()) return is_confirmed;
-      if (part == parts[k] ||
-          static_cast<int>(others.size()) < options.min_others) {
-        continue;
-      }
+      auto& [part, others] = *other;
       const ScanAgreement agreement =
           comparison.Compare(keys[k], poses[k], std::move(others));
       const bool contradicts =

@@ -397,7 +397,11 @@ def folders(solve, rng):
             solve.command(folder, "--quiet", "--checkpoint_every=1e-9"),
             stderr=subprocess.DEVNULL)
         time.sleep(length * (i + rng.random()) / vanishing)
-        shutil.rmtree(folder, ignore_errors=True)
+        # At once: removed file by file, what a run that is over has put there
+        # would go in part.
+        gone = folder + ".gone"
+        shutil.rmtree(gone, ignore_errors=True)
+        os.rename(folder, gone)
         # Files of the same run may be gone while others are put there.
         allowed = {0: ("none", "whole"), 2: ("none", "whole", "mixed")}
         status = process.wait()

@@ -48,8 +48,9 @@ void ReturnCells::Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
   }
 }
 
-void ReturnCells::Finish() {
+void ReturnCells::Finish(double least_share) {
   FillBuckets();
+  if (least_share > 0.0) DropStrays(least_share);
   FitDirections();
 }
 
@@ -120,8 +121,20 @@ void ReturnCells::DropUsed() {
   used_up_.clear();
 }
 
+void ReturnCells::DropStrays(double least_share) {
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    int most = 0;
+    VisitBuckets(
+        cells_[i].mean, buckets_[cells_[i].bucket].around, normal_radius_,
+        [&](int index) { most = std::max(most, cells_[index].returns); });
+    if (cells_[i].returns < least_share * most) Use(static_cast<int>(i));
+  }
+  DropUsed();
+}
+
 void ReturnCells::FitDirections() {
   for (Cell& cell : cells_) {
+    if (cell.used) continue;
     LineFit fit;
     int count = 0;
     const Eigen::Vector2d origin = cell.mean;

@@ -101,8 +101,9 @@ class ReturnCells {
            std::size_t scan);
 
   /// Prepares searches, and fits directions. To be called once all returns are
-  /// in.
-  void Finish();
+  /// in. No search finds cells with less than `least_share` of the returns that
+  /// one of their surroundings has: strays beside what stands there.
+  void Finish(double least_share = 0.0);
 
   /// The cells in the order in which they were first seen.
   const std::vector<Cell>& cells() const { return cells_; }
@@ -245,6 +246,7 @@ class ReturnCells {
   // The bucket of a point and those beside it; -1 for one without cells.
   std::array<int, 9> BucketsAround(const Eigen::Vector2d& point) const;
   void FillBuckets();
+  void DropStrays(double least_share);
   void FitDirections();
 
   template <typename Look>

@@ -353,11 +353,12 @@ class Completion {
     }
     half_way.push_back(count);
     NumberReturns(scans, count);
-    for (std::size_t k = 0; k + 2 < half_way.size(); ++k) {
-      Look(scans, poses, half_way[k], half_way[k + 2], {1.0});
+    LookAtAll(scans, poses, half_way);
+    if (!IsStopped() &&
+        ExplainedShare(scans, poses) < options_.least_explained) {
+      stray_share_ = options_.stray_share;
+      LookAtAll(scans, poses, half_way);
     }
-    // Then all together, also what scans from poses less exact have smeared.
-    Look(scans, poses, 0, count, {1.0, 2.0});
     if (is_stopped_) return {};
     return std::move(transaction_);
   }
@@ -368,11 +369,41 @@ class Completion {
     return is_stopped_;
   }
 
+  void LookAtAll(const std::vector<Scan>& scans,
+                 const std::vector<Pose2>& poses,
+                 const std::vector<std::size_t>& half_way) {
+    for (std::size_t k = 0; k + 2 < half_way.size(); ++k) {
+      Look(scans, poses, half_way[k], half_way[k + 2], {1.0});
+    }
+    // Then all together, also what scans from poses less exact have smeared.
+    Look(scans, poses, 0, half_way.back(), {1.0, 2.0});
+  }
+
+  // Share of the returns in reach that walls explain.
+  double ExplainedShare(const std::vector<Scan>& scans,
+                        const std::vector<Pose2>& poses) {
+    std::vector<Return> unexplained;
+    double explained = 0.0;
+    double all = 0.0;
+    for (std::size_t i = 0; i + 1 < first_word_.size() && !IsStopped(); ++i) {
+      FindUnexplained(scans[i], poses[i], is_done_.data() + first_word_[i],
+                      &unexplained);
+      const auto in_reach = static_cast<double>(std::count_if(
+          scans[i].ranges.begin(), scans[i].ranges.end(), [this](float range) {
+            return range >= options_.points.minimum_range &&
+                   range <= options_.points.usable_range;
+          }));
+      explained += in_reach - static_cast<double>(unexplained.size());
+      all += in_reach;
+    }
+    return all > 0.0 ? explained / all : 1.0;
+  }
+
   void Look(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
             std::size_t begin, std::size_t end,
             std::initializer_list<double> smears) {
     Gather(scans, poses, begin, end);
-    returns_.Finish();
+    returns_.Finish(stray_share_);
     const std::vector<ReturnCells::Cell>& cells = returns_.cells();
     // The straightest surroundings first; ties by the order of scans.
     std::vector<int> order;
@@ -590,6 +621,7 @@ class Completion {
   const WallCompletionOptions options_;
   const std::function<bool()>& stop_;
   bool is_stopped_ = false;
+  double stray_share_ = 0.0;
   WallIndex index_;
   ReturnCells returns_;
   std::vector<WallGrower::Scratch> scratch_;

@@ -51,6 +51,12 @@ struct WallCompletionOptions {
   int min_returns = 20;
   double max_gap = 0.4;
   double min_coverage = 0.75;
+  /// Where walls explain less than this share of all returns, many returns may
+  /// be strays, which cheap lasers have around all that stands there: walls are
+  /// looked for once more without the cells that have less than `stray_share`
+  /// of the returns of one in their neighbourhood.
+  double least_explained = 0.4;
+  double stray_share = 0.1;
   /// Number of walls of the map, the nearest, that a wall is bound to, and
   /// standard deviations of that: m across and along, rad.
   int links = 3;

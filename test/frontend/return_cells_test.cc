@@ -41,6 +41,41 @@ TEST(ReturnCellsTest, ReturnsOfOneCellAreGathered) {
   EXPECT_THAT(cell.scans, ElementsAre(3u, 5u));
 }
 
+// Single returns all around a wall that was seen twenty times leave it no
+// direction, unless they are left out.
+TEST(ReturnCellsTest, StraysAroundAWallAreLeftOut) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> at(-1.0, 1.0);
+  for (const bool leaves_out : {false, true}) {
+    ReturnCells returns(kCell, kRadius, kGap);
+    for (int i = 0; i < 20; ++i) {
+      for (double x = -1.0 + 0.5 * kCell; x < 1.0; x += kCell) {
+        returns.Add({x, 0.02}, {0.0, 1.0}, static_cast<std::size_t>(i));
+      }
+    }
+    for (int i = 0; i < 1500; ++i) {
+      returns.Add({at(random), at(random)}, {0.0, 1.0}, 20);
+    }
+    returns.Finish(leaves_out ? 0.2 : 0.0);
+    int straight = 0;
+    for (const ReturnCells::Cell& cell : returns.cells()) {
+      if (cell.returns < 5) {
+        const double off = std::abs(cell.mean.y() - 0.02);
+        if (off < 0.2) {
+          EXPECT_EQ(cell.used, leaves_out);
+        }
+        if (off > 0.35) {
+          EXPECT_FALSE(cell.used);
+        }
+      } else if (cell.straightness > 0.0) {
+        ++straight;
+        EXPECT_LT(std::abs(cell.direction.y()), 0.05);
+      }
+    }
+    EXPECT_EQ(straight > 20, leaves_out) << straight;
+  }
+}
+
 TEST(ReturnCellsTest, CellsNearAPlaceAreThoseOfALookAtAll) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> at(-2.0, 2.0);

@@ -14,11 +14,22 @@ using Eigen::Vector2d;
 // Share of a piece's length that must be occupied.
 constexpr double kLeastCovered = 0.5;
 
+// What lies on one side of a wall, bent as the map is, is no farther apart than
+// this, m.
+constexpr double kOneSide = 0.2;
+// Free cells before a face begin within this many cells of it, and lie beside
+// this share of a face that was seen from there.
+constexpr int kCellsBefore = 3;
+constexpr double kSeenShare = 0.5;
+
 // A face in one straight piece.
 struct Face {
   // Index into the directions; -1: its own.
   int direction = -1;
   Vector2d begin, end;
+  // It was seen from the left or from the right of begin to end.
+  bool from_left = false;
+  bool from_right = false;
   double length() const { return (end - begin).norm(); }
 };
 
@@ -217,11 +228,49 @@ class Returns {
   std::vector<std::int32_t> index_;
 };
 
+// Whether free space lies before most of a face on its left (`side` 1) or right
+// (-1).
+bool IsSeenFrom(const Face& face, int side, const SpaceGrid& space) {
+  const Vector2d along = (face.end - face.begin).normalized();
+  const Vector2d before =
+      side * space.resolution * Vector2d(-along[1], along[0]);
+  const int steps =
+      std::max(1, static_cast<int>(face.length() / space.resolution));
+  int free = 0;
+  for (int i = 0; i < steps; ++i) {
+    const Vector2d here =
+        face.begin + (i + 0.5) / steps * (face.end - face.begin);
+    for (int k = 1; k <= kCellsBefore; ++k) {
+      if (space.At(Vector2d(here + k * before)) != Space::kFree) continue;
+      ++free;
+      break;
+    }
+  }
+  return free > kSeenShare * steps;
+}
+
 // Faces that make one line.
 struct Group {
   WallLine line;
   int direction = -1;
+  std::vector<Face> faces;
 };
+
+// Whether two faces can be those of one wall: far apart only when nothing was
+// seen between them, where the wall would be.
+bool AreOneWall(const WallLine& line, const Face& a, const Face& b) {
+  const auto across = [&](const Face& face) {
+    return 0.5 * (line.Across(face.begin) + line.Across(face.end));
+  };
+  const double between = across(a) - across(b);
+  if (std::abs(between) <= kOneSide) return true;
+  const auto from = [&](const Face& face, bool left) {
+    const bool is_along = line.along.dot(face.end - face.begin) > 0.0;
+    return left == is_along ? face.from_left : face.from_right;
+  };
+  return !from(between > 0.0 ? a : b, false) &&
+         !from(between > 0.0 ? b : a, true);
+}
 
 // Adds a face to a group when it is a part of the same wall; how far it is off,
 // or -1 when it is not.
@@ -243,6 +292,11 @@ double Fits(const Group& group, const Face& face,
   const double end = std::max(line.Along(face.begin), line.Along(face.end));
   const double gap = std::max(begin - line.end, line.begin - end);
   if (gap > options.in_line_gap) return -1.0;
+  if (!std::all_of(
+          group.faces.begin(), group.faces.end(),
+          [&](const Face& other) { return AreOneWall(line, face, other); })) {
+    return -1.0;
+  }
   // In line before near.
   return std::max(0.0, high - low - (line.high - line.low)) +
          0.02 * std::max(0.0, gap);
@@ -258,6 +312,7 @@ void Add(const Face& face, Group* group) {
   line.low = std::min(line.low, across);
   line.high = std::max(line.high, across);
   line.weight += face.length();
+  group->faces.push_back(face);
   const double middle = 0.5 * (line.low + line.high);
   line.origin += middle * line.normal();
   line.low -= middle;
@@ -299,6 +354,10 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
     const std::vector<Face> rows =
         returns.TakeRows(all[i], static_cast<int>(i));
     faces.insert(faces.end(), rows.begin(), rows.end());
+  }
+  for (Face& face : faces) {
+    face.from_left = IsSeenFrom(face, 1, space);
+    face.from_right = IsSeenFrom(face, -1, space);
   }
   std::stable_sort(
       faces.begin(), faces.end(),

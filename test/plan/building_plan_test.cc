@@ -179,6 +179,28 @@ TEST(BuildingPlanTest, FurnitureIsNoWall) {
   EXPECT_EQ(PlanOf(drawing).rooms.size(), 3u);
 }
 
+// Edges of desks 0.25 m beside each other with free floor in between are no
+// faces of one wall; those of a wall of that thickness, seen from outside, are.
+TEST(BuildingPlanTest, FacesWithFreeSpaceBetweenThemAreNoWall) {
+  const auto rooms = [](bool is_wall) {
+    Drawing drawing(14.0, 12.0);
+    drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 6.0, 10.0);
+    drawing.Free(2.0, 2.9, 2.9, 3.3);
+    if (is_wall) {
+      drawing.Fill(1.0, 6.0, 6.0, 6.25, Space::kUnknown);
+      drawing.Fill(1.0, 6.0, 6.0, 6.05, Space::kOccupied);
+      drawing.Fill(1.0, 6.2, 6.0, 6.25, Space::kOccupied);
+      drawing.Free(3.0, 6.0, 3.9, 6.25);
+    } else {
+      drawing.Fill(1.0, 6.2, 2.6, 7.0, Space::kOccupied);
+      drawing.Fill(4.0, 5.2, 6.0, 6.0, Space::kOccupied);
+    }
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms(true), 3u);
+  EXPECT_EQ(rooms(false), 2u);
+}
+
 TEST(BuildingPlanTest, AWideOpeningJoins) {
   Drawing drawing = TwoRooms();
   drawing.Free(5.9, 4.0, 6.3, 8.0);

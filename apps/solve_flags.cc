@@ -358,6 +358,7 @@ void TakeFrontEndFlags(LogSolverOptions* options) {
   options->adjustment.num_threads = NumThreadsFromFlags();
   options->check.points = options->odometry.points;
   options->check.num_threads = NumThreadsFromFlags();
+  options->way_check.num_threads = NumThreadsFromFlags();
   options->completion.num_threads = NumThreadsFromFlags();
 }
 

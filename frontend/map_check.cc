@@ -2,6 +2,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/map_check.h>
+#include <plumbline/frontend/place_grid.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -21,43 +22,6 @@ constexpr double kLongestStep = 2.0;
 
 // Between two times that `stop` is asked.
 constexpr std::size_t kScansAtOnce = 64;
-
-// Key scans by the cell of a grid that they were made in.
-class PlaceGrid {
- public:
-  PlaceGrid(const std::vector<Pose2>& poses, double cell) : cell_(cell) {
-    for (std::size_t k = 0; k < poses.size(); ++k) {
-      entries_.emplace_back(CellOf(poses[k].head<2>()), k);
-    }
-    std::sort(entries_.begin(), entries_.end());
-  }
-
-  // Calls `visit` with each index in the cells around a position.
-  template <typename Visit>
-  void Around(const Eigen::Vector2d& position, const Visit& visit) const {
-    const Cell middle = CellOf(position);
-    for (long x = middle.first - 1; x <= middle.first + 1; ++x) {
-      for (long y = middle.second - 1; y <= middle.second + 1; ++y) {
-        const Cell cell(x, y);
-        auto entry = std::lower_bound(entries_.begin(), entries_.end(),
-                                      std::make_pair(cell, std::size_t{0}));
-        for (; entry != entries_.end() && entry->first == cell; ++entry) {
-          visit(entry->second);
-        }
-      }
-    }
-  }
-
- private:
-  using Cell = std::pair<long, long>;
-  Cell CellOf(const Eigen::Vector2d& position) const {
-    return {std::lround(position.x() / cell_),
-            std::lround(position.y() / cell_)};
-  }
-
-  double cell_;
-  std::vector<std::pair<Cell, std::size_t>> entries_;
-};
 
 enum class Verdict { kUnknown, kAgrees, kContradicts };
 

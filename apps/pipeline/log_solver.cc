@@ -38,6 +38,35 @@ constexpr int kPlanRounds = 6;
 constexpr double kGlimpsedPosition = 0.03;
 constexpr double kGlimpsedDirection = DegToRad(0.3);
 
+// Of crossings whose times and those of what speaks against them enclose
+// others' only these: the fault lies between.
+std::vector<BlockedWay> Innermost(const std::vector<BlockedWay>& ways) {
+  std::vector<BlockedWay> left;
+  const auto span = [](const BlockedWay& way) {
+    return std::minmax(way.crossing, way.seen);
+  };
+  for (const BlockedWay& way : ways) {
+    const auto [begin, end] = span(way);
+    const bool encloses =
+        std::any_of(ways.begin(), ways.end(), [&](const BlockedWay& other) {
+          const auto [first, last] = span(other);
+          return first >= begin && last <= end &&
+                 (first > begin || last < end || &other < &way);
+        });
+    if (!encloses) left.push_back(way);
+  }
+  return left;
+}
+
+void AddLoose(int begin, int end, std::string why, LogSolverResult* result) {
+  LooseTrack loose;
+  loose.begin = begin;
+  loose.end = end;
+  loose.found = true;
+  loose.why = std::move(why);
+  result->loose.push_back(std::move(loose));
+}
+
 void AddSameWall(HierarchySpec* hierarchy) {
   if (!hierarchy->Contains(kSameWallDetector)) {
     hierarchy->Add(0, kSameWallDetector);
@@ -466,6 +495,7 @@ void LogSolver::ScaleToNoise(double scale) {
   options_.completion.ScaleToNoise(scale);
   options_.adjustment.ScaleToNoise(scale);
   options_.check.ScaleToNoise(scale);
+  options_.way_check.ScaleToNoise(scale);
 }
 
 LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
@@ -863,16 +893,36 @@ void LogSolver::CheckMap(Context* context) const {
   const auto stop = [context] { return context->IsStopped(); };
   const std::vector<MapContradiction> contradictions =
       FindContradictions(context->scans, keys, poses, options_.check, stop);
+  std::vector<Wall> walls;
+  for (const Feature* feature : std::as_const(*graph_).Features()) {
+    if (feature->level != 0) continue;
+    if (const std::optional<Wall> wall = WallOf(*feature)) {
+      walls.push_back(*wall);
+    }
+  }
+  const std::vector<BlockedWay> blocked = FindBlockedWays(
+      context->scans, keys, poses, walls, options_.way_check, stop);
   // Where something is wrong no tie is taken for sure.
-  if (contradictions.empty()) DropConfirmed(keys, context);
+  if (contradictions.empty() && blocked.empty()) DropConfirmed(keys, context);
   for (const MapContradiction& part : contradictions) {
-    LooseTrack loose;
-    loose.begin = part.begin;
-    loose.end = part.end;
-    loose.found = true;
-    loose.why =
-        "what the robot saw here contradicts what it saw on other visits";
-    result.loose.push_back(std::move(loose));
+    AddLoose(part.begin, part.end,
+             "what the robot saw here contradicts what it saw on other visits",
+             &result);
+  }
+  for (const BlockedWay& way : Innermost(blocked)) {
+    const auto [begin, end] = std::minmax(way.crossing, way.seen);
+    // A tie between them that is reported already may be why.
+    const bool is_explained =
+        std::any_of(result.loose.begin(), result.loose.end(),
+                    [begin = begin, end = end](const LooseTrack& loose) {
+                      return (loose.begin >= begin && loose.begin < end) ||
+                             (loose.end > begin && loose.end <= end);
+                    });
+    if (is_explained) continue;
+    AddLoose(begin, end,
+             "between these two the robot went through what it has seen as a "
+             "wall: that was moved, or the map is wrong",
+             &result);
   }
   std::stable_sort(result.loose.begin(), result.loose.end(),
                    [](const LooseTrack& a, const LooseTrack& b) {

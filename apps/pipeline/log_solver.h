@@ -17,6 +17,7 @@
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/wall_completion.h>
+#include <plumbline/frontend/way_check.h>
 #include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/raw_features.h>
 #include <plumbline/pipeline/run_control.h>
@@ -79,9 +80,11 @@ struct LogSolverOptions {
   Refinement refine = Refinement::kFull;
   JointAdjustmentOptions adjustment;
   /// Compare each part of the final trajectory with what was seen on other
-  /// visits, and report those that contradict it.
+  /// visits, and report those that contradict it, and walls that the robot has
+  /// gone through.
   bool check_map = true;
   MapCheckOptions check;
+  WayCheckOptions way_check;
   /// What is known of the building beforehand; needs structure and full
   /// refinement of segments.
   KnownStructure known;

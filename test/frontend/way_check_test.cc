@@ -1,0 +1,139 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/error.h>
+#include <plumbline/frontend/way_check.h>
+
+#include <cmath>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::Laser;
+using testing::MakeScan;
+using testing::Noise;
+
+// A corridor of 2 m x 30 m along x that a robot goes along and comes back, and
+// what it finds at x = 15 the first time and from then on.
+struct Drive {
+  std::vector<Scan> scans;
+  std::vector<int> keys;
+  std::vector<Pose2> poses;
+};
+
+void Go(const std::vector<testing::Wall>& across, double from, double to,
+        Drive* drive) {
+  std::vector<testing::Wall> walls = {{{0.0, -1.0}, {30.0, -1.0}},
+                                      {{30.0, -1.0}, {30.0, 1.0}},
+                                      {{30.0, 1.0}, {0.0, 1.0}},
+                                      {{0.0, 1.0}, {0.0, -1.0}}};
+  walls.insert(walls.end(), across.begin(), across.end());
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(5 + drive->scans.size());
+  const double step = from < to ? 0.3 : -0.3;
+  for (double x = from; (to - x) * step > 0.0; x += step) {
+    const Pose2 pose(x, 0.0, from < to ? 0.0 : kPi);
+    drive->keys.push_back(static_cast<int>(drive->scans.size()));
+    drive->scans.push_back(MakeScan(walls, pose, laser, &noise));
+    drive->poses.push_back(pose);
+  }
+}
+
+// Up to what stands there, back, and through where it was.
+Drive Through(const std::vector<testing::Wall>& first,
+              const std::vector<testing::Wall>& then) {
+  Drive drive;
+  Go(first, 5.0, 12.0, &drive);
+  Go(first, 12.0, 5.0, &drive);
+  Go(then, 5.0, 25.0, &drive);
+  return drive;
+}
+
+// What the map has at x = 15.
+std::vector<Wall> WallAcross() {
+  return {MakeWall({15.0, 0.0}, 0.5 * kPi, -0.95, 0.95)};
+}
+
+TEST(FindBlockedWaysTest, ThroughAnEndOfACorridor) {
+  const Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  const std::vector<BlockedWay> found =
+      FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {});
+  ASSERT_EQ(found.size(), 1U);
+  const auto crossing = static_cast<std::size_t>(found[0].crossing);
+  EXPECT_LT(drive.poses[crossing].x(), 15.0);
+  EXPECT_GE(drive.poses[crossing + 1].x(), 15.0);
+  // The last ones that saw it were looking from where the robot turned.
+  EXPECT_LT(found[0].seen, 24);
+  EXPECT_GT(found[0].seen, 0);
+
+  WayCheckOptions threads;
+  threads.num_threads = 3;
+  EXPECT_EQ(FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(),
+                            threads)
+                .size(),
+            1U);
+}
+
+TEST(FindBlockedWaysTest, TurnedAndMoved) {
+  Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  const Pose2 world(-300.0, 1e4, 2.5);
+  for (Pose2& pose : drive.poses) pose = Compose(world, pose);
+  const std::vector<Wall> walls = {
+      MakeWall(Compose(world, Pose2(15.0, 0.0, -0.5 * kPi)), -0.95, 0.95)};
+  EXPECT_EQ(
+      FindBlockedWays(drive.scans, drive.keys, drive.poses, walls, {}).size(),
+      1U);
+}
+
+TEST(FindBlockedWaysTest, ADoorThatWasClosed) {
+  const std::vector<testing::Wall> frame = {{{15.0, -1.0}, {15.0, -0.45}},
+                                            {{15.0, 0.45}, {15.0, 1.0}}};
+  const Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, frame);
+  EXPECT_TRUE(
+      FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {})
+          .empty());
+}
+
+TEST(FindBlockedWaysTest, AWallThatIsDrawnAcrossADoorway) {
+  const std::vector<testing::Wall> frame = {{{15.0, -1.0}, {15.0, -0.7}},
+                                            {{15.0, 0.7}, {15.0, 1.0}}};
+  const Drive drive = Through(frame, frame);
+  EXPECT_TRUE(
+      FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {})
+          .empty());
+}
+
+TEST(FindBlockedWaysTest, WallsBesideTheWayAndJumps) {
+  Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  const std::vector<Wall> sides = {MakeWall({15.0, -1.0}, 0.0, -15.0, 15.0),
+                                   MakeWall({15.0, 1.0}, kPi, -15.0, 15.0),
+                                   MakeWall({15.0, 0.0}, 0.5 * kPi, 0.0, 0.0)};
+  EXPECT_TRUE(
+      FindBlockedWays(drive.scans, drive.keys, drive.poses, sides, {}).empty());
+  // Nobody went from one side to the other where 2 m are missing.
+  Drive jump = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  for (std::size_t k = jump.poses.size(); k-- > 0;) {
+    if (std::abs(jump.poses[k].x() - 15.0) < 1.0) {
+      jump.poses.erase(jump.poses.begin() + static_cast<std::ptrdiff_t>(k));
+      jump.keys.erase(jump.keys.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+  }
+  EXPECT_TRUE(
+      FindBlockedWays(jump.scans, jump.keys, jump.poses, WallAcross(), {})
+          .empty());
+}
+
+TEST(FindBlockedWaysTest, EndsWhenItIsToldAndRefusesPosesThatDoNotFit) {
+  const Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  EXPECT_TRUE(FindBlockedWays(drive.scans, drive.keys, drive.poses,
+                              WallAcross(), {}, [] { return true; })
+                  .empty());
+  EXPECT_THROW(FindBlockedWays(drive.scans, drive.keys, {}, WallAcross(), {}),
+               Error);
+  EXPECT_TRUE(FindBlockedWays({}, {}, {}, WallAcross(), {}).empty());
+}
+
+}  // namespace
+}  // namespace plumbline

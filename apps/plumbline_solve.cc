@@ -419,6 +419,21 @@ void TellOfLog(const std::string& name, const Log& log, Summary* summary) {
   summary->notes = log.notes;
 }
 
+ScanOdometryOptions MatchingOptions(const LogSolverOptions& solver_options) {
+  ScanOdometryOptions options;
+  options.points = solver_options.odometry.points;
+  options.matcher = solver_options.odometry.matcher;
+  options.stop = [] { return InterruptRequested(); };
+  return options;
+}
+
+void TellSweeps(const std::string& name, Summary* summary) {
+  summary->notes.push_back(
+      "scans fit each other better as sweeps of a turning laser: the motion "
+      "during them is undone");
+  Remark("%s: %s", name.c_str(), summary->notes.back().c_str());
+}
+
 // Names what MatchScansAlone takes the time of.
 constexpr char kMatchingStep[] = "scan matching for want of odometry";
 
@@ -427,10 +442,7 @@ void MatchScansAlone(const std::string& name,
                      const LogSolverOptions& solver_options, RunClock* clock,
                      Log* log, Summary* summary) {
   clock->Begin(kMatchingStep);
-  ScanOdometryOptions options;
-  options.points = solver_options.odometry.points;
-  options.matcher = solver_options.odometry.matcher;
-  options.stop = [] { return InterruptRequested(); };
+  ScanOdometryOptions options = MatchingOptions(solver_options);
   options.progress = [clock](std::size_t done, std::size_t total) {
     clock->bar().Update(ShareOf(static_cast<std::int64_t>(done),
                                 static_cast<std::int64_t>(total)));
@@ -456,12 +468,7 @@ void MatchScansAlone(const std::string& name,
   }
   Remark("%s: there is no odometry: %s carries it", name.c_str(),
          summary->odometry_source.c_str());
-  if (report.sweep != 0) {
-    summary->notes.push_back(
-        "scans fit each other better as sweeps of a turning laser: the motion "
-        "during them is undone");
-    Remark("%s: %s", name.c_str(), summary->notes.back().c_str());
-  }
+  if (report.sweep != 0) TellSweeps(name, summary);
   if (report.unmatched > 0) {
     std::snprintf(text, sizeof text,
                   "%zu of %zu scans could not be matched: there the robot is "
@@ -471,6 +478,16 @@ void MatchScansAlone(const std::string& name,
     summary->notes.push_back(text);
   }
   Detail("matched scans for want of odometry in %.1f s", watch.Seconds());
+}
+
+// What a turning laser saw while the robot moved, where the log does not say
+// how long its sweeps take.
+void UndoSweeps(const std::string& name, const LogSolverOptions& solver_options,
+                Log* log, Summary* summary) {
+  if (!solver_options.odometry.match_scans) return;
+  if (UndoSweepsByOdometry(MatchingOptions(solver_options), log) != 0) {
+    TellSweeps(name, summary);
+  }
 }
 
 // A summary that says what the run is asked to do.
@@ -896,6 +913,8 @@ int SolveLog(const LogInput& input, const Registry& registry, RunClock* clock,
   if (!log.has_odometry) {
     PlanMatching({1.0}, options, clock);
     MatchScansAlone(input.name, options, clock, &log, &summary);
+  } else {
+    UndoSweeps(input.name, options, &log, &summary);
   }
 
   CheckpointFile checkpoint(
@@ -1013,6 +1032,8 @@ std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
     if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
     if (!log.has_odometry) {
       MatchScansAlone(name, options, clock, &log, &of_log);
+    } else {
+      UndoSweeps(name, options, &log, &of_log);
     }
     AddNotes(TitleOf(name), of_log, summary);
     logs.push_back(std::move(log));

@@ -41,6 +41,8 @@ constexpr int kFitRounds = 20;
 constexpr double kSweepTurn = DegToRad(1.0);
 constexpr std::size_t kFewestSweeps = 20;
 constexpr int kSweepParts = 8;
+// Scans that are matched to tell, where odometry carries the log.
+constexpr std::size_t kTrialScans = 150;
 // What sweeps less, rad, is not taken for a turning laser.
 constexpr double kLeastSweep = DegToRad(200.0);
 
@@ -194,16 +196,17 @@ class SweepTrial {
     return sum / static_cast<double>(turning_.size());
   }
 
-  // Takes the scans for sweeps in the order of beams (1) or against it (-1).
-  void Undo(int direction, std::vector<Scan>* scans) const {
+  // Takes the scans for sweeps in the order of beams (1) or against it (-1),
+  // seen from where the robot was `origin` periods after a sweep began.
+  void Undo(int direction, double origin, std::vector<Scan>* scans) const {
     for (std::size_t i = 0; i < scans->size(); ++i) {
       Scan& scan = (*scans)[i];
       if (velocities_[i] == Pose2::Zero()) continue;
       std::vector<Pose2> places;
       for (int k = 0; k <= kSweepParts; ++k) {
-        // About the middle of the sweep: the scan is matched as a whole.
-        const double time =
-            direction * period_ * (static_cast<double>(k) / kSweepParts - 0.5);
+        const double share =
+            0.5 + direction * (static_cast<double>(k) / kSweepParts - 0.5);
+        const double time = period_ * (share - origin);
         places.push_back(
             Compose(Inverse(scan.laser_offset),
                     Compose(Pose2(velocities_[i] * time), scan.laser_offset)));
@@ -211,6 +214,18 @@ class SweepTrial {
       UndoSweep(places, &scan);
     }
   }
+
+  // A sweep is stamped when it begins, and matched as seen from its middle.
+  void MoveOdometryToBegin(std::vector<Scan>* scans) const {
+    for (std::size_t i = 0; i < scans->size(); ++i) {
+      Pose2& odometry = (*scans)[i].odometry;
+      odometry =
+          Compose(odometry, Pose2(velocities_[i] * (-kMiddle * period_)));
+    }
+  }
+
+  // As seen from here scans are matched as a whole.
+  static constexpr double kMiddle = 0.5;
 
  private:
   double period_ = 0.0;
@@ -349,6 +364,32 @@ class Matcher {
   std::deque<Key> keys_;
 };
 
+// In which direction scans, whose matches have these costs, fit each other
+// better as sweeps: 1, -1, or 0 for none. Fills `chosen` with them as seen from
+// the middle of each, placed by matching.
+int ChooseSweep(const ScanOdometryOptions& options, const TurnIntegral& turns,
+                const Calibration* guide, const SweepTrial& trial,
+                std::vector<double> costs, const std::vector<Scan>& scans,
+                std::vector<Scan>* chosen, std::size_t* unmatched) {
+  double best = (1.0 - options.min_sweep_gain) * trial.MeanCost(costs);
+  int sweep = 0;
+  for (const int direction : {1, -1}) {
+    std::vector<Scan> undone = scans;
+    trial.Undo(direction, SweepTrial::kMiddle, &undone);
+    std::size_t lost = 0;
+    if (!Matcher(options, turns).Run(guide, &undone, &lost, nullptr, &costs)) {
+      return 0;
+    }
+    const double cost = trial.MeanCost(costs);
+    if (cost >= best) continue;
+    best = cost;
+    *chosen = std::move(undone);
+    sweep = direction;
+    *unmatched = lost;
+  }
+  return sweep;
+}
+
 }  // namespace
 
 ScanOdometryReport AddScanOdometry(const ScanOdometryOptions& options,
@@ -377,25 +418,64 @@ ScanOdometryReport AddScanOdometry(const ScanOdometryOptions& options,
 
   const SweepTrial trial(scans, turns, guide);
   if (trial.turning().size() < kFewestSweeps) return report;
-  double best = (1.0 - options.min_sweep_gain) * trial.MeanCost(costs);
   std::vector<Scan> chosen;
-  for (const int direction : {1, -1}) {
-    std::vector<Scan> undone = scans;
-    trial.Undo(direction, &undone);
-    std::size_t unmatched = 0;
-    if (!Matcher(options, turns)
-             .Run(guide, &undone, &unmatched, nullptr, &costs)) {
-      return report;
-    }
-    const double cost = trial.MeanCost(costs);
-    if (cost >= best) continue;
-    best = cost;
-    chosen = std::move(undone);
-    report.sweep = direction;
-    report.unmatched = unmatched;
+  report.sweep = ChooseSweep(options, turns, guide, trial, costs, scans,
+                             &chosen, &report.unmatched);
+  if (report.sweep == 0) return report;
+  trial.MoveOdometryToBegin(&chosen);
+  trial.Undo(report.sweep, 0.0, &scans);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    scans[i].odometry = chosen[i].odometry;
   }
-  if (report.sweep != 0) scans = std::move(chosen);
   return report;
+}
+
+int UndoSweepsByOdometry(const ScanOdometryOptions& options, Log* log) {
+  std::vector<Scan>& scans = log->scans;
+  const TurnIntegral no_turns({});
+  const SweepTrial whole(scans, no_turns, nullptr);
+  const std::vector<std::size_t>& turning = whole.turning();
+  if (turning.size() < kFewestSweeps) return 0;
+  // The stretch with most scans that tell.
+  std::size_t begin = turning.front();
+  std::size_t most = 0;
+  for (std::size_t first = 0, last = 0; first < turning.size(); ++first) {
+    while (last < turning.size() &&
+           turning[last] < turning[first] + kTrialScans) {
+      ++last;
+    }
+    if (last - first <= most) continue;
+    most = last - first;
+    begin = turning[first];
+  }
+  const std::size_t end = std::min(scans.size(), begin + kTrialScans);
+  std::vector<Scan> stretch(scans.begin() + static_cast<std::ptrdiff_t>(begin),
+                            scans.begin() + static_cast<std::ptrdiff_t>(end));
+  const SweepTrial trial(stretch, no_turns, nullptr);
+  if (trial.turning().size() < kFewestSweeps) return 0;
+  // Odometry in place of a gyroscope.
+  std::vector<TimedYawRate> rates;
+  for (std::size_t i = 1; i < stretch.size(); ++i) {
+    const double step = stretch[i].timestamp - stretch[i - 1].timestamp;
+    if (!(step > 0.0)) continue;
+    const double turn =
+        Between(stretch[i - 1].odometry, stretch[i].odometry)[2];
+    rates.push_back({stretch[i].timestamp - 0.5 * step, turn / step});
+  }
+  const TurnIntegral turns(rates);
+  Calibration odometry;
+  odometry.holds = true;
+  std::vector<double> costs;
+  std::size_t unmatched = 0;
+  if (!Matcher(options, turns)
+           .Run(&odometry, &stretch, &unmatched, nullptr, &costs)) {
+    return 0;
+  }
+  std::vector<Scan> chosen;
+  const int sweep = ChooseSweep(options, turns, &odometry, trial, costs,
+                                stretch, &chosen, &unmatched);
+  if (sweep != 0) whole.Undo(sweep, 0.0, &scans);
+  return sweep;
 }
 
 }  // namespace plumbline

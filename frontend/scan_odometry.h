@@ -47,8 +47,8 @@ struct ScanOdometryReport {
   double yaw_bias = 0.0;
   double explained = 0.0;
   /// The motion during scans was undone: the laser takes from one scan to the
-  /// next for a sweep, in the order of beams (1) or against it (-1). 0: it was
-  /// left.
+  /// next for a sweep that begins at Scan::timestamp, in the order of beams (1)
+  /// or against it (-1). 0: it was left.
   int sweep = 0;
 };
 
@@ -60,6 +60,13 @@ struct ScanOdometryReport {
 /// and near each other in time (5 a second and more) are what this needs.
 ScanOdometryReport AddScanOdometry(const ScanOdometryOptions& options,
                                    Log* log);
+
+/// Tries, on a stretch of a log with odometry in which the robot turned,
+/// whether scans fit each other better as sweeps of a turning laser whose
+/// duration the log does not say, and undoes the motion during all of them if
+/// so. Returns ScanOdometryReport::sweep. Scans of less than 200 degrees, and
+/// those whose motion was undone before, are left as they are.
+int UndoSweepsByOdometry(const ScanOdometryOptions& options, Log* log);
 
 }  // namespace plumbline
 

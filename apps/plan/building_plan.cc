@@ -1,6 +1,7 @@
 #include <plumbline/plan/arrangement.h>
 #include <plumbline/plan/building_plan.h>
 #include <plumbline/plan/drawn_lines.h>
+#include <plumbline/plan/unseen_walls.h>
 
 #include <algorithm>
 #include <cmath>
@@ -31,6 +32,9 @@ constexpr int kLeastJamb = 6;
 // how many rays to each side look for it.
 constexpr double kDeeperThanFurniture = 1.0;
 constexpr int kRaysAside = 3;
+// Walls without a trace are looked for again in the parts of a region, up to so
+// many times.
+constexpr int kUnseenRounds = 3;
 // Doors between the same rooms nearer to each other than this are one, m.
 constexpr double kSameDoor = 0.8;
 
@@ -467,8 +471,18 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
     drawn = DrawLines(lines, options.reach);
     MeasureLines(space, options.doors, &drawn);
   }
-  const Arrangement arrangement = Arrange(drawn, space);
-  const std::vector<int> region = FindRegions(arrangement, options.regions);
+  Arrangement arrangement = Arrange(drawn, space);
+  std::vector<int> region = FindRegions(arrangement, options.regions);
+  for (int i = 0; i < kUnseenRounds; ++i) {
+    const std::vector<WallLine> unseen =
+        FindUnseenWalls(arrangement, region, drawn, space, options.unseen);
+    if (unseen.empty()) break;
+    lines.insert(lines.end(), unseen.begin(), unseen.end());
+    drawn = DrawLines(lines, options.reach);
+    MeasureLines(space, options.doors, &drawn);
+    arrangement = Arrange(drawn, space);
+    region = FindRegions(arrangement, options.regions);
+  }
 
   BuildingPlan plan;
   std::vector<int> room_of_face;

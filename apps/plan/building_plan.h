@@ -6,6 +6,7 @@
 #include <plumbline/plan/polygon.h>
 #include <plumbline/plan/regions.h>
 #include <plumbline/plan/space_grid.h>
+#include <plumbline/plan/unseen_walls.h>
 #include <plumbline/plan/wall_lines.h>
 
 #include <Eigen/Core>
@@ -19,6 +20,7 @@ struct BuildingPlanOptions {
   WallLineOptions lines;
   DoorOptions doors;
   RegionOptions regions;
+  UnseenWallOptions unseen;
   /// Lines with less wall than this, m, counting both faces, are furniture.
   double min_wall = 2.0;
   /// Lines of walls are drawn on by at most this to meet others, m.

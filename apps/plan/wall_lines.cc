@@ -11,8 +11,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-// Share of a piece's length that must be occupied.
+// Share of a row's length that must be occupied, and of a known face's.
 constexpr double kLeastCovered = 0.5;
+constexpr double kLeastSupport = 0.25;
 
 // What lies on one side of a wall, bent as the map is, is no farther apart than
 // this, m.
@@ -67,8 +68,10 @@ class Returns {
     is_explained_.assign(points_.size(), false);
   }
 
-  // Share of the piece's length beside which there are occupied cells.
-  double Covered(const Vector2d& begin, const Vector2d& end) const {
+  // Whether occupied cells speak for a piece: along a share of its length, and
+  // along as much as was seen through. A wall that was seen at grazing angles
+  // has gaps behind which nothing was seen.
+  bool Support(const Vector2d& begin, const Vector2d& end) const {
     const double length = (end - begin).norm();
     const double step = space_.resolution;
     const int steps = std::max(1, static_cast<int>(length / step));
@@ -76,16 +79,20 @@ class Returns {
     const Vector2d normal(-along[1], along[0]);
     const int reach = static_cast<int>(options_.cell_distance / step);
     int covered = 0;
+    int open = 0;
     for (int i = 0; i < steps; ++i) {
       const Vector2d here = begin + (i + 0.5) * length / steps * along;
       bool is_occupied = false;
-      for (int k = -reach; k <= reach && !is_occupied; ++k) {
-        is_occupied =
-            space_.At(Vector2d(here + k * step * normal)) == Space::kOccupied;
+      bool is_free = true;
+      for (int k = -reach; k <= reach; ++k) {
+        const Space at = space_.At(Vector2d(here + k * step * normal));
+        is_occupied = is_occupied || at == Space::kOccupied;
+        is_free = is_free && at == Space::kFree;
       }
       covered += is_occupied;
+      open += is_free;
     }
-    return static_cast<double>(covered) / steps;
+    return covered >= kLeastSupport * steps && covered >= open;
   }
 
   void Explain(const std::vector<Face>& faces) {
@@ -335,7 +342,7 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
     face.end = piece.end;
     const double length = face.length();
     if (!(length >= options.min_length)) continue;
-    if (returns.Covered(face.begin, face.end) < kLeastCovered) continue;
+    if (!returns.Support(face.begin, face.end)) continue;
     Vector2d along = (face.end - face.begin) / length;
     for (std::size_t i = 0; i < all.size(); ++i) {
       const double cosine = along.dot(all[i]);

@@ -266,6 +266,57 @@ TEST(BuildingPlanTest, WhatWasSeenFromTwoDoorsIsTwoRooms) {
   EXPECT_EQ(rooms(true), 2u);
 }
 
+// Rooms of which each was seen through its own door, and nothing at all of the
+// walls between them.
+TEST(BuildingPlanTest, WallsWithoutATraceKeepRoomsApart) {
+  const auto plan = [](bool is_seen_through) {
+    Drawing drawing(20.0, 10.0);
+    drawing.Room(1.0, 1.0, 19.0, 3.0).Room(1.0, 3.2, 19.0, 8.0);
+    for (const double x : {2.0, 9.0, 16.0}) {
+      drawing.Free(x, 2.9, x + 0.9, 3.3);
+    }
+    for (const double x : {6.0, 12.5}) {
+      drawing.Fill(x, 3.2, x + 0.4, 8.05, Space::kUnknown);
+      if (is_seen_through) drawing.Free(x, 5.0, x + 0.4, 6.0);
+    }
+    return PlanOf(drawing);
+  };
+  const BuildingPlan apart = plan(false);
+  ASSERT_EQ(apart.rooms.size(), 4u);
+  // The walls stand in the middle of what was not seen.
+  std::vector<double> areas;
+  for (const PlanRoom& room : apart.rooms) areas.push_back(room.area);
+  std::sort(areas.begin(), areas.end());
+  EXPECT_NEAR(areas[0], 5.2 * 4.8, 1.0);
+  EXPECT_NEAR(areas[1], 6.3 * 4.8, 1.0);
+  EXPECT_NEAR(areas[2], 6.5 * 4.8, 1.0);
+  EXPECT_EQ(apart.doors.size(), 3u);
+  EXPECT_EQ(plan(true).rooms.size(), 2u);
+}
+
+// A face that was seen at grazing angles: every third cell of it was hit, and
+// nothing was seen behind the others, or it was seen through them.
+TEST(BuildingPlanTest, KnownFacesMayHaveGapsThatNobodyLookedThrough) {
+  const auto rooms = [](bool is_seen_through) {
+    Drawing drawing(14.0, 10.0);
+    drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 13.0, 8.0);
+    drawing.Free(2.0, 2.9, 2.9, 3.3).Free(10.0, 2.9, 10.9, 3.3);
+    for (int i = 0; i < 78; ++i) {
+      const double y = 4.1 + 0.05 * i;
+      drawing.Fill(6.0, y, 6.05, y + 0.05,
+                   i % 3 == 0        ? Space::kOccupied
+                   : is_seen_through ? Space::kFree
+                                     : Space::kUnknown);
+    }
+    KnownWall face;
+    face.begin = {6.025, 4.1};
+    face.end = {6.025, 8.0};
+    return MakeBuildingPlan({face}, {0.0}, drawing.space(), {}).rooms.size();
+  };
+  EXPECT_EQ(rooms(false), 3u);
+  EXPECT_EQ(rooms(true), 2u);
+}
+
 // A corridor of 2 m in which a cupboard stands, 0.4 m deep, in line with the
 // wall of a room beside it.
 TEST(BuildingPlanTest, CupboardsDoNotDivideACorridor) {

@@ -173,6 +173,13 @@ HeatMap MakeHeatMap(const Overview& overview, std::size_t row_axis,
   return map;
 }
 
+// Heat maps beside each other, as many as the window has room for.
+std::string Tiles(const std::vector<HeatMap>& maps) {
+  std::string pictures = "<div class=\"plots\">\n";
+  for (const HeatMap& map : maps) pictures += HeatMapSvg({map});
+  return pictures + "</div>\n";
+}
+
 // The plots, all in one picture or, for a page, each in its own.
 std::string Plots(const Overview& overview, bool one_picture) {
   if (overview.is_table()) {
@@ -180,7 +187,7 @@ std::string Plots(const Overview& overview, bool one_picture) {
     for (const std::string& figure : overview.options.figures) {
       maps.push_back(MakeHeatMap(overview, 0, 1, figure));
     }
-    return HeatMapSvg(maps);
+    return one_picture ? HeatMapSvg(maps) : Tiles(maps);
   }
   std::vector<LinePlot> plots;
   for (const std::string& figure : overview.options.figures) {
@@ -190,7 +197,7 @@ std::string Plots(const Overview& overview, bool one_picture) {
     }
   }
   if (one_picture) return PlotSvg(plots, kPlotColumns);
-  std::string pictures = "<div class=\"plots\">\n";
+  std::string pictures = "<div class=\"plots lines\">\n";
   for (const LinePlot& plot : plots) pictures += PlotSvg({plot});
   return pictures + "</div>\n";
 }
@@ -258,6 +265,8 @@ pre { background: #f4f4f4; padding: 0.7em; white-space: pre-wrap; overflow-wrap:
 table { border-collapse: collapse; font-size: 90%; }
 .wide { overflow-x: auto; }
 .plots { display: flex; flex-wrap: wrap; gap: 0.5em; }
+.plots.lines { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); }
+.plots.lines svg { width: 100%; max-width: 900px; }
 @media (max-width: 600px) { body { margin: 0.7em; } }
 th, td { border: 1px solid #cccccc; padding: 0.25em 0.6em; text-align: right; }
 th { background: #f4f4f4; position: sticky; top: 0; }
@@ -353,7 +362,7 @@ void WritePlots(const Overview& overview, std::ostringstream* output) {
           MakeHeatMap(overview, row, column, overview.options.figures[0]));
     }
   }
-  *output << HeatMapSvg(maps);
+  *output << Tiles(maps);
 }
 
 // Every run with every number that is not the same in all of them.

@@ -121,7 +121,7 @@ TEST(SweepOverviewTest, MoreFlagsGiveALineEachAndMapsOfPairs) {
   const SweepResult result = MakeResult(axes, 1);
   EXPECT_EQ(Count(OverviewSvg(result, options), "<polyline"), 3);
   const std::string page = OverviewHtml(result, options);
-  EXPECT_EQ(Count(page, "<svg"), 3 + 1);
+  EXPECT_EQ(Count(page, "<svg"), 3 + 3);
   EXPECT_EQ(Count(page, "stroke=\"#D55E00\""), 3);
 
   // One at a time only the plots of lines have all their numbers.
@@ -162,7 +162,7 @@ TEST(SweepOverviewTest, ThePageOpensInABrowser) {
   result.definition.evaluate = {"/bin/judge", "{}/trajectory.tum"};
   std::ofstream(folder + "/sweep.html") << OverviewHtml(result, options);
   browser.Open("file://" + folder + "/sweep.html");
-  EXPECT_EQ(browser.Evaluate("document.querySelectorAll('svg').length"), 7);
+  EXPECT_EQ(browser.Evaluate("document.querySelectorAll('svg').length"), 6 + 3);
   EXPECT_EQ(browser.Evaluate("document.querySelectorAll('tr.best').length"), 1);
   EXPECT_EQ(browser.Evaluate(
                 "document.body.scrollWidth <= document.body.clientWidth"),
@@ -188,6 +188,8 @@ TEST(SweepOverviewTest, ThePageOpensInABrowser) {
     const double right =
         of_plots("Math.max(...boxes.map((b) => b.right))").get<double>();
     EXPECT_LE(right, width);
+    // Nor is half of a wide window left empty.
+    EXPECT_GE(right, width - 40.0);
   }
   EXPECT_THAT(browser.complaints(), IsEmpty());
   std::filesystem::remove_all(folder);

@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <unordered_map>
 #include <utility>
 
 namespace plumbline {
@@ -38,6 +39,33 @@ Verdict Judge(const ScanAgreement& agreement, const MapCheckOptions& options) {
   return contradicts ? Verdict::kContradicts : Verdict::kAgrees;
 }
 
+// The returns of scans, those of some of the last ones kept.
+class ScanReturns {
+ public:
+  // Both must outlive it.
+  ScanReturns(const std::vector<Scan>& scans, const ScanPointsOptions& options)
+      : scans_(scans), options_(options) {}
+
+  // Valid until the next call.
+  const std::vector<ScanPoint>& Of(int scan) {
+    if (kept_.size() >= kMostKept) kept_.clear();
+    const auto [entry, is_new] = kept_.try_emplace(scan);
+    if (is_new) {
+      ExtractScanPoints(scans_[static_cast<std::size_t>(scan)], options_,
+                        &entry->second);
+    }
+    return entry->second;
+  }
+
+ private:
+  // As many as lie around a few visits; some megabytes.
+  static constexpr std::size_t kMostKept = 1024;
+
+  const std::vector<Scan>& scans_;
+  const ScanPointsOptions& options_;
+  std::unordered_map<int, std::vector<ScanPoint>> kept_;
+};
+
 // How a scan at a pose agrees with what these key scans saw.
 class MapComparison {
  public:
@@ -47,34 +75,35 @@ class MapComparison {
       : scans_(scans), keys_(keys), poses_(poses), options_(options) {}
 
   // `others`: distance and index of key scans, of which the nearest count.
-  ScanAgreement Compare(
-      int scan_index, const Pose2& pose,
-      std::vector<std::pair<double, std::size_t>> others) const {
+  // `returns`: of the same scans.
+  ScanAgreement Compare(int scan_index, const Pose2& pose,
+                        std::vector<std::pair<double, std::size_t>> others,
+                        ScanReturns* returns) const {
     std::sort(others.begin(), others.end());
     if (static_cast<int>(others.size()) > options_.max_others) {
       others.resize(static_cast<std::size_t>(options_.max_others));
     }
-    std::vector<ScanPoint> points;
     std::vector<ScanPoint> reference;
     std::vector<Viewpoint> viewpoints;
     for (const auto& [distance, j] : others) {
-      const Scan& scan = scans_[static_cast<std::size_t>(keys_[j])];
-      ExtractScanPoints(scan, options_.points, &points);
       const PoseTransform transform(poses_[j]);
       viewpoints.push_back(
-          {transform.Point(scan.laser_offset.head<2>()), reference.size()});
-      for (const ScanPoint& point : points) {
+          {transform.Point(LaserOf(keys_[j])), reference.size()});
+      for (const ScanPoint& point : returns->Of(keys_[j])) {
         reference.push_back(Moved(point, transform));
       }
     }
     ScanMatcher matcher(options_.matcher);
     matcher.SetReference(std::move(reference), std::move(viewpoints));
-    const Scan& scan = scans_[static_cast<std::size_t>(scan_index)];
-    ExtractScanPoints(scan, options_.points, &points);
-    return matcher.Compare(points, pose, scan.laser_offset.head<2>());
+    return matcher.Compare(returns->Of(scan_index), pose, LaserOf(scan_index));
   }
 
  private:
+  // Position of a scan's laser, robot's frame, m.
+  Eigen::Vector2d LaserOf(int scan) const {
+    return scans_[static_cast<std::size_t>(scan)].laser_offset.head<2>();
+  }
+
   const std::vector<Scan>& scans_;
   const std::vector<int>& keys_;
   const std::vector<Pose2>& poses_;
@@ -176,8 +205,10 @@ std::vector<MapContradiction> FindContradictions(
       }
     });
     if (static_cast<int>(others.size()) < options.min_others) return;
+    ScanReturns returns(scans, options.points);
     verdicts[i] = Judge(
-        comparison.Compare(keys[k], poses[k], std::move(others)), options);
+        comparison.Compare(keys[k], poses[k], std::move(others), &returns),
+        options);
   };
   for (std::size_t begin = 0; begin < looked_at.size(); begin += kScansAtOnce) {
     if (stop && stop()) return {};
@@ -242,6 +273,7 @@ std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
   }
   const PlaceGrid grid(poses, options.radius);
   const MapComparison comparison(scans, keys, poses, options);
+  ScanReturns returns(scans, options.points);
   // Key scans near a pose, by the part that they are of.
   const auto near = [&](const Pose2& pose) {
     std::map<std::size_t, std::vector<std::pair<double, std::size_t>>> result;
@@ -272,7 +304,7 @@ std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
       if (stop && stop()) return is_confirmed;
       auto& [part, others] = *other;
       const ScanAgreement agreement =
-          comparison.Compare(keys[k], poses[k], std::move(others));
+          comparison.Compare(keys[k], poses[k], std::move(others), &returns);
       const bool contradicts =
           Judge(agreement, options) == Verdict::kContradicts;
       if (!contradicts && !IsKnown(agreement, options)) continue;
@@ -298,7 +330,8 @@ std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
       }
       fits =
           static_cast<int>(others.size()) >= options.min_others &&
-          IsConfirming(comparison.Compare(i, pose, std::move(others)), options);
+          IsConfirming(comparison.Compare(i, pose, std::move(others), &returns),
+                       options);
     }
     is_confirmed[c] = fits;
   }

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <initializer_list>
 #include <limits>
-#include <queue>
 #include <tuple>
 #include <utility>
 
@@ -41,24 +41,32 @@ constexpr double kFreeShare = 0.03;
 // Peaks: levels of the pyramid, the cells that it reaches beyond the grid, what
 // a point costs where the reference has looked through, the error at the
 // farthest point that a step of the rotation makes, m, and its bounds, rad.
-constexpr int kLevels = 5;
+constexpr int kLevels = 4;
 constexpr int kLevelPad = 1 << (kLevels - 1);
 constexpr std::int16_t kThrough = -128;
 constexpr double kRotationError = 0.15;
 constexpr double kLeastRotation = DegToRad(1.0);
 constexpr double kMostRotation = DegToRad(3.0);
-// Search nodes after which Peaks gives up, and between two questions whether to
-// stop: some hundredths of a second.
+// Search nodes after which Peaks gives up, how many of the coarsest ones, whose
+// scores are added up together, count as one, and nodes between two questions
+// whether to stop: some hundredths of a second.
 constexpr int kMaxNodes = 3000000;
+constexpr std::int64_t kTogether = 4;
 constexpr int kNodesAtOnce = 20000;
 // A point's most score, the points between two looks at what a pose can still
 // come to, and the step in which points are taken.
 constexpr int kMostScore = 255;
 constexpr std::size_t kBoundBlock = 16;
 constexpr std::size_t kSpread = 8;
+// Peaks: one in so many rotations is looked at first.
+constexpr int kFewTurns = 8;
 // Search: one in so many poses of the lattice, each way, is looked at first.
 constexpr int kFewSteps = 3;
 constexpr int kFewRotations = 3;
+// Where the window has at least so many steps each way, squares of poses of
+// this side are left out together.
+constexpr int kManySteps = 8;
+constexpr int kSquare = 4;
 
 // Cosine of the largest angle between the normals of partners.
 constexpr double kSameSide = 0.7;
@@ -101,6 +109,55 @@ std::vector<Eigen::Vector2d> Spread(
   return spread;
 }
 
+// The coarsest scores in the order in which PeakSearch adds them up: those of
+// cells that are a node apart lie beside each other.
+class StridedScores {
+ public:
+  static constexpr int kStride = 1 << (kLevels - 1);
+
+  StridedScores(const std::vector<std::int16_t>& scores, int columns, int rows)
+      : columns_((columns + kStride - 1) / kStride),
+        rows_((rows + kStride - 1) / kStride),
+        scores_(static_cast<std::size_t>(columns_) * rows_ * kStride *
+                kStride) {
+    for (int y = 0; y < rows; ++y) {
+      const std::int16_t* from = &scores[static_cast<std::size_t>(y) * columns];
+      for (int first = 0; first < kStride; ++first) {
+        std::int16_t* to = &scores_[Begin(first, y % kStride, y / kStride)];
+        for (int x = first; x < columns; x += kStride) *to++ = from[x];
+      }
+    }
+  }
+
+  // Adds the scores of the cells (x + kStride * j, y) for j in [0, count).
+  void AddTo(int x, int y, int count, std::int32_t* sums) const {
+    const int row = FloorDivided(y);
+    if (row < 0 || row >= rows_) return;
+    const int column = FloorDivided(x);
+    const int begin = std::max(0, -column);
+    const int end = std::min(count, columns_ - column);
+    if (begin >= end) return;
+    const std::int16_t* scores =
+        &scores_[Begin(x - kStride * column, y - kStride * row, row) +
+                 static_cast<std::size_t>(column + begin)];
+    for (int j = begin; j < end; ++j) sums[j] += *scores++;
+  }
+
+ private:
+  static int FloorDivided(int x) {
+    return x >= 0 ? x / kStride : -((kStride - 1 - x) / kStride);
+  }
+  // Index of the first score of a row of those at (x, y) modulo kStride.
+  std::size_t Begin(int x, int y, int row) const {
+    return ((static_cast<std::size_t>(y) * kStride + x) * rows_ + row) *
+           columns_;
+  }
+
+  int columns_;
+  int rows_;
+  std::vector<std::int16_t> scores_;
+};
+
 // What PeakSearch looks at.
 struct PeakGrid {
   // By level: the best score of 2^level cells each way from a cell on.
@@ -118,16 +175,18 @@ struct PeakGrid {
 class PeakSearch {
  public:
   // `minimum_score`: the least of a peak, of a share of what all points on
-  // surfaces would have.
+  // surfaces would have; `share`: of the best one's score.
   PeakSearch(const PeakGrid& grid, const std::vector<Eigen::Vector2d>& points,
              const Pose2& center, double translation_window,
-             double rotation_window, double minimum_score)
+             double rotation_window, double minimum_score, double share)
       : grid_(grid),
+        coarsest_(grid.levels.back(), grid.columns, grid.rows),
         center_(center),
         window_(
             static_cast<int>(std::ceil(translation_window / grid.resolution))),
         rotation_window_(rotation_window),
         unit_(255.0 * static_cast<double>(points.size())),
+        share_(share),
         least_(minimum_score * unit_) {
     double farthest = 1.0;
     for (const Eigen::Vector2d& point : points) {
@@ -143,41 +202,51 @@ class PeakSearch {
   }
 
   // Opens the coarsest nodes of the window that are within `reach`, m, of a
-  // viewpoint.
+  // viewpoint. Once `stop` has returned true there are none.
   void OpenAll(double reach, const std::function<bool()>& stop) {
-    // Where no point is on the grid no pose has a score.
-    const NodeRange columns = NodesOnGrid(&Cell::x, grid_.columns);
-    const NodeRange rows = NodesOnGrid(&Cell::y, grid_.rows);
-    const std::vector<char> is_near = NearNodes(reach, columns, rows);
-    std::size_t node = 0;
-    for (int i = rows.begin; i < rows.end; ++i) {
-      if (stop && stop()) return;
-      for (int j = columns.begin; j < columns.end; ++j) {
-        if (!is_near[node++]) continue;
-        for (int k = 0; k < static_cast<int>(cells_.size()); ++k) {
-          Open(kLevels - 1, k, j * kStride - window_, i * kStride - window_);
+    const std::vector<NodeRun> runs = NearNodes(reach);
+    std::int64_t count = 0;
+    for (const NodeRun& run : runs) count += run.count;
+    count *= static_cast<std::int64_t>(cells_.size());
+    nodes_ = std::min<std::int64_t>(count / kTogether, kMaxNodes);
+    if (nodes_ >= kMaxNodes) return;
+    // What some rotations lead to leaves little to open at the others.
+    for (const int step : {kFewTurns, 1}) {
+      open_.clear();
+      for (int k = 0; k < static_cast<int>(cells_.size()); k += step) {
+        if (stop && stop()) {
+          open_.clear();
+          return;
         }
+        OpenRotation(k, runs);
       }
     }
+    const auto is_left = [this](const Node& node) {
+      return node.bound >= least_;
+    };
+    open_.erase(std::partition(open_.begin(), open_.end(), is_left),
+                open_.end());
+    std::make_heap(open_.begin(), open_.end());
   }
 
-  // The peaks, best first, that have `share` of the best one's score.
-  std::vector<ScoredPose> Run(double share, int max_peaks,
+  // The peaks, best first, that have the share of the best one's score.
+  std::vector<ScoredPose> Run(int max_peaks,
                               const std::function<bool()>& stop) {
     std::vector<ScoredPose> peaks;
-    int asked_at = nodes_;
+    std::int64_t asked_at = nodes_;
     while (!open_.empty() && static_cast<int>(peaks.size()) < max_peaks &&
            nodes_ < kMaxNodes) {
       if (stop && nodes_ - asked_at >= kNodesAtOnce) {
         if (stop()) return {};
         asked_at = nodes_;
       }
-      const Node node = open_.top();
-      open_.pop();
+      std::pop_heap(open_.begin(), open_.end());
+      const Node node = open_.back();
+      open_.pop_back();
       if (node.bound < least_) break;
       if (IsBesideAny(node, peaks)) continue;
       if (node.level == 0) {
-        if (peaks.empty()) least_ = std::max(least_, share * node.bound);
+        if (peaks.empty()) Raise(node.bound);
         peaks.push_back({PoseOf(node), node.bound / unit_});
       } else {
         Split(node);
@@ -188,7 +257,7 @@ class PeakSearch {
 
  private:
   // Of the coarsest nodes, cells.
-  static constexpr int kStride = 1 << (kLevels - 1);
+  static constexpr int kStride = StridedScores::kStride;
 
   struct Cell {
     int x;
@@ -254,21 +323,68 @@ class PeakSearch {
     return sum;
   }
 
-  void Open(int level, int rotation, int x, int y) {
-    ++nodes_;
-    const int bound = Bound(level, rotation, x, y);
-    if (bound >= least_ && bound > 0) {
-      open_.push({bound, level, rotation, x, y});
+  // No peak has less than its share of what some pose has.
+  void Raise(int score) { least_ = std::max(least_, share_ * score); }
+
+  // Nodes at the corners (x + kStride * j, y), j in [0, count).
+  struct NodeRun {
+    int x;
+    int y;
+    int count;
+  };
+
+  // Opens those of the nodes at a rotation that may hold a peak, and goes from
+  // the best of them down to a pose.
+  void OpenRotation(int rotation, const std::vector<NodeRun>& runs) {
+    Node best{0, kLevels - 1, rotation, 0, 0};
+    for (const NodeRun& run : runs) {
+      sums_.assign(static_cast<std::size_t>(run.count), 0);
+      for (const Cell& cell : cells_[rotation]) {
+        coarsest_.AddTo(cell.x + run.x, cell.y + run.y, run.count,
+                        sums_.data());
+      }
+      for (int j = 0; j < run.count; ++j) {
+        const int bound = sums_[static_cast<std::size_t>(j)];
+        if (bound < least_ || bound <= 0) continue;
+        const Node node{bound, kLevels - 1, rotation, run.x + kStride * j,
+                        run.y};
+        open_.push_back(node);
+        if (best < node) best = node;
+      }
     }
+    while (best.bound > 0 && best.level > 0) best = BestPart(best);
+    Raise(best.bound);
   }
 
-  void Split(const Node& node) {
+  // Calls `visit(x, y)` with the four parts of a node that are in the window.
+  template <typename Visit>
+  void VisitParts(const Node& node, const Visit& visit) const {
     const int half = 1 << (node.level - 1);
     for (int y = node.y; y <= std::min(node.y + half, window_); y += half) {
       for (int x = node.x; x <= std::min(node.x + half, window_); x += half) {
-        Open(node.level - 1, node.rotation, x, y);
+        visit(x, y);
       }
     }
+  }
+
+  Node BestPart(const Node& node) const {
+    Node best{0, node.level - 1, node.rotation, node.x, node.y};
+    VisitParts(node, [&](int x, int y) {
+      const int bound = Bound(best.level, node.rotation, x, y);
+      if (bound > best.bound) best = {bound, best.level, node.rotation, x, y};
+    });
+    return best;
+  }
+
+  void Split(const Node& node) {
+    const int level = node.level - 1;
+    VisitParts(node, [&](int x, int y) {
+      ++nodes_;
+      const int bound = Bound(level, node.rotation, x, y);
+      if (bound < least_ || bound <= 0) return;
+      open_.push_back({bound, level, node.rotation, x, y});
+      std::push_heap(open_.begin(), open_.end());
+    });
   }
 
   // Coarsest nodes along an axis, [begin, end): from -window_ on in steps.
@@ -299,10 +415,33 @@ class PeakSearch {
             static_cast<int>(last / kStride + 1)};
   }
 
+  // The coarsest nodes of which some pose may be within reach, m, of a
+  // viewpoint.
+  std::vector<NodeRun> NearNodes(double reach) const {
+    // Where no point is on the grid no pose has a score.
+    const NodeRange columns = NodesOnGrid(&Cell::x, grid_.columns);
+    const NodeRange rows = NodesOnGrid(&Cell::y, grid_.rows);
+    const std::vector<char> is_near = AreNear(reach, columns, rows);
+    std::vector<NodeRun> runs;
+    std::size_t node = 0;
+    for (int i = rows.begin; i < rows.end; ++i) {
+      bool was_near = false;
+      for (int j = columns.begin; j < columns.end; ++j) {
+        const bool now = is_near[node++] != 0;
+        if (now && !was_near) {
+          runs.push_back({j * kStride - window_, i * kStride - window_, 0});
+        }
+        if (now) ++runs.back().count;
+        was_near = now;
+      }
+    }
+    return runs;
+  }
+
   // By node, a row of columns after the other: whether some pose of it may be
   // within reach, m, of a viewpoint.
-  std::vector<char> NearNodes(double reach, const NodeRange& columns,
-                              const NodeRange& rows) const {
+  std::vector<char> AreNear(double reach, const NodeRange& columns,
+                            const NodeRange& rows) const {
     std::vector<char> is_near(columns.size() * rows.size(),
                               std::isfinite(reach) ? 0 : 1);
     if (is_near.empty() || !std::isfinite(reach)) return is_near;
@@ -353,19 +492,273 @@ class PeakSearch {
   }
 
   const PeakGrid& grid_;
+  const StridedScores coarsest_;
   const Pose2 center_;
   // Cells each way.
   const int window_;
   const double rotation_window_;
   // The largest sum of scores.
   const double unit_;
+  const double share_;
   double least_;
   // Each way.
   int rotations_ = 0;
   // By rotation.
   std::vector<std::vector<Cell>> cells_;
-  std::priority_queue<Node> open_;
-  int nodes_ = 0;
+  // A heap once all are open.
+  std::vector<Node> open_;
+  std::int64_t nodes_ = 0;
+  // Of OpenRotation, kept for its memory.
+  std::vector<std::int32_t> sums_;
+};
+
+// A likelihood field, and where on it a search begins, cells.
+struct FieldView {
+  const std::vector<std::uint8_t>& likelihood;
+  int columns;
+  int rows;
+  double resolution;
+  Eigen::Vector2d begin;
+
+  // The likelihood of a cell; 0 where it is not on the field.
+  int At(int column, int row) const {
+    return static_cast<unsigned>(column) < static_cast<unsigned>(columns) &&
+                   static_cast<unsigned>(row) < static_cast<unsigned>(rows)
+               ? likelihood[static_cast<std::size_t>(row) * columns + column]
+               : 0;
+  }
+};
+
+// The best likelihood of the cells from (column, row) on, so many each way.
+class BestAround {
+ public:
+  BestAround(const FieldView& field, int size)
+      : size_(size),
+        columns_(field.columns + size),
+        rows_(field.rows + size),
+        best_(static_cast<std::size_t>(columns_) * rows_, 0) {
+    // First along the rows, then down the columns.
+    std::vector<std::uint8_t> along(best_.size(), 0);
+    for (int y = 0; y < field.rows; ++y) {
+      const std::uint8_t* const from =
+          &field.likelihood[static_cast<std::size_t>(y) * field.columns];
+      for (int k = 0; k < size; ++k) {
+        std::uint8_t* const to =
+            &along[static_cast<std::size_t>(y + size) * columns_ + size - k];
+        for (int x = 0; x < field.columns; ++x) {
+          to[x] = std::max(to[x], from[x]);
+        }
+      }
+    }
+    for (int y = 0; y < rows_; ++y) {
+      std::uint8_t* const to = &best_[static_cast<std::size_t>(y) * columns_];
+      for (int k = y; k < std::min(y + size, rows_); ++k) {
+        const std::uint8_t* const from =
+            &along[static_cast<std::size_t>(k) * columns_];
+        for (int x = 0; x < columns_; ++x) to[x] = std::max(to[x], from[x]);
+      }
+    }
+  }
+
+  // From the cell of a position on, cells; what is rounded is within the one
+  // cell more.
+  int At(double column, double row) const {
+    const int x = static_cast<int>(column + size_);
+    const int y = static_cast<int>(row + size_);
+    return static_cast<unsigned>(x) < static_cast<unsigned>(columns_) &&
+                   static_cast<unsigned>(y) < static_cast<unsigned>(rows_)
+               ? best_[static_cast<std::size_t>(y) * columns_ + x]
+               : 0;
+  }
+
+ private:
+  int size_;
+  int columns_;
+  int rows_;
+  std::vector<std::uint8_t> best_;
+};
+
+// A pose of the lattice, by its steps from the middle, and its score.
+struct LatticePose {
+  double score = 0.0;
+  int rotation = 0;
+  int row = 0;
+  int column = 0;
+};
+
+// The best of all translations and rotations of a lattice.
+class LatticeSearch {
+ public:
+  // `field` must outlive it. The lattice goes `steps` steps of `step`, m, each
+  // way.
+  LatticeSearch(const FieldView& field,
+                const std::vector<Eigen::Vector2d>& points, double heading,
+                double rotation_window, double rotation_step, int steps,
+                double step)
+      : field_(field),
+        points_(points),
+        heading_(heading),
+        rotation_window_(rotation_window),
+        rotations_(
+            static_cast<int>(std::ceil(rotation_window / rotation_step))),
+        steps_(steps),
+        step_(step),
+        normalization_(1.0 / (kMostScore * points.size())),
+        rotated_(points.size()) {
+    const int side = 2 * steps + 1;
+    penalties_.reserve(static_cast<std::size_t>(side) * side);
+    for (int iy = -steps; iy <= steps; ++iy) {
+      for (int ix = -steps; ix <= steps; ++ix) {
+        penalties_.push_back(0.03 * std::hypot(ix * step, iy * step) / 0.5);
+      }
+    }
+  }
+
+  double Angle(int rotation) const {
+    return rotations_ > 0 ? rotation * (rotation_window_ / rotations_) : 0.0;
+  }
+
+  // The first of the best ones; the middle, with score 0, where nothing fits.
+  LatticePose Run() {
+    if (steps_ >= kManySteps) {
+      SearchSquares();
+    } else {
+      SearchAll();
+    }
+    return best_;
+  }
+
+ private:
+  void SearchAll() {
+    // What the best pose has at least: that of the best of a few.
+    for (int k = -rotations_; k <= rotations_; k += kFewRotations) {
+      Rotate(k);
+      for (int iy = -steps_; iy <= steps_; iy += kFewSteps) {
+        for (int ix = -steps_; ix <= steps_; ix += kFewSteps) {
+          least_ = std::max(least_, ScoreOf(k, ix, iy));
+        }
+      }
+    }
+    for (int k = -rotations_; k <= rotations_; ++k) {
+      Rotate(k);
+      LookAt(k, -steps_, -steps_, 2 * steps_ + 1);
+    }
+  }
+
+  void SearchSquares() {
+    // Cells that a point comes to at the poses of a square, and one more: cells
+    // are rounded towards zero.
+    const BestAround around(
+        field_,
+        static_cast<int>(std::ceil((kSquare - 1) * step_ / field_.resolution)) +
+            2);
+    for (int k = -rotations_; k <= rotations_; k += kFewRotations) {
+      VisitSquares(around, k, [&](int ix, int iy) {
+        least_ = std::max(least_, ScoreOf(k, std::min(ix + 1, steps_),
+                                          std::min(iy + 1, steps_)));
+      });
+    }
+    for (int k = -rotations_; k <= rotations_; ++k) {
+      VisitSquares(around, k,
+                   [&](int ix, int iy) { LookAt(k, ix, iy, kSquare); });
+    }
+  }
+
+  // Calls `visit(ix, iy)` with the first corners of the squares of poses at a
+  // rotation that may hold the best pose.
+  template <typename Visit>
+  void VisitSquares(const BestAround& around, int rotation,
+                    const Visit& visit) {
+    Rotate(rotation);
+    const auto best_at = [&](double x, double y) { return around.At(x, y); };
+    for (int iy = -steps_; iy <= steps_; iy += kSquare) {
+      for (int ix = -steps_; ix <= steps_; ix += kSquare) {
+        // The share of the pose of the square that is nearest to the middle.
+        const double share = ShareOf(rotation, Nearest(ix), Nearest(iy));
+        if (SumOf(ix, iy, share, best_at) >= least_) visit(ix, iy);
+      }
+    }
+  }
+
+  // The step nearest to the middle of those of a square that begins here.
+  int Nearest(int first) const {
+    const int last = std::min(first + kSquare - 1, steps_);
+    return first > 0 ? first : std::min(last, 0);
+  }
+
+  // Takes the best of a square of poses, unless there is a better one.
+  void LookAt(int k, int first_x, int first_y, int size) {
+    for (int iy = first_y; iy < std::min(first_y + size, steps_ + 1); ++iy) {
+      for (int ix = first_x; ix < std::min(first_x + size, steps_ + 1); ++ix) {
+        const double score = ScoreOf(k, ix, iy);
+        if (score < least_ || score <= 0.0) continue;
+        least_ = score;
+        const bool is_first =
+            std::make_tuple(k, iy, ix) <
+            std::make_tuple(best_.rotation, best_.row, best_.column);
+        if (score > best_.score || is_first) best_ = {score, k, iy, ix};
+      }
+    }
+  }
+
+  // Ties go to the pose nearest to the prediction.
+  double ShareOf(int k, int ix, int iy) const {
+    return 1.0 - 0.05 * std::abs(Angle(k)) / DegToRad(30.0) -
+           penalties_[static_cast<std::size_t>(iy + steps_) * (2 * steps_ + 1) +
+                      (ix + steps_)];
+  }
+
+  // The score of a pose whose points are rotated; something below least_ when
+  // it is less than that.
+  double ScoreOf(int k, int ix, int iy) const {
+    return SumOf(ix, iy, ShareOf(k, ix, iy), [this](double x, double y) {
+      return field_.At(static_cast<int>(x), static_cast<int>(y));
+    });
+  }
+
+  template <typename At>
+  double SumOf(int ix, int iy, double share, const At& at) const {
+    const double cx = ix * step_ / field_.resolution;
+    const double cy = iy * step_ / field_.resolution;
+    int sum = 0;
+    for (std::size_t begin = 0; begin < rotated_.size(); begin += kBoundBlock) {
+      const std::size_t end = std::min(begin + kBoundBlock, rotated_.size());
+      const int most =
+          sum + kMostScore * static_cast<int>(rotated_.size() - begin);
+      const double bound = most * normalization_ * share;
+      if (bound < least_) return bound;
+      for (std::size_t i = begin; i < end; ++i) {
+        sum += at(rotated_[i].x() + cx, rotated_[i].y() + cy);
+      }
+    }
+    return sum * normalization_ * share;
+  }
+
+  void Rotate(int k) {
+    const double theta = heading_ + Angle(k);
+    const double c = std::cos(theta) / field_.resolution;
+    const double s = std::sin(theta) / field_.resolution;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      rotated_[i] = field_.begin +
+                    Eigen::Vector2d(c * points_[i].x() - s * points_[i].y(),
+                                    s * points_[i].x() + c * points_[i].y());
+    }
+  }
+
+  const FieldView& field_;
+  const std::vector<Eigen::Vector2d>& points_;
+  const double heading_;
+  const double rotation_window_;
+  // Each way.
+  const int rotations_;
+  const int steps_;
+  const double step_;
+  const double normalization_;
+  std::vector<double> penalties_;
+  std::vector<Eigen::Vector2d> rotated_;
+  // What the best pose has at least.
+  double least_ = 0.0;
+  LatticePose best_;
 };
 
 }  // namespace
@@ -756,6 +1149,10 @@ void ScanMatcher::BuildFree() const {
   if (!field_valid_) BuildField();
   const double resolution = options_.grid_resolution;
   free_.assign(field_.size(), 0);
+  const auto is_on_grid = [this](const Eigen::Vector2d& cell) {
+    return cell.x() >= 0.0 && cell.y() >= 0.0 && cell.x() < field_columns_ &&
+           cell.y() < field_rows_;
+  };
   for (std::size_t v = 0; v < viewpoints_.size(); ++v) {
     const Eigen::Vector2d origin =
         (viewpoints_[v].position - origin_) / resolution;
@@ -769,14 +1166,19 @@ void ScanMatcher::BuildFree() const {
           std::min(length - kFreeMargin / resolution, kFreeReach / resolution);
       if (!(reach > 0.0)) continue;
       const Eigen::Vector2d step = ray / length;
-      for (double along = 0.0; along < reach; along += 1.0) {
-        const Eigen::Vector2d cell = origin + along * step;
-        if (!(cell.x() >= 0.0 && cell.y() >= 0.0 && cell.x() < field_columns_ &&
-              cell.y() < field_rows_)) {
-          break;
-        }
+      const auto mark = [&](const Eigen::Vector2d& cell) {
         free_[static_cast<std::size_t>(cell.y()) * field_columns_ +
               static_cast<std::size_t>(cell.x())] = 1;
+      };
+      const int count = static_cast<int>(std::ceil(reach));
+      if (is_on_grid(origin) && is_on_grid(origin + (count - 1) * step)) {
+        for (int k = 0; k < count; ++k) mark(origin + k * step);
+        continue;
+      }
+      for (int k = 0; k < count; ++k) {
+        const Eigen::Vector2d cell = origin + k * step;
+        if (!is_on_grid(cell)) break;
+        mark(cell);
       }
     }
   }
@@ -804,16 +1206,19 @@ void ScanMatcher::BuildLevels() const {
     best.resize(finer.size());
     const int half = 1 << (level - 1);
     // Beyond the grid nothing is known.
-    const auto at = [&](int x, int y) -> std::int16_t {
-      return x < columns && y < rows
-                 ? finer[static_cast<std::size_t>(y) * columns + x]
-                 : static_cast<std::int16_t>(0);
-    };
+    const std::vector<std::int16_t> beyond(static_cast<std::size_t>(columns),
+                                           0);
+    std::vector<std::int16_t> both(static_cast<std::size_t>(columns + half), 0);
     for (int y = 0; y < rows; ++y) {
+      const std::int16_t* const upper =
+          &finer[static_cast<std::size_t>(y) * columns];
+      const std::int16_t* const lower =
+          y + half < rows ? &finer[static_cast<std::size_t>(y + half) * columns]
+                          : beyond.data();
+      for (int x = 0; x < columns; ++x) both[x] = std::max(upper[x], lower[x]);
+      std::int16_t* const row = &best[static_cast<std::size_t>(y) * columns];
       for (int x = 0; x < columns; ++x) {
-        best[static_cast<std::size_t>(y) * columns + x] =
-            std::max({at(x, y), at(x + half, y), at(x, y + half),
-                      at(x + half, y + half)});
+        row[x] = std::max(both[x], both[x + half]);
       }
     }
   }
@@ -830,9 +1235,9 @@ std::vector<ScoredPose> ScanMatcher::Peaks(
       levels_, field_columns_ + kLevelPad, field_rows_ + kLevelPad,
       origin_, options_.grid_resolution,   viewpoints_};
   PeakSearch search(grid, points, center, translation_window, rotation_window,
-                    minimum_score);
+                    minimum_score, share);
   search.OpenAll(reach, stop);
-  return search.Run(share, max_peaks, stop);
+  return search.Run(max_peaks, stop);
 }
 
 ScanAgreement ScanMatcher::Compare(const std::vector<ScanPoint>& scan,
@@ -930,97 +1335,19 @@ Pose2 ScanMatcher::Search(const std::vector<ScanPoint>& scan,
 
   points = Spread(points);
 
-  const double resolution = options_.grid_resolution;
-  const int rotations =
-      static_cast<int>(std::ceil(rotation_window / options_.rotation_step));
   const int steps = static_cast<int>(
       std::ceil(translation_window / options_.search_step - 1e-9));
-  const Eigen::Vector2d shift = (center.head<2>() - origin_) / resolution;
-  const double normalization = 1.0 / (kMostScore * points.size());
-  std::vector<Eigen::Vector2d> rotated(points.size());
-  const auto angle = [&](int k) {
-    return rotations > 0 ? k * (rotation_window / rotations) : 0.0;
-  };
-  const auto rotate = [&](int k) {
-    const double theta = center[2] + angle(k);
-    const double c = std::cos(theta) / resolution;
-    const double s = std::sin(theta) / resolution;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      rotated[i] =
-          shift + Eigen::Vector2d(c * points[i].x() - s * points[i].y(),
-                                  s * points[i].x() + c * points[i].y());
-    }
-  };
-  const int side = 2 * steps + 1;
-  std::vector<double> penalties;
-  penalties.reserve(static_cast<std::size_t>(side) * side);
-  for (int iy = -steps; iy <= steps; ++iy) {
-    for (int ix = -steps; ix <= steps; ++ix) {
-      penalties.push_back(
-          0.03 *
-          std::hypot(ix * options_.search_step, iy * options_.search_step) /
-          0.5);
-    }
-  }
-  // The score of a pose of the lattice, whose points are rotated; something
-  // below `least` when it is less than that.
-  const auto value_at = [&](int k, int ix, int iy, double least) {
-    // Ties go to the pose nearest to the prediction.
-    const double share =
-        1.0 - 0.05 * std::abs(angle(k)) / DegToRad(30.0) -
-        penalties[static_cast<std::size_t>(iy + steps) * side + (ix + steps)];
-    const double cx = ix * options_.search_step / resolution;
-    const double cy = iy * options_.search_step / resolution;
-    int sum = 0;
-    for (std::size_t begin = 0; begin < rotated.size(); begin += kBoundBlock) {
-      const std::size_t end = std::min(begin + kBoundBlock, rotated.size());
-      const int most =
-          sum + kMostScore * static_cast<int>(rotated.size() - begin);
-      const double bound = most * normalization * share;
-      if (bound < least) return bound;
-      for (std::size_t i = begin; i < end; ++i) {
-        const int column = static_cast<int>(rotated[i].x() + cx);
-        const int row = static_cast<int>(rotated[i].y() + cy);
-        if (static_cast<unsigned>(column) <
-                static_cast<unsigned>(field_columns_) &&
-            static_cast<unsigned>(row) < static_cast<unsigned>(field_rows_)) {
-          sum +=
-              field_[static_cast<std::size_t>(row) * field_columns_ + column];
-        }
-      }
-    }
-    return sum * normalization * share;
-  };
-  // What the best pose has at least: that of the best of a few.
-  double least = 0.0;
-  for (int k = -rotations; k <= rotations; k += kFewRotations) {
-    rotate(k);
-    for (int iy = -steps; iy <= steps; iy += kFewSteps) {
-      for (int ix = -steps; ix <= steps; ix += kFewSteps) {
-        least = std::max(least, value_at(k, ix, iy, least));
-      }
-    }
-  }
-  Pose2 best = center;
+  const FieldView field{
+      field_, field_columns_, field_rows_, options_.grid_resolution,
+      (center.head<2>() - origin_) / options_.grid_resolution};
+  LatticeSearch search(field, points, center[2], rotation_window,
+                       options_.rotation_step, steps, options_.search_step);
+  const LatticePose best = search.Run();
+  if (score != nullptr) *score = best.score;
   // Where nothing fits at all the prediction stands.
-  double best_score = 0.0;
-  for (int k = -rotations; k <= rotations; ++k) {
-    rotate(k);
-    for (int iy = -steps; iy <= steps; ++iy) {
-      for (int ix = -steps; ix <= steps; ++ix) {
-        const double value = value_at(k, ix, iy, std::max(least, best_score));
-        if (value > best_score && value >= least) {
-          best_score = value;
-          best = Pose2(center[0] + ix * options_.search_step,
-                       center[1] + iy * options_.search_step,
-                       center[2] + angle(k));
-        }
-      }
-    }
-  }
-  best[2] = NormalizeAngle(best[2]);
-  if (score != nullptr) *score = best_score;
-  return best;
+  return Pose2(center[0] + best.column * options_.search_step,
+               center[1] + best.row * options_.search_step,
+               NormalizeAngle(center[2] + search.Angle(best.rotation)));
 }
 
 }  // namespace plumbline

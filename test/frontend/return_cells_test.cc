@@ -5,7 +5,9 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <random>
+#include <set>
 #include <vector>
 
 namespace plumbline {
@@ -39,6 +41,24 @@ TEST(ReturnCellsTest, ReturnsOfOneCellAreGathered) {
   EXPECT_NEAR((cell.mean - Vector2d(1.02, 2.02)).norm(), 0.0, 1e-12);
   EXPECT_NEAR((cell.view - Vector2d(-2.0, -1.0)).norm(), 0.0, 1e-12);
   EXPECT_THAT(cell.scans, ElementsAre(3u, 5u));
+}
+
+// Negative numbers cannot be shifted: sanitizers look at this one (test/fuzz).
+TEST(ReturnCellsTest, EveryCellHasAKeyOfItsOwn) {
+  std::set<std::int64_t> keys;
+  for (std::int64_t column : {-3, -1, 0, 1, 3}) {
+    for (std::int64_t row : {-3, -1, 0, 1, 3}) {
+      keys.insert(CellKey(column, row));
+    }
+  }
+  EXPECT_EQ(keys.size(), 25u);
+  ReturnCells returns(kCell, kRadius, kGap);
+  for (const double x : {-7.03, 7.03}) {
+    for (const double y : {-4.02, 4.02}) returns.Add({x, y}, {1.0, 0.0}, 0);
+  }
+  returns.Finish();
+  EXPECT_EQ(returns.cells().size(), 4u);
+  EXPECT_THAT(Near(returns, {-7.0, -4.0}, 0.1), ElementsAre(0));
 }
 
 // Single returns all around a wall that was seen twenty times leave it no

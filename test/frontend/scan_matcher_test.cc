@@ -188,6 +188,50 @@ TEST(ScanMatcherTest, SearchFindsAWrongTurn) {
   }
 }
 
+// Wide windows leave out squares of poses together.
+TEST(ScanMatcherTest, AWideSearchFindsWhatALookAtEveryPoseFinds) {
+  const ScanMatcherOptions options = Options();
+  ScanMatcher matcher(options);
+  matcher.SetReference(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)));
+  const Pose2 truth(-0.3, 0.3, 0.3);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
+  constexpr int kSteps = 10;
+  constexpr int kTurns = 8;
+  for (const Pose2& off : {Pose2(1.2, -0.9, 0.1), Pose2(-1.35, 0.3, -0.12),
+                           Pose2(3.0, 2.0, 0.05), Pose2(30.0, 0.0, 0.0)}) {
+    SCOPED_TRACE(off.transpose());
+    const Pose2 guess = truth + off;
+    double expected = 0.0;
+    for (int k = -kTurns; k <= kTurns; ++k) {
+      for (int y = -kSteps; y <= kSteps; ++y) {
+        for (int x = -kSteps; x <= kSteps; ++x) {
+          const Pose2 step(x * options.search_step, y * options.search_step,
+                           k * options.rotation_step);
+          double score = 0.0;
+          matcher.Search(scan, guess + step, 0.0, 0.0, &score);
+          expected = std::max(
+              expected,
+              score * (1.0 - 0.05 * std::abs(step[2]) / DegToRad(30.0) -
+                       0.06 * step.head<2>().norm()));
+        }
+      }
+    }
+    double score = -1.0;
+    const Pose2 found =
+        matcher.Search(scan, guess, kSteps * options.search_step,
+                       kTurns * options.rotation_step, &score);
+    // A point at the edge of a cell may fall to either side.
+    EXPECT_NEAR(score, expected, 0.01);
+    if (off.head<2>().norm() < 1.6) {
+      EXPECT_LT(PositionError(found, truth), 0.15);
+    }
+    if (expected == 0.0) {
+      EXPECT_EQ(found, guess);
+    }
+  }
+}
+
 TEST(ScanMatcherTest, SearchStaysInItsWindow) {
   ScanMatcher matcher(Options());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
@@ -555,6 +599,38 @@ TEST(ScanMatcherTest, PeaksFindThePoseFromAnywhere) {
       matcher
           .Peaks(Positions(scan), Pose2(50.0, 0.0, 0.0), 3.0, kPi, 0.2, 0.3, 5)
           .empty());
+}
+
+TEST(ScanMatcherTest, NoPoseScoresMoreThanTheFirstPeak) {
+  ScanMatcher matcher(Options());
+  const Pose2 from(-0.5, 0.2, 0.1);
+  matcher.SetReference(Seen(RoomWithPillar(), from), {{from.head<2>(), 0}});
+  const std::vector<Eigen::Vector2d> points = Positions(PointsOf(
+      MakeScan(RoomWithPillar(), Pose2(0.6, -0.8, 0.2), FullCircle())));
+  // The last two lie where the walls end, and beyond.
+  for (const Pose2& center :
+       {Pose2(0.2, -0.5, 0.1), Pose2(3.4, 2.4, 0.3), Pose2(-6.0, 1.0, 0.0)}) {
+    SCOPED_TRACE(center.transpose());
+    constexpr int kCells = 9;
+    constexpr double kTurn = DegToRad(4.0);
+    double expected = 0.0;
+    for (const double turn : {-kTurn, 0.0, kTurn}) {
+      for (int y = -kCells; y <= kCells; ++y) {
+        for (int x = -kCells; x <= kCells; ++x) {
+          const std::vector<ScoredPose> here =
+              matcher.Peaks(points, center + Pose2(0.1 * x, 0.1 * y, turn), 0.0,
+                            0.0, 0.0, 0.0, 1);
+          if (!here.empty()) expected = std::max(expected, here[0].score);
+        }
+      }
+    }
+    const std::vector<ScoredPose> peaks =
+        matcher.Peaks(points, center, 0.1 * kCells, kTurn, 0.01, 0.5, 5);
+    ASSERT_EQ(peaks.empty(), expected < 0.01) << expected;
+    if (!peaks.empty()) {
+      EXPECT_GE(peaks[0].score, expected - 0.01);
+    }
+  }
 }
 
 TEST(ScanMatcherTest, PeaksOfARoomThatLooksTheSameTurnedRound) {

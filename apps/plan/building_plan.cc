@@ -457,11 +457,13 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
   std::vector<WallLine> lines =
       FindWallLines(walls, directions, space, options.lines);
   // The edges of furniture are no walls.
-  const auto furniture = std::stable_partition(
-      lines.begin(), lines.end(),
-      [&](const WallLine& line) { return line.weight >= options.min_wall; });
-  const std::vector<WallLine> short_lines(furniture, lines.end());
-  lines.erase(furniture, lines.end());
+  const std::vector<double> wall = WallOfChains(lines, options.min_wall);
+  std::vector<WallLine> long_lines, short_lines;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    (wall[i] >= options.min_wall ? long_lines : short_lines)
+        .push_back(lines[i]);
+  }
+  lines = std::move(long_lines);
   std::vector<DrawnLine> drawn = DrawLines(lines, options.reach);
   MeasureLines(space, options.doors, &drawn);
   const std::vector<WallLine> partitions =

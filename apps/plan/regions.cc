@@ -1,10 +1,10 @@
+#include <plumbline/core/disjoint_sets.h>
 #include <plumbline/plan/min_cut.h>
 #include <plumbline/plan/regions.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -208,32 +208,6 @@ bool IsNarrow(const Polygon& polygon, double width) {
   return Offset(polygon, -0.5 * width).empty();
 }
 
-// Sets that grow together; the least member names each.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t size) : parents_(size) {
-    std::iota(parents_.begin(), parents_.end(), 0);
-  }
-  int Find(int i) {
-    int root = i;
-    while (parents_[static_cast<std::size_t>(root)] != root) {
-      root = parents_[static_cast<std::size_t>(root)];
-    }
-    while (parents_[static_cast<std::size_t>(i)] != root) {
-      i = std::exchange(parents_[static_cast<std::size_t>(i)], root);
-    }
-    return root;
-  }
-  void Join(int a, int b) {
-    a = Find(a);
-    b = Find(b);
-    parents_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parents_;
-};
-
 // Which faces lie where their region is wider than a corridor.
 std::vector<bool> WideFaces(const Arrangement& arrangement,
                             const std::vector<int>& region, double width) {
@@ -282,7 +256,7 @@ double WidestChain(const std::vector<StraightPiece>& pieces) {
       for (const Vector2d& a : {pieces[i].first, pieces[i].second}) {
         for (const Vector2d& b : {pieces[j].first, pieces[j].second}) {
           if ((a - b).norm() < kSameCorner) {
-            chains.Join(static_cast<int>(i), static_cast<int>(j));
+            chains.Join(i, j);
           }
         }
       }
@@ -291,8 +265,7 @@ double WidestChain(const std::vector<StraightPiece>& pieces) {
   double widest = 0.0;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      if (chains.Find(static_cast<int>(i)) != chains.Find(static_cast<int>(j)))
-        continue;
+      if (chains.Find(i) != chains.Find(j)) continue;
       for (const Vector2d& a : {pieces[i].first, pieces[i].second}) {
         for (const Vector2d& b : {pieces[j].first, pieces[j].second}) {
           widest = std::max(widest, (a - b).norm());
@@ -318,24 +291,26 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
   for (const ArrangementEdge& edge : arrangement.edges) {
     if (is_within(edge) && is_wide[static_cast<std::size_t>(edge.left)] ==
                                is_wide[static_cast<std::size_t>(edge.right)]) {
-      pieces.Join(edge.left, edge.right);
+      pieces.Join(static_cast<std::size_t>(edge.left),
+                  static_cast<std::size_t>(edge.right));
     }
   }
   // Narrow pieces and the wide ones beside them.
-  std::map<int, std::map<int, std::vector<StraightPiece>>> borders;
+  std::map<std::size_t, std::map<std::size_t, std::vector<StraightPiece>>>
+      borders;
   for (const ArrangementEdge& edge : arrangement.edges) {
     if (!is_within(edge)) continue;
-    int narrow = edge.left;
-    int wide = edge.right;
-    if (is_wide[static_cast<std::size_t>(narrow)]) std::swap(narrow, wide);
+    auto narrow = static_cast<std::size_t>(edge.left);
+    auto wide = static_cast<std::size_t>(edge.right);
+    if (is_wide[narrow]) std::swap(narrow, wide);
     if (pieces.Find(narrow) == pieces.Find(wide)) continue;
     borders[pieces.Find(narrow)][pieces.Find(wide)].emplace_back(edge.begin,
                                                                  edge.end);
   }
-  std::map<int, std::vector<Polygon>> faces;
+  std::map<std::size_t, std::vector<Polygon>> faces;
   for (std::size_t i = 0; i < region->size(); ++i) {
     if ((*region)[i] < 0) continue;
-    faces[pieces.Find(static_cast<int>(i))].push_back(arrangement.faces[i]);
+    faces[pieces.Find(i)].push_back(arrangement.faces[i]);
   }
   DisjointSets joined(region->size());
   for (const auto& [narrow, wides] : borders) {
@@ -358,8 +333,46 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
   }
   for (std::size_t i = 0; i < region->size(); ++i) {
     if ((*region)[i] < 0) continue;
-    (*region)[i] = joined.Find(pieces.Find(static_cast<int>(i)));
+    (*region)[i] = static_cast<int>(joined.Find(pieces.Find(i)));
   }
+}
+
+// Faces of no region in unseen spaces behind furniture: small and narrow as a
+// whole, up to the walls around them.
+std::vector<bool> HiddenFaces(const Arrangement& arrangement,
+                              const RegionOptions& options,
+                              const std::vector<int>& region) {
+  const std::size_t size = arrangement.faces.size();
+  DisjointSets spaces(size);
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    if (edge.left < 0 || edge.right < 0 ||
+        region[static_cast<std::size_t>(edge.left)] >= 0 ||
+        region[static_cast<std::size_t>(edge.right)] >= 0 ||
+        -Openness(edge.lengths) >= options.holds_apart) {
+      continue;
+    }
+    spaces.Join(static_cast<std::size_t>(edge.left),
+                static_cast<std::size_t>(edge.right));
+  }
+  std::map<std::size_t, std::vector<Polygon>> faces;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (region[i] >= 0) continue;
+    faces[spaces.Find(i)].push_back(arrangement.faces[i]);
+  }
+  std::vector<bool> is_hidden(size, false);
+  for (std::size_t i = 0; i < size; ++i) {
+    if (region[i] >= 0) continue;
+    const std::vector<Polygon>& parts = faces[spaces.Find(i)];
+    double area = 0.0;
+    for (const Polygon& part : parts) area += part.Area();
+    if (area > kMaxPocket) continue;
+    const std::vector<Polygon> outlines = UnionOf(parts);
+    is_hidden[i] = std::all_of(outlines.begin(), outlines.end(),
+                               [&](const Polygon& whole) {
+                                 return IsNarrow(whole, options.pocket_width);
+                               });
+  }
+  return is_hidden;
 }
 
 // What is too small for a room goes to the neighbor from which least keeps it
@@ -381,14 +394,15 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
       rooms.insert(id);
     }
   }
+  const std::vector<bool> is_hidden =
+      HiddenFaces(arrangement, options, *region);
   // Pockets have numbers of their own: the region's, or that of the face.
   std::vector<int> pocket(size, -1);
   std::map<int, double> seen;
   for (std::size_t i = 0; i < size; ++i) {
     if ((*region)[i] >= 0) {
       if (rooms.count((*region)[i]) == 0) pocket[i] = (*region)[i];
-    } else if (arrangement.faces[i].Area() <= kMaxPocket &&
-               IsNarrow(arrangement.faces[i], options.pocket_width)) {
+    } else if (is_hidden[i]) {
       pocket[i] = static_cast<int>(i);
     }
     if (pocket[i] >= 0) seen[pocket[i]] += arrangement.free[i];

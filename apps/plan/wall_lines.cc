@@ -1,8 +1,11 @@
+#include <plumbline/core/disjoint_sets.h>
 #include <plumbline/plan/wall_lines.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <queue>
 #include <tuple>
 
@@ -15,6 +18,10 @@ using Eigen::Vector2d;
 constexpr double kLeastCovered = 0.5;
 constexpr double kLeastSupport = 0.25;
 
+// Chords of a curved wall: between their ends, m, and directions, rad.
+constexpr double kChainGap = 0.4;
+constexpr double kLeastBend = DegToRad(2.0);
+constexpr double kLargestBend = DegToRad(25.0);
 // What lies on one side of a wall, bent as the map is, is no farther apart than
 // this, m.
 constexpr double kOneSide = 0.2;
@@ -326,6 +333,26 @@ void Add(const Face& face, Group* group) {
   line.high -= middle;
 }
 
+// Whether one line goes on where the other one ends, as chords of a curved wall
+// do.
+bool GoesOn(const WallLine& a, const WallLine& b) {
+  const double cosine = std::abs(a.along.dot(b.along));
+  if (cosine < std::cos(kLargestBend) || cosine > std::cos(kLeastBend)) {
+    return false;
+  }
+  for (const double end : {a.begin, a.end}) {
+    const Vector2d here = a.At(end);
+    for (const double other : {b.begin, b.end}) {
+      if ((b.At(other) - here).norm() > kChainGap) continue;
+      // Away from each other.
+      const Vector2d from = a.At(a.begin + a.end - end) - here;
+      const Vector2d to = b.At(b.begin + b.end - other) - b.At(other);
+      if (from.dot(to) < 0.0) return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
@@ -399,6 +426,28 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
   lines.reserve(groups.size());
   for (const Group& group : groups) lines.push_back(group.line);
   return lines;
+}
+
+std::vector<double> WallOfChains(const std::vector<WallLine>& lines,
+                                 double longest) {
+  DisjointSets chains(lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines[i].weight >= longest) continue;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (lines[j].weight < longest && GoesOn(lines[i], lines[j])) {
+        chains.Join(i, j);
+      }
+    }
+  }
+  std::map<std::size_t, double> wall;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    wall[chains.Find(i)] += lines[i].weight;
+  }
+  std::vector<double> of_lines;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    of_lines.push_back(wall[chains.Find(i)]);
+  }
+  return of_lines;
 }
 
 }  // namespace plumbline

@@ -73,6 +73,12 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
                                     const SpaceGrid& space,
                                     const WallLineOptions& options = {});
 
+/// Metres of wall in the chain that each line belongs to. Lines with less than
+/// `longest` metres of wall that go on from end to end, with a bend between
+/// them, are the chords of one curved wall.
+std::vector<double> WallOfChains(const std::vector<WallLine>& lines,
+                                 double longest);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_PLAN_WALL_LINES_H_

@@ -317,6 +317,37 @@ TEST(BuildingPlanTest, KnownFacesMayHaveGapsThatNobodyLookedThrough) {
   EXPECT_EQ(rooms(true), 2u);
 }
 
+// A room with one wall that is an arc, whose chords are all shorter than a wall
+// must be.
+TEST(BuildingPlanTest, ChordsOfAnArcCloseARoom) {
+  const auto arc = [](double y) {
+    return -2.0 + std::sqrt(36.0 - (y - 5.0) * (y - 5.0));
+  };
+  Drawing drawing(12.0, 10.0);
+  drawing.Room(1.0, 1.0, 9.0, 9.0);
+  double area = 0.0;
+  for (double y = 0.95; y < 9.0; y += 0.05) {
+    const double x = arc(y + 0.025);
+    drawing.Fill(0.9, y, x - 0.05, y + 0.05, Space::kUnknown);
+    drawing.Fill(x - 0.05, y, x + 0.05, y + 0.05, Space::kOccupied);
+    area += 0.05 * (9.0 - x);
+  }
+  std::vector<KnownWall> chords;
+  for (double y = 1.0; y < 8.5; y += 1.0) {
+    KnownWall chord;
+    chord.begin = {arc(y), y};
+    chord.end = {arc(y + 1.0), y + 1.0};
+    chords.push_back(chord);
+  }
+  const BuildingPlan plan =
+      MakeBuildingPlan(chords, {0.0}, drawing.space(), {});
+  ASSERT_EQ(plan.rooms.size(), 1u);
+  EXPECT_NEAR(plan.rooms[0].area, area, 2.0);
+  for (const Vector2d& corner : plan.rooms[0].outline.shell) {
+    EXPECT_GT(corner[0], arc(corner[1]) - 0.3);
+  }
+}
+
 // A corridor of 2 m in which a cupboard stands, 0.4 m deep, in line with the
 // wall of a room beside it.
 TEST(BuildingPlanTest, CupboardsDoNotDivideACorridor) {

@@ -1,0 +1,58 @@
+#include <gtest/gtest.h>
+#include <plumbline/plan/regions.h>
+
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+// Faces of 4 m one above the other, with these heights, m: the lowest was seen,
+// and there is wall around each but between the others.
+Arrangement Stack(const std::vector<double>& heights) {
+  constexpr double kWidth = 4.0;
+  Arrangement arrangement;
+  const auto add = [&](const Vector2d& begin, const Vector2d& end, int left,
+                       int right, bool is_wall) {
+    ArrangementEdge edge;
+    edge.begin = begin;
+    edge.end = end;
+    edge.left = left;
+    edge.right = right;
+    const Mark mark = is_wall ? Mark::kWall : Mark::kUnknown;
+    edge.lengths.metres[static_cast<std::size_t>(mark)] = edge.length();
+    edge.lengths.holds = (is_wall ? 1.0 : 0.2) * edge.length();
+    arrangement.edges.push_back(edge);
+  };
+  double low = 0.0;
+  const int count = static_cast<int>(heights.size());
+  for (int i = 0; i < count; ++i) {
+    const double high = low + heights[static_cast<std::size_t>(i)];
+    Polygon face;
+    face.shell = {{0.0, low}, {kWidth, low}, {kWidth, high}, {0.0, high}};
+    arrangement.faces.push_back(face);
+    arrangement.free.push_back(i == 0 ? face.Area() : 0.0);
+    arrangement.unknown.push_back(i == 0 ? 0.0 : face.Area());
+    if (i == 0) add({0.0, low}, {kWidth, low}, i, -1, true);
+    add({kWidth, low}, {kWidth, high}, i, -1, true);
+    add({0.0, high}, {0.0, low}, i, -1, true);
+    add({kWidth, high}, {0.0, high}, i, i + 1 < count ? i + 1 : -1,
+        i == 0 || i + 1 == count);
+    low = high;
+  }
+  return arrangement;
+}
+
+TEST(RegionsTest, NarrowSpaceBehindFurnitureBelongsToItsRoom) {
+  EXPECT_EQ(FindRegions(Stack({3.0, 0.7})), (std::vector<int>{0, 0}));
+}
+
+// Nothing is known between the two upper faces: they are one space, and that is
+// no narrow one.
+TEST(RegionsTest, UnseenSpaceBehindAWallIsNoPocket) {
+  EXPECT_EQ(FindRegions(Stack({3.0, 0.7, 0.8})), (std::vector<int>{0, -1, -1}));
+}
+
+}  // namespace
+}  // namespace plumbline

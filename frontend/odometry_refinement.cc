@@ -147,6 +147,12 @@ double OdometryCost(double squared_innovation, double scale) {
   return scale * std::log1p(squared_innovation / scale);
 }
 
+// Share of the returns on what the reference has seen, of all that do not lie
+// in the unknown.
+double Support(const ScanAgreement& a) {
+  return static_cast<double>(a.hits) / std::max(1, a.hits + a.intruders);
+}
+
 // How much of a scan the reference explains, at most 1.
 double Quality(const ScanAgreement& a) {
   return (a.hits * (1.0 - SeenThrough(a)) - 2.0 * a.intruders) /
@@ -338,6 +344,8 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
   const bool believed =
       ratio >= least && match->inliers >= options_.minimum_points &&
       (agrees || here.hits >= tracking.min_hits) &&
+      (agrees || !track_.after_gap ||
+       Support(here) >= tracking.min_unexpected_support) &&
       !((track_.after_gap || !agrees) && Contradicts(here, before));
   if (!believed && (track_.after_gap || Contradicts(there, before))) {
     outcome->verdict = Outcome::Verdict::kContradicted;
@@ -694,11 +702,11 @@ bool OdometryRefiner::Judge(const TrackView& view, const ScoredPose& peak,
       is_global ? tracking.min_global_inliers : tracking.min_tie_inliers;
   const double inliers =
       match.inlier_ratio / std::max(kLeastKnown, KnownShare(sum));
+  hypothesis->support = Support(sum);
   hypothesis->quality = Quality(sum) * std::min(1.0, inliers);
   hypothesis->holds =
       peak.score >= tracking.min_tie_score &&
-      sum.hits >= min_support * (sum.hits + sum.intruders) &&
-      inliers >= min_inliers &&
+      hypothesis->support >= min_support && inliers >= min_inliers &&
       SeenThrough(sum) <= tracking.max_tie_seen_through + seen_through &&
       KnownShare(sum) >= tracking.min_tie_known &&
       sum.hits >= tracking.min_tie_hits * static_cast<int>(view.keys.size());
@@ -789,9 +797,15 @@ void OdometryRefiner::Tie(bool last) {
               return std::vector<Visit>{{&reference, 0, 0}};
             },
             open_->keys[middle].pose, window, 0, end, open_->seen_through,
-            false, &found) &&
-        AgreesWithOdometry(found, middle, archive_.size() - 1)) {
-      first.tie = TrackTie::kMatched;
+            false, &found)) {
+      const bool is_expected =
+          AgreesWithOdometry(found, middle, archive_.size() - 1);
+      // Where the robot was carried the right place need not be among those
+      // that were searched, and the next door looks like this one.
+      if (is_expected || (!open_->odometry_holds &&
+                          found.support >= tracking.min_unexpected_support)) {
+        first.tie = TrackTie::kMatched;
+      }
     }
   }
   if (first.tie == TrackTie::kNone && count >= tracking.first_global_keys &&
@@ -806,7 +820,8 @@ void OdometryRefiner::Tie(bool last) {
                       &found)) {
       const std::size_t nearest = NearestOf(found, where);
       const ArchivedKey& key = archive_[nearest];
-      if (AgreesWithOdometry(found, middle, nearest)) {
+      if (!open_->odometry_holds ||
+          AgreesWithOdometry(found, middle, nearest)) {
         first.tie = TrackTie::kMatched;
         first.since = key.scan;
         first.since_key.mean = key.pose;
@@ -887,7 +902,6 @@ UncertainPose2 OdometryRefiner::BlindMotion() const {
 bool OdometryRefiner::AgreesWithOdometry(const Hypothesis& found,
                                          std::size_t middle,
                                          std::size_t since) const {
-  if (!open_->odometry_holds) return true;
   std::vector<Pose2> before;
   for (std::size_t k = since; k < archive_.size(); ++k) {
     // A guess lies between.

@@ -100,6 +100,9 @@ struct TrackingOptions {
   double max_tie_seen_through = 0.15;
   double min_tie_known = 0.4;
   int min_tie_hits = 15;
+  /// The same share where odometry, which a gap or a contradiction has put in
+  /// doubt, speaks of another place: also for a single scan after a gap.
+  double min_unexpected_support = 0.97;
   /// What a tie needs that was found in everything seen so far, where many
   /// places look alike and the right one need not be among them.
   double min_global_support = 0.96;
@@ -430,6 +433,9 @@ class OdometryRefiner {
   struct Hypothesis {
     Pose2 pose = Pose2::Zero();
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    // Share of the returns on what was seen there, of all that do not lie in
+    // the unknown.
+    double support = 0.0;
     double quality = 0.0;
     bool holds = false;
     std::size_t begin = 0;

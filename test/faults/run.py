@@ -542,7 +542,8 @@ def interrupts(solve, count, rng, datasets):
             step = last_step(said)
             spent = cpu_seconds(process.pid)
             begin = time.monotonic()
-            process.send_signal(signal.SIGINT)
+            # send_signal would take the status of one that has just ended.
+            os.kill(process.pid, signal.SIGINT)
             status, total, _ = finish(process)
             wall = time.monotonic() - begin
             if not alive or spent is None or status == 0:

@@ -44,6 +44,8 @@ constexpr double kDeepestFurniture = 0.8;
 constexpr double kAtTheEnd = 0.4;
 // Share of a partition that may look open: laser points go astray.
 constexpr double kMostSeenThrough = 0.05;
+// Metres of wall in a partition that may have doors.
+constexpr double kLeastPartition = 1.5;
 
 // Where two lines meet: along each.
 bool Crossing(const WallLine& a, const WallLine& b, double* t_a, double* t_b) {
@@ -428,8 +430,11 @@ std::vector<WallLine> FindPartitions(const std::vector<WallLine>& lines,
     Measure(space, &whole);
     const auto& marks = whole.profile.marks;
     const auto open = std::count(marks.begin(), marks.end(), Mark::kOpen);
-    if (static_cast<double>(open) <=
-        kMostSeenThrough * static_cast<double>(marks.size())) {
+    const auto wall = std::count(marks.begin(), marks.end(), Mark::kWall);
+    const auto all = static_cast<double>(marks.size());
+    const bool is_wall = line.weight >= kLeastPartition &&
+                         static_cast<double>(wall) >= kWallThere * all;
+    if (is_wall || static_cast<double>(open) <= kMostSeenThrough * all) {
       found.push_back(line);
     }
   }

@@ -65,10 +65,10 @@ std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
                                  double reach);
 
 /// Those of `lines` in a direction of the building that reach from wall to wall
-/// without a place that was seen through: a partition of which little was seen,
-/// at grazing angles or behind furniture, while furniture itself leaves gaps to
-/// the walls beside it. `drawn` has the profiles of the lines that are known to
-/// be walls.
+/// and are wall for the most part, or without a place that was seen through: a
+/// partition of which little was seen, at grazing angles or behind furniture,
+/// while furniture itself leaves gaps to the walls beside it. `drawn` has the
+/// profiles of the lines that are known to be walls.
 std::vector<WallLine> FindPartitions(const std::vector<WallLine>& lines,
                                      const std::vector<DrawnLine>& drawn,
                                      const SpaceGrid& space, double reach);

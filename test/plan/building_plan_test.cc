@@ -317,6 +317,20 @@ TEST(BuildingPlanTest, KnownFacesMayHaveGapsThatNobodyLookedThrough) {
   EXPECT_EQ(rooms(true), 2u);
 }
 
+// A partition of 1.7 m with a door of 0.9 m, from wall to wall; a cupboard of
+// the same length that stands alone.
+TEST(BuildingPlanTest, AShortPartitionWithADoorKeepsRoomsApart) {
+  const auto rooms = [](double width) {
+    Drawing drawing(14.0, 12.0);
+    drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 1.0 + width, 10.0);
+    drawing.Free(2.0, 2.9, 2.9, 3.3);
+    drawing.Fill(1.0, 6.0, 2.7, 6.05, Space::kOccupied);
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms(2.6), 3u);
+  EXPECT_EQ(rooms(5.0), 2u);
+}
+
 // A room with one wall that is an arc, whose chords are all shorter than a wall
 // must be.
 TEST(BuildingPlanTest, ChordsOfAnArcCloseARoom) {

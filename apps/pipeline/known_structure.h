@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_PIPELINE_KNOWN_STRUCTURE_H_
 #define PLUMBLINE_PIPELINE_KNOWN_STRUCTURE_H_
 
+#include <plumbline/core/constraint.h>
 #include <plumbline/core/feature.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
@@ -115,12 +116,19 @@ class KnownStructureBinder {
   std::vector<std::string> Notes() const;
 
  private:
-  struct Wall;
-  std::vector<Wall> Walls() const;
-  const Wall* WallAt(const std::vector<Wall>& walls,
-                     const Eigen::Vector2d& point) const;
-  // Pose of the plan's frame in the map's, or why there is none.
-  std::optional<Pose2> PlacePlan(const std::function<bool()>& stop);
+  struct MapWall;
+  struct LineBeside;
+  std::vector<MapWall> Walls() const;
+  const MapWall* WallAt(const std::vector<MapWall>& walls,
+                        const Eigen::Vector2d& point) const;
+  // Places the plan and adds its pose; false, with a note, where there is no
+  // place for it.
+  bool AddPlan(const std::function<bool()>& stop);
+  // The line to tie a wall to, which has this pose in the plan.
+  std::optional<LineBeside> NearestLine(const MapWall& wall,
+                                        const Pose2& in_plan) const;
+  Constraint MakeTie(const MapWall& wall, const Pose2& in_plan,
+                     const LineBeside& beside) const;
 
   const KnownStructure& known_;
   const Registry& registry_;

@@ -10,6 +10,7 @@
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/log_solver.h>
+#include <plumbline/pipeline/plan_placement.h>
 
 #include <cmath>
 #include <map>
@@ -288,6 +289,78 @@ TEST_F(PlanTest, ThePlanOfAnotherBuildingIsNotUsed) {
   EXPECT_THAT(with.notes, Contains(HasSubstr("the plan is not used")));
   EXPECT_THAT(with.notes, Not(Contains(HasSubstr("tied"))));
   EXPECT_EQ(with.trajectory, without.trajectory);
+}
+
+// A room of 10 m by 6 m with a wall that goes 4 m into it, 3 m from its left.
+std::vector<PlanLine> UnevenRoom() {
+  const auto line = [](double x1, double y1, double x2, double y2) {
+    PlanLine result;
+    result.begin = {x1, y1};
+    result.end = {x2, y2};
+    return result;
+  };
+  return {line(0, 0, 10, 0), line(10, 0, 10, 6), line(10, 6, 0, 6),
+          line(0, 6, 0, 0), line(3, 0, 3, 4)};
+}
+
+// The walls that lines of a plan are in a map whose pose in it this is.
+std::vector<Wall> WallsOf(const std::vector<PlanLine>& plan,
+                          const Pose2& map_in_plan) {
+  std::vector<Wall> walls;
+  for (const PlanLine& line : plan) {
+    const Wall wall = MakePlanWall(line);
+    walls.push_back(
+        MakeWall(Between(map_in_plan, wall.pose()), wall.begin, wall.end));
+  }
+  return walls;
+}
+
+TEST(PlanPlacementTest, APlanLineIsAWallAroundItsMiddle) {
+  PlanLine line;
+  line.begin = {1.0, 2.0};
+  line.end = {1.0, 6.0};
+  const Wall wall = MakePlanWall(line);
+  EXPECT_NEAR((wall.At(wall.begin) - line.begin).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((wall.At(wall.end) - line.end).norm(), 0.0, 1e-12);
+  EXPECT_NEAR(wall.angle, 0.5 * kPi, 1e-12);
+}
+
+TEST(PlanPlacementTest, IsFoundFromAnyPose) {
+  KnownStructure known;
+  known.plan = UnevenRoom();
+  for (const Pose2& pose : {Pose2(0.0, 0.0, 0.0), Pose2(40.0, -25.0, 2.3)}) {
+    const PlanPlacement placement = PlacePlan(known, WallsOf(known.plan, pose));
+    ASSERT_TRUE(placement.map_in_plan) << placement.note;
+    const Pose2 error = Between(pose, *placement.map_in_plan);
+    EXPECT_LT(error.head<2>().norm(), 0.05);
+    EXPECT_LT(std::abs(error[2]), DegToRad(0.5));
+    EXPECT_THAT(placement.note, HasSubstr("agrees with"));
+  }
+}
+
+TEST(PlanPlacementTest, ARoomThatFitsTwiceIsNotPlaced) {
+  KnownStructure known;
+  known.plan = UnevenRoom();
+  known.plan.pop_back();
+  const PlanPlacement placement =
+      PlacePlan(known, WallsOf(known.plan, Pose2(1.0, 2.0, 0.3)));
+  EXPECT_FALSE(placement.map_in_plan);
+  EXPECT_THAT(placement.note, HasSubstr("fits in two places"));
+}
+
+TEST(PlanPlacementTest, SaysNothingWhenItIsStopped) {
+  KnownStructure known;
+  known.plan = UnevenRoom();
+  const PlanPlacement placement = PlacePlan(
+      known, WallsOf(known.plan, Pose2(1.0, 2.0, 0.3)), [] { return true; });
+  EXPECT_FALSE(placement.map_in_plan);
+  EXPECT_EQ(placement.note, "");
+}
+
+TEST(PlanPlacementTest, SaysThatThereAreNoWalls) {
+  KnownStructure known;
+  known.plan = UnevenRoom();
+  EXPECT_THAT(PlacePlan(known, {}).note, HasSubstr("no walls"));
 }
 
 }  // namespace

@@ -1,0 +1,426 @@
+#include <plumbline/core/number_text.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/frontend/scan_matcher.h>
+#include <plumbline/frontend/scan_points.h>
+#include <plumbline/pipeline/plan_placement.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Points along lines of the plan, along walls in the search, and along walls
+// when a place is judged, lie so far apart, m.
+constexpr double kLineSpacing = 0.1;
+constexpr double kSearchSpacing = 0.4;
+constexpr double kJudgeSpacing = 0.5;
+// Walls within this of a middle, m, are looked for together; middles lie so far
+// apart, m, and there are so many at most.
+constexpr double kPartRadius = 12.0;
+constexpr double kPartSpacing = 8.0;
+constexpr std::size_t kMostParts = 8;
+// Parts of fewer points say too little.
+constexpr std::size_t kLeastPartPoints = 10;
+constexpr double kLeastScore = 0.5;
+// They are looked for at turns that give the walls of the map directions of the
+// plan: those with this share of what the best turn has, and this much, rad, to
+// either side.
+constexpr double kSameDirection = DegToRad(15.0);
+constexpr double kTurnShare = 0.25;
+constexpr double kTurnWindow = DegToRad(3.0);
+constexpr double kScoreShare = 0.8;
+constexpr int kMostPeaks = 8;
+// A wall lies on a line within this, m and rad; and while a place is refined,
+// from far to near.
+constexpr double kAgreeDistance = 0.15;
+constexpr double kAgreeAngle = DegToRad(5.0);
+constexpr double kRefineDistances[] = {0.8, 0.5, 0.3, 0.3, 0.2, 0.2};
+// Two places of the plan are one when they are so near, m and rad.
+constexpr double kSamePlace = 1.5;
+constexpr double kSameTurn = DegToRad(8.0);
+// A place that is found again, from another part: m and rad.
+constexpr double kKnownDistance = 0.4;
+constexpr double kKnownTurn = DegToRad(2.0);
+// Directions of agreeing walls have to differ by this, rad.
+constexpr double kLeastSpread = DegToRad(25.0);
+// Lines reach so far beyond their ends, m.
+constexpr double kOverhang = 0.2;
+
+// Difference of two directions without sense, in [0, pi/2].
+double AngleBetween(double a, double b) {
+  return std::abs(NormalizeAxial(a - b));
+}
+
+// Lengths and angles in notes.
+std::string Fixed(double value, int decimals) {
+  std::string text;
+  AppendFixed(value, decimals, &text);
+  return text;
+}
+
+// The line nearest to a point of a wall, plan frame, that has its direction
+// within `max_angle`; -1 for none within `max_distance`.
+int NearestLine(const std::vector<Wall>& lines, const Eigen::Vector2d& point,
+                double direction, double max_distance, double max_angle,
+                double* distance) {
+  int nearest = -1;
+  double least = max_distance;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const Wall& line = lines[i];
+    const double across = line.Across(point);
+    if (std::abs(across) >= least ||
+        std::abs(line.Along(point)) > line.end + kOverhang ||
+        AngleBetween(direction, line.angle) > max_angle) {
+      continue;
+    }
+    least = std::abs(across);
+    nearest = static_cast<int>(i);
+    *distance = across;
+  }
+  return nearest;
+}
+
+// A point of a wall, map frame, and the wall's direction.
+struct WallPoint {
+  Eigen::Vector2d position;
+  double direction;
+  // Every direction that walls have counts the same: along a corridor walls
+  // agree wherever the plan lies.
+  double weight;
+};
+
+void WeighByDirection(std::vector<WallPoint>* points) {
+  const auto count_near = [points](double direction) {
+    return std::count_if(
+        points->begin(), points->end(), [direction](const WallPoint& other) {
+          return AngleBetween(direction, other.direction) < kSameDirection;
+        });
+  };
+  // A direction of next to nothing does not decide.
+  const double least = 0.05 * static_cast<double>(points->size());
+  for (WallPoint& point : *points) {
+    point.weight =
+        1.0 / std::max(least, static_cast<double>(count_near(point.direction)));
+  }
+}
+
+// Turns of the map, rad, that give most of its walls a direction of the plan,
+// both ways round.
+std::vector<double> TurnsOf(const std::vector<WallPoint>& points,
+                            const std::vector<Wall>& lines) {
+  constexpr int kBins = 180;
+  const auto bin_of = [](double angle) {
+    const double share = angle / kPi - std::floor(angle / kPi);
+    return static_cast<int>(share * kBins) % kBins;
+  };
+  // The plan's a little blurred.
+  std::vector<double> of_plan(kBins, 0.0);
+  std::vector<double> of_map(kBins, 0.0);
+  for (const Wall& line : lines) {
+    for (int k = -2; k <= 2; ++k) {
+      of_plan[static_cast<std::size_t>((bin_of(line.angle) + k + kBins) %
+                                       kBins)] += line.end / (1 + std::abs(k));
+    }
+  }
+  for (const WallPoint& point : points) {
+    of_map[static_cast<std::size_t>(bin_of(point.direction))] += 1.0;
+  }
+  std::vector<double> sums(kBins, 0.0);
+  for (int shift = 0; shift < kBins; ++shift) {
+    for (int k = 0; k < kBins; ++k) {
+      sums[static_cast<std::size_t>(shift)] +=
+          of_map[static_cast<std::size_t>(k)] *
+          of_plan[static_cast<std::size_t>((k + shift) % kBins)];
+    }
+  }
+  const double most = *std::max_element(sums.begin(), sums.end());
+  std::vector<double> turns;
+  for (int shift = 0; shift < kBins; ++shift) {
+    bool is_peak = sums[static_cast<std::size_t>(shift)] >= kTurnShare * most;
+    for (int k = 1; k <= 3; ++k) {
+      const double left =
+          sums[static_cast<std::size_t>((shift - k + kBins) % kBins)];
+      const double right = sums[static_cast<std::size_t>((shift + k) % kBins)];
+      is_peak = is_peak && sums[static_cast<std::size_t>(shift)] > left &&
+                sums[static_cast<std::size_t>(shift)] >= right;
+    }
+    if (!is_peak) continue;
+    turns.push_back(NormalizeAngle(shift * kPi / kBins));
+    turns.push_back(NormalizeAngle(shift * kPi / kBins + kPi));
+  }
+  return turns;
+}
+
+// Moves the pose of the map in the plan to where points lie on lines.
+Pose2 Refined(const std::vector<WallPoint>& points,
+              const std::vector<Wall>& lines, Pose2 pose) {
+  for (const double reach : kRefineDistances) {
+    Eigen::Matrix3d information = 1e-6 * Eigen::Matrix3d::Identity();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    const PoseTransform transform(pose);
+    for (const WallPoint& point : points) {
+      const Eigen::Vector2d position = transform.Point(point.position);
+      double offset = 0.0;
+      const int line = NearestLine(lines, position, point.direction + pose[2],
+                                   reach, kAgreeAngle, &offset);
+      if (line < 0) continue;
+      const double theta = lines[static_cast<std::size_t>(line)].angle;
+      const Eigen::Vector2d normal(-std::sin(theta), std::cos(theta));
+      const Eigen::Vector2d arm = position - pose.head<2>();
+      const Eigen::Vector3d row(normal.x(), normal.y(),
+                                normal.dot(Eigen::Vector2d(-arm.y(), arm.x())));
+      const double weight = 1.0 / (1.0 + std::pow(offset / 0.1, 2));
+      information += weight * row * row.transpose();
+      gradient += weight * offset * row;
+    }
+    pose -= information.ldlt().solve(gradient);
+    pose[2] = NormalizeAngle(pose[2]);
+  }
+  return pose;
+}
+
+// Points along the lines of the plan, as a reference to search in.
+std::vector<ScanPoint> SamplesOf(const std::vector<Wall>& lines) {
+  std::vector<ScanPoint> samples;
+  for (const Wall& line : lines) {
+    const PoseTransform transform(line.pose());
+    const int steps = static_cast<int>(2.0 * line.end / kLineSpacing);
+    for (int k = 0; k <= steps; ++k) {
+      ScanPoint point;
+      point.position =
+          transform.Point(Eigen::Vector2d(-line.end + k * kLineSpacing, 0.0));
+      point.normal = transform.Direction(Eigen::Vector2d(0.0, 1.0));
+      point.range = 1.0;
+      point.beam = 0;
+      samples.push_back(point);
+    }
+  }
+  return samples;
+}
+
+// Points along the walls of the map, by which places of the plan are judged.
+std::vector<WallPoint> PointsOn(const std::vector<Wall>& walls) {
+  std::vector<WallPoint> points;
+  for (const Wall& wall : walls) {
+    const int steps =
+        std::max(1, static_cast<int>(wall.length() / kJudgeSpacing));
+    for (int k = 0; k < steps; ++k) {
+      points.push_back({wall.At(wall.begin + (k + 0.5) * wall.length() / steps),
+                        wall.angle, 0.0});
+    }
+  }
+  WeighByDirection(&points);
+  return points;
+}
+
+// Middles of the longest walls, some way apart: parts of the map lie around
+// them.
+std::vector<Eigen::Vector2d> PartMiddles(std::vector<Wall> walls) {
+  std::stable_sort(
+      walls.begin(), walls.end(),
+      [](const Wall& a, const Wall& b) { return a.length() > b.length(); });
+  std::vector<Eigen::Vector2d> middles;
+  for (const Wall& wall : walls) {
+    const Eigen::Vector2d middle = wall.Middle();
+    const bool is_apart = std::all_of(
+        middles.begin(), middles.end(), [&](const Eigen::Vector2d& other) {
+          return (other - middle).norm() >= kPartSpacing;
+        });
+    if (is_apart && middles.size() < kMostParts) middles.push_back(middle);
+  }
+  return middles;
+}
+
+// Points of the walls around a middle, seen from there.
+std::vector<Eigen::Vector2d> PartAround(const Eigen::Vector2d& middle,
+                                        const std::vector<Wall>& walls) {
+  std::vector<Eigen::Vector2d> part;
+  for (const Wall& wall : walls) {
+    for (double s = wall.begin; s <= wall.end; s += kSearchSpacing) {
+      const Eigen::Vector2d point = wall.At(s) - middle;
+      if (point.norm() <= kPartRadius) part.push_back(point);
+    }
+  }
+  return part;
+}
+
+// A place of the map in the plan.
+struct Place {
+  Pose2 pose = Pose2::Zero();
+  // Length of walls that lie on lines, m, and the largest angle between these.
+  double agreeing = 0.0;
+  double spread = 0.0;
+  // That length with its weights.
+  double score = 0.0;
+};
+
+Place Judged(const std::vector<WallPoint>& points,
+             const std::vector<Wall>& lines, const Pose2& pose) {
+  Place place;
+  place.pose = pose;
+  const PoseTransform transform(place.pose);
+  double first = 0.0;
+  for (const WallPoint& point : points) {
+    double offset = 0.0;
+    if (NearestLine(lines, transform.Point(point.position),
+                    point.direction + place.pose[2], kAgreeDistance,
+                    kAgreeAngle, &offset) < 0) {
+      continue;
+    }
+    if (place.agreeing == 0.0) first = point.direction;
+    place.spread = std::max(place.spread, AngleBetween(first, point.direction));
+    place.agreeing += kJudgeSpacing;
+    place.score += point.weight;
+  }
+  return place;
+}
+
+// Whether one of the places puts the middle of a part where a peak does.
+bool IsKnown(const std::vector<Place>& places, const Eigen::Vector2d& middle,
+             const Pose2& peak) {
+  return std::any_of(places.begin(), places.end(), [&](const Place& other) {
+    const Eigen::Vector2d there = PoseTransform(other.pose).Point(middle);
+    return (there - peak.head<2>()).norm() < kKnownDistance &&
+           std::abs(NormalizeAngle(other.pose[2] - peak[2])) < kKnownTurn;
+  });
+}
+
+// Searches for parts of a map among the lines of a plan.
+class PartSearch {
+ public:
+  PartSearch(const std::vector<Wall>& lines,
+             const std::vector<WallPoint>& points,
+             const std::function<bool()>& stop)
+      : matcher_(ScanMatcherOptions()),
+        turns_(TurnsOf(points, lines)),
+        stop_(stop) {
+    std::vector<ScanPoint> samples = SamplesOf(lines);
+    Eigen::Vector2d low = Eigen::Vector2d::Constant(1e300);
+    Eigen::Vector2d high = -low;
+    for (const ScanPoint& sample : samples) {
+      low = low.cwiseMin(sample.position);
+      high = high.cwiseMax(sample.position);
+    }
+    center_ = 0.5 * (low + high);
+    window_ = 0.5 * (high - low).maxCoeff() + 2.0;
+    matcher_.SetReference(std::move(samples));
+  }
+
+  // Poses of a part in the plan.
+  std::vector<Pose2> Find(const std::vector<Eigen::Vector2d>& part) const {
+    std::vector<Pose2> poses;
+    for (const double turn : turns_) {
+      for (const ScoredPose& peak :
+           matcher_.Peaks(part, Pose2(center_.x(), center_.y(), turn), window_,
+                          kTurnWindow, kLeastScore, kScoreShare, kMostPeaks,
+                          std::numeric_limits<double>::infinity(), stop_)) {
+        poses.push_back(peak.pose);
+      }
+    }
+    return poses;
+  }
+
+ private:
+  ScanMatcher matcher_;
+  std::vector<double> turns_;
+  std::function<bool()> stop_;
+  // Of the plan, and how far the search goes from there.
+  Eigen::Vector2d center_;
+  double window_;
+};
+
+// Places of the map where one of its parts fits the plan, the one with the
+// highest score first; none once `stop` has returned true.
+std::vector<Place> FindPlaces(const std::vector<Wall>& walls,
+                              const std::vector<WallPoint>& points,
+                              const std::vector<Eigen::Vector2d>& middles,
+                              const std::vector<Wall>& lines,
+                              const std::function<bool()>& stop) {
+  const PartSearch search(lines, points, stop);
+  std::vector<Place> places;
+  for (const Eigen::Vector2d& middle : middles) {
+    if (stop && stop()) return {};
+    const std::vector<Eigen::Vector2d> part = PartAround(middle, walls);
+    if (part.size() < kLeastPartPoints) continue;
+    for (const Pose2& peak : search.Find(part)) {
+      if (stop && stop()) return {};
+      if (IsKnown(places, middle, peak)) continue;
+      places.push_back(
+          Judged(points, lines,
+                 Refined(points, lines,
+                         Compose(peak, Pose2(-middle.x(), -middle.y(), 0.0)))));
+    }
+  }
+  std::stable_sort(
+      places.begin(), places.end(),
+      [](const Place& a, const Place& b) { return a.score > b.score; });
+  return places;
+}
+
+// Why the best of these places is not to be believed; empty when it is.
+// `length`: of all walls, m; `middle`: of a part of the map.
+std::string WhyRefused(const KnownStructure& known,
+                       const std::vector<Place>& places, double length,
+                       const Eigen::Vector2d& middle) {
+  if (places.empty() || places.front().agreeing < known.min_agreeing_length ||
+      places.front().agreeing < known.min_agreeing_share * length ||
+      places.front().spread < kLeastSpread) {
+    return "the plan is not used: " +
+           Fixed(places.empty() ? 0.0 : places.front().agreeing, 1) + " m of " +
+           Fixed(length, 1) +
+           " m of walls agree with it at the best place, too little or all of "
+           "one direction";
+  }
+  const Place& best = places.front();
+  for (const Place& rival : places) {
+    // Where the middle of the map lies tells them apart.
+    const Eigen::Vector2d moved = PoseTransform(rival.pose).Point(middle) -
+                                  PoseTransform(best.pose).Point(middle);
+    const double turn = std::abs(NormalizeAngle(rival.pose[2] - best.pose[2]));
+    if (moved.norm() < kSamePlace && turn < kSameTurn) continue;
+    if (rival.score < known.rival_share * best.score) continue;
+    return "the plan is not used: it fits in two places, " +
+           Fixed(moved.norm(), 2) + " m and " + Fixed(RadToDeg(turn), 1) +
+           " degrees apart, with " + Fixed(best.agreeing, 1) + " m and " +
+           Fixed(rival.agreeing, 1) + " m of walls";
+  }
+  return {};
+}
+
+}  // namespace
+
+Wall MakePlanWall(const PlanLine& line) {
+  const Eigen::Vector2d along = line.end - line.begin;
+  const double length = along.norm();
+  return {0.5 * (line.begin + line.end), std::atan2(along.y(), along.x()),
+          along / length, -0.5 * length, 0.5 * length};
+}
+
+PlanPlacement PlacePlan(const KnownStructure& known,
+                        const std::vector<Wall>& walls,
+                        const std::function<bool()>& stop) {
+  std::vector<Wall> lines;
+  for (const PlanLine& line : known.plan) lines.push_back(MakePlanWall(line));
+  if (walls.empty() || lines.empty()) {
+    return {std::nullopt,
+            "the plan is not used: there are no walls to compare"};
+  }
+  double length = 0.0;
+  for (const Wall& wall : walls) length += wall.length();
+  const std::vector<Eigen::Vector2d> middles = PartMiddles(walls);
+  const std::vector<Place> places =
+      FindPlaces(walls, PointsOn(walls), middles, lines, stop);
+  if (stop && stop()) return {};
+  const std::string why = WhyRefused(known, places, length, middles.front());
+  if (!why.empty()) return {std::nullopt, why};
+  return {places.front().pose,
+          "the plan agrees with " + Fixed(places.front().agreeing, 1) +
+              " m of " + Fixed(length, 1) + " m of walls where it is placed"};
+}
+
+}  // namespace plumbline

@@ -302,87 +302,38 @@ struct Edge {
   Constraint constraint;
 };
 
-class Reader {
+[[noreturn]] void Fail(const std::string& name, int line,
+                       const std::string& what, const std::string& expected) {
+  // Fields of the file may be any bytes.
+  throw Error(name, line, PrintableUtf8(what), expected);
+}
+
+// The fields of a line, with errors that say where they are.
+class LineFields {
  public:
-  Reader(const std::string& name, const Registry& registry,
-         const G2oOptions& options)
-      : name_(name), registry_(registry) {
-    file_.options = options;
-    for (const FeatureType* type : registry.features()) {
-      feature_types_[type->name] = type;
-      vertex_tags_[type->g2o_tag] = {type, nullptr};
-      for (const G2oVertexFormat& format : type->other_g2o_formats) {
-        vertex_tags_[format.tag] = {type, &format};
-      }
-    }
-    for (const RelationType* type : registry.relations()) {
-      edge_tags_[type->g2o_tag] = {type, nullptr};
-      for (const G2oEdgeFormat& format : type->other_g2o_formats) {
-        edge_tags_[format.tag] = {type, &format};
-      }
-    }
+  explicit LineFields(const std::string& name) : name_(name) {}
+
+  // `text` must outlive the fields.
+  void Set(int line, const std::string& text) {
+    line_ = line;
+    Split(text, &fields_);
   }
 
-  G2oFile Read(std::istream& input, Graph* graph) {
-    if (graph->num_features() > 0 || graph->num_constraints() > 0) {
-      throw PLUMBLINE_ERROR("the graph holds features already",
-                            "an empty graph");
-    }
-    first_feature_ = graph->feature_id_end();
-    first_constraint_ = graph->constraint_id_end();
-    file_.file_ids.assign(static_cast<std::size_t>(first_feature_), kNoId);
-    std::string line;
-    while (std::getline(input, line)) {
-      // The last line counts as ended unless the input ended before.
-      file_.ends_with_line_feed = !input.eof();
-      ++line_;
-      if (line_ == 1) RemoveByteOrderMark(&line);
-      file_.lines.push_back({G2oLine::Kind::kText, line, kNoId});
-      ReadLine(line);
-    }
-    if (input.bad()) throw Error(name_, line_, "cannot read on", "");
-    if (features_.empty() && unknown_ids_.empty()) NameVertices();
-    if (features_.empty() && !first_unknown_.tag.empty()) {
-      Fail(first_unknown_.line,
-           "no vertex or edge of the file has a known tag; the first is " +
-               first_unknown_.tag,
-           "a graph of the plane (VERTEX_SE2, EDGE_SE2 and others); graphs "
-           "in three dimensions are not solved");
-    }
-    Transaction transaction;
-    AddFeatures(&transaction);
-    std::vector<const Edge*> added = AddConstraints(&transaction);
-    try {
-      graph->Apply(transaction);
-    } catch (const Error&) {
-      // The graph knows what is wrong but not where.
-      for (std::size_t i = 0; i < added.size(); ++i) {
-        const ConstraintFault fault =
-            FindFault(transaction.added_constraints()[i], transaction);
-        if (!fault.what.empty()) {
-          Fail(added[i]->line, fault.what, fault.expected);
-        }
-      }
-      throw;
-    }
-    TakeFingerprints(*graph);
-    return std::move(file_);
-  }
+  int line() const { return line_; }
+  bool empty() const { return fields_.empty(); }
+  std::size_t size() const { return fields_.size(); }
+  std::string_view operator[](std::size_t i) const { return fields_[i]; }
 
- private:
-  enum class Above { kNothing, kEdge, kUnknown };
-
-  [[noreturn]] void Fail(int line, const std::string& what,
+  [[noreturn]] void Fail(const std::string& what,
                          const std::string& expected) const {
-    // Fields of the file may be any bytes.
-    throw Error(name_, line, PrintableUtf8(what), expected);
+    plumbline::Fail(name_, line_, what, expected);
   }
 
   std::int64_t Integer(std::string_view field, const std::string& what,
                        std::int64_t minimum, std::int64_t maximum) const {
     std::int64_t value = 0;
     if (!ParseNumber(field, &value) || value < minimum || value > maximum) {
-      Fail(line_, what + " is \"" + std::string(field) + "\"",
+      Fail(what + " is \"" + std::string(field) + "\"",
            "a whole number from " + std::to_string(minimum) + " to " +
                std::to_string(maximum));
     }
@@ -396,7 +347,7 @@ class Reader {
   double Number(std::string_view field) const {
     double value = 0.0;
     if (!ParseNumber(field, &value) || !std::isfinite(value)) {
-      Fail(line_, "\"" + std::string(field) + "\"", "a finite number");
+      Fail("\"" + std::string(field) + "\"", "a finite number");
     }
     return value;
   }
@@ -404,7 +355,7 @@ class Reader {
   std::string Source(std::string_view field) const {
     std::string source;
     if (!ParseSource(field, &source)) {
-      Fail(line_, "source \"" + std::string(field) + "\"",
+      Fail("source \"" + std::string(field) + "\"",
            "two hexadecimal digits after each %");
     }
     return source;
@@ -412,18 +363,58 @@ class Reader {
 
   void ExpectFields(std::size_t count, const std::string& what) const {
     if (fields_.size() != count + 1) {
-      Fail(line_,
-           std::string(fields_[0]) + " has " +
+      Fail(std::string(fields_[0]) + " has " +
                std::to_string(fields_.size() - 1) + " fields",
            std::to_string(count) + " (" + what + ")");
     }
   }
 
-  // The line that is being read.
-  G2oLine& Line() { return file_.lines.back(); }
+ private:
+  const std::string& name_;
+  int line_ = 0;
+  std::vector<std::string_view> fields_;
+};
 
-  void ReadLine(const std::string& line) {
-    Split(line, &fields_);
+// What the lines of a file say.
+struct Records {
+  std::vector<Feature> features;
+  // Position in `features` by the id in the file.
+  std::unordered_map<std::int64_t, std::size_t> index;
+  // Ids of vertices with unknown tags.
+  std::unordered_set<std::int64_t> unknown_ids;
+  UnknownLine first_unknown;
+  std::vector<FixLine> fix_lines;
+  std::vector<ExtraFields> extra_fields;
+  std::vector<FeatureLine> feature_lines;
+  std::vector<Edge> edges;
+};
+
+// Reads lines one by one into records.
+class LineReader {
+ public:
+  LineReader(const std::string& name, const Registry& registry,
+             FeatureId first_feature, G2oFile* file, Records* records)
+      : first_feature_(first_feature),
+        file_(file),
+        records_(records),
+        fields_(name) {
+    for (const FeatureType* type : registry.features()) {
+      vertex_tags_[type->g2o_tag] = {type, nullptr};
+      for (const G2oVertexFormat& format : type->other_g2o_formats) {
+        vertex_tags_[format.tag] = {type, &format};
+      }
+    }
+    for (const RelationType* type : registry.relations()) {
+      edge_tags_[type->g2o_tag] = {type, nullptr};
+      for (const G2oEdgeFormat& format : type->other_g2o_formats) {
+        edge_tags_[format.tag] = {type, &format};
+      }
+    }
+  }
+
+  // The line `number`, the last of G2oFile::lines.
+  void Read(int number, const std::string& line) {
+    fields_.Set(number, line);
     if (fields_.empty() || fields_[0][0] == '#') return;
     const std::string tag(fields_[0]);
     const Above above = above_;
@@ -432,17 +423,17 @@ class Reader {
       if (above == Above::kEdge) {
         ReadConstraintLine();
       } else if (above != Above::kUnknown) {
-        Fail(line_, tag + " without an edge", "an edge above it");
+        fields_.Fail(tag + " without an edge", "an edge above it");
       }
       return;
     }
     if (tag == kFixTag) {
       if (fields_.size() < 2) {
-        Fail(line_, "FIX without an id", "ids of vertices");
+        fields_.Fail("FIX without an id", "ids of vertices");
       }
       Line().kind = G2oLine::Kind::kFix;
       for (std::size_t i = 1; i < fields_.size(); ++i) {
-        fix_lines_.push_back({line_, Id(fields_[i])});
+        records_->fix_lines.push_back({fields_.line(), fields_.Id(fields_[i])});
       }
       return;
     }
@@ -465,15 +456,22 @@ class Reader {
       above_ = Above::kEdge;
       return;
     }
-    if (first_unknown_.tag.empty()) first_unknown_ = {line_, tag};
-    ++file_.unknown_tags[tag];
+    if (records_->first_unknown.tag.empty())
+      records_->first_unknown = {fields_.line(), tag};
+    ++file_->unknown_tags[tag];
     std::int64_t id = 0;
     if (MayBeVertex(tag) && fields_.size() > 1 &&
         ParseNumber(fields_[1], &id)) {
-      unknown_ids_.insert(id);
+      records_->unknown_ids.insert(id);
     }
     above_ = Above::kUnknown;
   }
+
+ private:
+  enum class Above { kNothing, kEdge, kUnknown };
+
+  // The line that is being read.
+  G2oLine& Line() { return file_->lines.back(); }
 
   void ReadVertex(const VertexTag& tag) {
     const FeatureType& type = *tag.type;
@@ -490,38 +488,41 @@ class Reader {
     }
     const std::size_t extra =
         tag.format == nullptr ? 0 : tag.format->extra_fields.size();
-    ExpectFields(static_cast<std::size_t>(type.size) + 1 + extra, what);
-    const std::int64_t id = Id(fields_[1]);
-    if (!index_.emplace(id, features_.size()).second) {
-      Fail(line_, "id " + std::to_string(id) + " is taken", "each vertex once");
+    fields_.ExpectFields(static_cast<std::size_t>(type.size) + 1 + extra, what);
+    const std::int64_t id = fields_.Id(fields_[1]);
+    if (!records_->index.emplace(id, records_->features.size()).second) {
+      fields_.Fail("id " + std::to_string(id) + " is taken",
+                   "each vertex once");
     }
     Feature feature;
     feature.type = &type;
     feature.source = kDefaultSource;
     for (int i = 0; i < type.size; ++i) {
-      feature.parameters[i] = Number(fields_[i + 2]);
+      feature.parameters[i] = fields_.Number(fields_[i + 2]);
     }
     if (tag.format != nullptr && tag.format->read) {
       tag.format->read(feature.parameters.data());
     }
     if (extra > 0) {
-      ExtraFields fields = {features_.size(), tag.format, {}};
+      ExtraFields fields = {records_->features.size(), tag.format, {}};
       for (std::size_t i = 0; i < extra; ++i) {
         const std::string_view field =
             fields_[static_cast<std::size_t>(type.size) + 2 + i];
         if (tag.format->extra_fields_are_ids) {
-          fields.numbers.push_back(
-              Integer(field, tag.format->extra_fields[i], -1, kLargestFileId));
+          fields.numbers.push_back(fields_.Integer(
+              field, tag.format->extra_fields[i], -1, kLargestFileId));
         } else {
-          Number(field);
+          fields_.Number(field);
         }
       }
-      if (tag.format->read_extra) extra_fields_.push_back(std::move(fields));
+      if (tag.format->read_extra)
+        records_->extra_fields.push_back(std::move(fields));
     }
     Line().kind = G2oLine::Kind::kVertex;
-    Line().id = first_feature_ + static_cast<FeatureId>(features_.size());
-    features_.push_back(std::move(feature));
-    file_.file_ids.push_back(id);
+    Line().id =
+        first_feature_ + static_cast<FeatureId>(records_->features.size());
+    records_->features.push_back(std::move(feature));
+    file_->file_ids.push_back(id);
   }
 
   void ReadFeatureLine() {
@@ -529,27 +530,28 @@ class Reader {
     // later.
     const int anchor_size =
         fields_.size() == 8 + kMaxAnchorSize ? kMaxAnchorSize : 2;
-    ExpectFields(static_cast<std::size_t>(7 + anchor_size),
-                 "id, level, virtual, anchor_x, anchor_y, extent_begin, "
-                 "extent_end, observations, source");
+    fields_.ExpectFields(
+        static_cast<std::size_t>(7 + anchor_size),
+        "id, level, virtual, anchor_x, anchor_y, extent_begin, "
+        "extent_end, observations, source");
     FeatureLine own;
     own.anchor_size = anchor_size;
-    own.line = line_;
-    own.file_id = Id(fields_[1]);
+    own.line = fields_.line();
+    own.file_id = fields_.Id(fields_[1]);
     Feature& feature = own.attributes;
     feature.level =
-        static_cast<int>(Integer(fields_[2], "level", 0, kMaxLevel));
-    feature.is_virtual = Integer(fields_[3], "virtual", 0, 1) == 1;
+        static_cast<int>(fields_.Integer(fields_[2], "level", 0, kMaxLevel));
+    feature.is_virtual = fields_.Integer(fields_[3], "virtual", 0, 1) == 1;
     std::size_t field = 4;
     for (int i = 0; i < anchor_size; ++i) {
-      feature.anchor[i] = Number(fields_[field++]);
+      feature.anchor[i] = fields_.Number(fields_[field++]);
     }
-    feature.extent_begin = Number(fields_[field++]);
-    feature.extent_end = Number(fields_[field++]);
-    feature.observations = static_cast<int>(Integer(
+    feature.extent_begin = fields_.Number(fields_[field++]);
+    feature.extent_end = fields_.Number(fields_[field++]);
+    feature.observations = static_cast<int>(fields_.Integer(
         fields_[field++], "observations", 0, std::numeric_limits<int>::max()));
-    feature.source = Source(fields_[field]);
-    feature_lines_.push_back(std::move(own));
+    feature.source = fields_.Source(fields_[field]);
+    records_->feature_lines.push_back(std::move(own));
   }
 
   // type start_angle field_of_view resolution maximum_range accuracy
@@ -558,41 +560,43 @@ class Reader {
   void ReadLaser() {
     constexpr std::size_t kBefore = 7;
     constexpr std::size_t kPoses = 6;
-    if (features_.empty()) {
-      Fail(line_, std::string(kLaserTag) + " before all vertices",
-           "the vertex that it belongs to above it");
+    if (records_->features.empty()) {
+      fields_.Fail(std::string(kLaserTag) + " before all vertices",
+                   "the vertex that it belongs to above it");
     }
     std::size_t field = kBefore + 1;
     for (int list = 0; list < 2; ++list) {
       if (field >= fields_.size()) break;
       field += 1 + static_cast<std::size_t>(
-                       Integer(fields_[field], "number of readings", 0,
-                               std::numeric_limits<int>::max()));
+                       fields_.Integer(fields_[field], "number of readings", 0,
+                                       std::numeric_limits<int>::max()));
     }
     if (field + kPoses > fields_.size()) {
-      Fail(line_,
-           std::string(kLaserTag) + " has " +
-               std::to_string(fields_.size() - 1) + " fields",
-           "7 numbers, ranges and remissions each with their number before "
-           "them, and two poses");
+      fields_.Fail(
+          std::string(kLaserTag) + " has " +
+              std::to_string(fields_.size() - 1) + " fields",
+          "7 numbers, ranges and remissions each with their number before "
+          "them, and two poses");
     }
-    for (std::size_t i = 1; i < field + kPoses; ++i) Number(fields_[i]);
-    ++file_.laser_scans;
+    for (std::size_t i = 1; i < field + kPoses; ++i) fields_.Number(fields_[i]);
+    ++file_->laser_scans;
   }
 
   void ReadEdge(const EdgeTag& tag) {
     const RelationType& type = *tag.type;
     const int arity = static_cast<int>(type.feature_types.size());
     const int size = type.residual_size;
-    ExpectFields(static_cast<std::size_t>(arity + size + size * (size + 1) / 2),
-                 std::to_string(arity) + (arity == 1 ? " id, " : " ids, ") +
-                     std::to_string(size) +
-                     (size == 1 ? " expected value" : " expected values") +
-                     ", the upper triangle of the information");
+    fields_.ExpectFields(
+        static_cast<std::size_t>(arity + size + size * (size + 1) / 2),
+        std::to_string(arity) + (arity == 1 ? " id, " : " ids, ") +
+            std::to_string(size) +
+            (size == 1 ? " expected value" : " expected values") +
+            ", the upper triangle of the information");
     Edge edge;
-    edge.line = line_;
+    edge.line = fields_.line();
     for (int i = 0; i < arity; ++i) {
-      edge.file_ids.push_back(Id(fields_[1 + FeaturePlace(tag.format, i)]));
+      edge.file_ids.push_back(
+          fields_.Id(fields_[1 + FeaturePlace(tag.format, i)]));
     }
     Constraint& constraint = edge.constraint;
     constraint.type = &type;
@@ -600,7 +604,7 @@ class Reader {
     constraint.expected.resize(size);
     for (int i = 0; i < size; ++i) {
       constraint.expected[i] =
-          Number(fields_[1 + arity + RowPlace(tag.format, i)]);
+          fields_.Number(fields_[1 + arity + RowPlace(tag.format, i)]);
     }
     if (tag.format != nullptr && tag.format->read) {
       tag.format->read(constraint.expected.data());
@@ -608,7 +612,7 @@ class Reader {
     Eigen::MatrixXd entries(size, size);
     int field = 1 + arity + size;
     for (const auto& [row, column] : InformationOrder(tag.format, size)) {
-      entries(row, column) = Number(fields_[field++]);
+      entries(row, column) = fields_.Number(fields_[field++]);
       entries(column, row) = entries(row, column);
     }
     constraint.information.resize(size, size);
@@ -618,43 +622,103 @@ class Reader {
             entries(RowPlace(tag.format, i), RowPlace(tag.format, j));
       }
     }
-    if (IsTurned(file_.options, constraint)) {
+    if (IsTurned(file_->options, constraint)) {
       TurnInformation(constraint.expected[2], &constraint.information);
     }
     Line().kind = G2oLine::Kind::kEdge;
-    edges_.push_back(std::move(edge));
+    records_->edges.push_back(std::move(edge));
   }
 
   // `above_` was an edge.
   void ReadConstraintLine() {
-    ExpectFields(4, "class, state, delta, source");
+    fields_.ExpectFields(4, "class, state, delta, source");
     Line().kind = G2oLine::Kind::kConstraintAttributes;
-    edges_.back().has_attributes = true;
-    Constraint& constraint = edges_.back().constraint;
+    records_->edges.back().has_attributes = true;
+    Constraint& constraint = records_->edges.back().constraint;
     if (fields_[1] == "structure") {
       constraint.kind = ConstraintClass::kStructure;
     } else if (fields_[1] != "measurement") {
-      Fail(line_, "class \"" + std::string(fields_[1]) + "\"",
-           "measurement or structure");
+      fields_.Fail("class \"" + std::string(fields_[1]) + "\"",
+                   "measurement or structure");
     }
     if (fields_[2] == "broken") {
       constraint.state = ConstraintState::kBroken;
     } else if (fields_[2] != "live") {
-      Fail(line_, "state \"" + std::string(fields_[2]) + "\"",
-           "live or broken");
+      fields_.Fail("state \"" + std::string(fields_[2]) + "\"",
+                   "live or broken");
     }
-    constraint.delta = Number(fields_[3]);
+    constraint.delta = fields_.Number(fields_[3]);
     if (constraint.delta < 0.0 || constraint.delta > 1.0) {
-      Fail(line_, "delta " + std::string(fields_[3]), "a number in [0, 1]");
+      fields_.Fail("delta " + std::string(fields_[3]), "a number in [0, 1]");
     }
-    constraint.source = Source(fields_[4]);
+    constraint.source = fields_.Source(fields_[4]);
   }
 
+  // Whether the first field after an unknown tag can be the id of a vertex.
+  static bool MayBeVertex(const std::string& tag) {
+    return tag.find("EDGE") == std::string::npos &&
+           tag.find("LASER") == std::string::npos &&
+           tag.rfind("PARAMS", 0) != 0;
+  }
+
+  const FeatureId first_feature_;
+  G2oFile* const file_;
+  Records* const records_;
+  LineFields fields_;
+  std::unordered_map<std::string, VertexTag> vertex_tags_;
+  std::unordered_map<std::string, EdgeTag> edge_tags_;
+  Above above_ = Above::kNothing;
+};
+
+// Makes the graph of the records of all lines.
+class GraphAssembler {
+ public:
+  GraphAssembler(const std::string& name, const Registry& registry,
+                 G2oFile* file, Records* records, Graph* graph)
+      : name_(name),
+        registry_(registry),
+        first_feature_(graph->feature_id_end()),
+        first_constraint_(graph->constraint_id_end()),
+        file_(file),
+        records_(records),
+        graph_(graph) {}
+
+  void Assemble() {
+    if (records_->features.empty() && records_->unknown_ids.empty()) {
+      NameVertices();
+    }
+    if (records_->features.empty() && !records_->first_unknown.tag.empty()) {
+      Fail(name_, records_->first_unknown.line,
+           "no vertex or edge of the file has a known tag; the first is " +
+               records_->first_unknown.tag,
+           "a graph of the plane (VERTEX_SE2, EDGE_SE2 and others); graphs "
+           "in three dimensions are not solved");
+    }
+    Transaction transaction;
+    AddFeatures(&transaction);
+    const std::vector<const Edge*> added = AddConstraints(&transaction);
+    try {
+      graph_->Apply(transaction);
+    } catch (const Error&) {
+      // The graph knows what is wrong but not where.
+      for (std::size_t i = 0; i < added.size(); ++i) {
+        const ConstraintFault fault =
+            FindFault(transaction.added_constraints()[i], transaction);
+        if (!fault.what.empty()) {
+          Fail(name_, added[i]->line, fault.what, fault.expected);
+        }
+      }
+      throw;
+    }
+    TakeFingerprints();
+  }
+
+ private:
   // Makes the vertices of a file that has edges only.
   void NameVertices() {
     // What each may be, the likeliest first.
     std::map<std::int64_t, std::vector<std::string>> types;
-    for (const Edge& edge : edges_) {
+    for (const Edge& edge : records_->edges) {
       const RelationType& type = *edge.constraint.type;
       for (std::size_t i = 0; i < edge.file_ids.size(); ++i) {
         const std::vector<std::string>& fitting = type.feature_types[i];
@@ -667,7 +731,7 @@ class Reader {
           }
         }
         if (both.empty()) {
-          Fail(edge.line,
+          Fail(name_, edge.line,
                "vertex " + std::to_string(edge.file_ids[i]) + " is a " +
                    fitting[0] + " here and a " + known->second[0] + " above",
                "one type");
@@ -676,60 +740,62 @@ class Reader {
       }
     }
     for (const auto& [file_id, names] : types) {
-      index_.emplace(file_id, features_.size());
+      records_->index.emplace(file_id, records_->features.size());
       Feature feature;
-      feature.type = feature_types_.at(names[0]);
+      feature.type = &registry_.GetFeature(names[0]);
       feature.source = kDefaultSource;
-      file_.named_by_edges.push_back(first_feature_ +
-                                     static_cast<FeatureId>(features_.size()));
-      file_.file_ids.push_back(file_id);
-      features_.push_back(std::move(feature));
+      file_->named_by_edges.push_back(
+          first_feature_ + static_cast<FeatureId>(records_->features.size()));
+      file_->file_ids.push_back(file_id);
+      records_->features.push_back(std::move(feature));
     }
   }
 
-  // The index of the vertex with this id; features_.size() when its tag is
-  // unknown.
+  // The index of the vertex with this id; records_->features.size() when its
+  // tag is unknown.
   std::size_t FindVertex(int line, std::int64_t file_id) const {
-    const auto found = index_.find(file_id);
-    if (found != index_.end()) return found->second;
-    if (unknown_ids_.count(file_id) == 0) {
-      Fail(line, "no vertex " + std::to_string(file_id),
+    const auto found = records_->index.find(file_id);
+    if (found != records_->index.end()) return found->second;
+    if (records_->unknown_ids.count(file_id) == 0) {
+      Fail(name_, line, "no vertex " + std::to_string(file_id),
            "the id of a vertex in the file");
     }
-    return features_.size();
+    return records_->features.size();
   }
 
   void AddFeatures(Transaction* transaction) {
-    for (const FixLine& fix : fix_lines_) {
+    for (const FixLine& fix : records_->fix_lines) {
       const std::size_t index = FindVertex(fix.line, fix.file_id);
-      if (index < features_.size()) features_[index].fixed = true;
+      if (index < records_->features.size())
+        records_->features[index].fixed = true;
     }
-    for (const ExtraFields& fields : extra_fields_) {
+    for (const ExtraFields& fields : records_->extra_fields) {
       std::vector<const Feature*> named;
       for (const std::int64_t number : fields.numbers) {
-        const auto found = index_.find(number);
-        named.push_back(found == index_.end() ? nullptr
-                                              : &features_[found->second]);
+        const auto found = records_->index.find(number);
+        named.push_back(found == records_->index.end()
+                            ? nullptr
+                            : &records_->features[found->second]);
       }
-      fields.format->read_extra(named, &features_[fields.feature]);
+      fields.format->read_extra(named, &records_->features[fields.feature]);
     }
     std::unordered_set<std::int64_t> seen;
-    for (const FeatureLine& own : feature_lines_) {
+    for (const FeatureLine& own : records_->feature_lines) {
       if (!seen.insert(own.file_id).second) {
-        Fail(own.line,
+        Fail(name_, own.line,
              "a second " + std::string(kFeatureTag) + " of vertex " +
                  std::to_string(own.file_id),
              "one a vertex");
       }
       const std::size_t index = FindVertex(own.line, own.file_id);
-      if (index == features_.size()) continue;
-      G2oLine& line = file_.lines[static_cast<std::size_t>(own.line - 1)];
+      if (index == records_->features.size()) continue;
+      G2oLine& line = file_->lines[static_cast<std::size_t>(own.line - 1)];
       line.kind = G2oLine::Kind::kFeatureAttributes;
       line.id = first_feature_ + static_cast<FeatureId>(index);
-      Feature& feature = features_[index];
+      Feature& feature = records_->features[index];
       const int anchor_size = feature.type->written_anchor_size();
       if (own.anchor_size != anchor_size) {
-        Fail(own.line,
+        Fail(name_, own.line,
              std::string(kFeatureTag) + " has an anchor of " +
                  std::to_string(own.anchor_size) + " coordinates",
              std::to_string(anchor_size) + " for a " + feature.type->name);
@@ -745,18 +811,19 @@ class Reader {
         feature.maker = registry_.FindDetector(feature.source);
       }
     }
-    for (const Feature& feature : features_) transaction->AddFeature(feature);
+    for (const Feature& feature : records_->features)
+      transaction->AddFeature(feature);
   }
 
   // Returns the edge of each constraint that it added.
   std::vector<const Edge*> AddConstraints(Transaction* transaction) {
     std::vector<const Edge*> added;
-    for (Edge& edge : edges_) {
+    for (Edge& edge : records_->edges) {
       const std::size_t index = static_cast<std::size_t>(edge.line - 1);
       bool known = true;
       for (const std::int64_t file_id : edge.file_ids) {
         const std::size_t vertex = FindVertex(edge.line, file_id);
-        known = known && vertex < features_.size();
+        known = known && vertex < records_->features.size();
         edge.constraint.features.push_back(Transaction::ProvisionalId(vertex));
       }
       ConstraintId id = kNoId;
@@ -765,9 +832,9 @@ class Reader {
         transaction->AddConstraint(std::move(edge.constraint));
         added.push_back(&edge);
       } else {
-        file_.lines[index].kind = G2oLine::Kind::kText;
+        file_->lines[index].kind = G2oLine::Kind::kText;
       }
-      file_.lines[index].id = id;
+      file_->lines[index].id = id;
       if (edge.has_attributes) SetAttributesLine(index + 1, id);
     }
     return added;
@@ -775,59 +842,66 @@ class Reader {
 
   // Comments and blank lines may stand between an edge and its own line.
   void SetAttributesLine(std::size_t index, ConstraintId id) {
-    while (file_.lines[index].kind != G2oLine::Kind::kConstraintAttributes) {
+    while (file_->lines[index].kind != G2oLine::Kind::kConstraintAttributes) {
       ++index;
     }
-    file_.lines[index].id = id;
-    if (id == kNoId) file_.lines[index].kind = G2oLine::Kind::kText;
+    file_->lines[index].id = id;
+    if (id == kNoId) file_->lines[index].kind = G2oLine::Kind::kText;
   }
 
-  void TakeFingerprints(const Graph& graph) {
-    file_.feature_fingerprints.resize(
+  void TakeFingerprints() {
+    const Graph& graph = *graph_;
+    file_->feature_fingerprints.resize(
         static_cast<std::size_t>(graph.feature_id_end()));
-    file_.was_fixed.resize(file_.feature_fingerprints.size());
+    file_->was_fixed.resize(file_->feature_fingerprints.size());
     for (const Feature* feature : graph.Features()) {
       const auto id = static_cast<std::size_t>(feature->id);
-      file_.feature_fingerprints[id] = FingerprintOf(*feature);
-      file_.was_fixed[id] = feature->fixed;
+      file_->feature_fingerprints[id] = FingerprintOf(*feature);
+      file_->was_fixed[id] = feature->fixed;
     }
-    file_.constraint_fingerprints.resize(
+    file_->constraint_fingerprints.resize(
         static_cast<std::size_t>(graph.constraint_id_end()));
     for (const Constraint* constraint : graph.Constraints()) {
-      file_.constraint_fingerprints[static_cast<std::size_t>(constraint->id)] =
-          FingerprintOf(*constraint, file_.file_ids);
+      file_->constraint_fingerprints[static_cast<std::size_t>(constraint->id)] =
+          FingerprintOf(*constraint, file_->file_ids);
     }
-  }
-
-  // Whether the first field after an unknown tag can be the id of a vertex.
-  static bool MayBeVertex(const std::string& tag) {
-    return tag.find("EDGE") == std::string::npos &&
-           tag.find("LASER") == std::string::npos &&
-           tag.rfind("PARAMS", 0) != 0;
   }
 
   const std::string& name_;
-  std::unordered_map<std::string, VertexTag> vertex_tags_;
-  std::unordered_map<std::string, EdgeTag> edge_tags_;
   const Registry& registry_;
-  std::unordered_map<std::string, const FeatureType*> feature_types_;
-  int line_ = 0;
-  std::vector<std::string_view> fields_;
-  Above above_ = Above::kNothing;
-  FeatureId first_feature_ = 0;
-  ConstraintId first_constraint_ = 0;
-  std::vector<Feature> features_;
-  // Position in features_ by the id in the file.
-  std::unordered_map<std::int64_t, std::size_t> index_;
-  // Ids of vertices with unknown tags.
-  std::unordered_set<std::int64_t> unknown_ids_;
-  UnknownLine first_unknown_;
-  std::vector<FixLine> fix_lines_;
-  std::vector<ExtraFields> extra_fields_;
-  std::vector<FeatureLine> feature_lines_;
-  std::vector<Edge> edges_;
-  G2oFile file_;
+  const FeatureId first_feature_;
+  const ConstraintId first_constraint_;
+  G2oFile* const file_;
+  Records* const records_;
+  Graph* const graph_;
 };
+
+G2oFile ReadG2oFile(std::istream& input, const std::string& name,
+                    const Registry& registry, const G2oOptions& options,
+                    Graph* graph) {
+  if (graph->num_features() > 0 || graph->num_constraints() > 0) {
+    throw PLUMBLINE_ERROR("the graph holds features already", "an empty graph");
+  }
+  G2oFile file;
+  file.options = options;
+  const FeatureId first_feature = graph->feature_id_end();
+  file.file_ids.assign(static_cast<std::size_t>(first_feature), kNoId);
+  Records records;
+  LineReader reader(name, registry, first_feature, &file, &records);
+  std::string line;
+  int number = 0;
+  while (std::getline(input, line)) {
+    // The last line counts as ended unless the input ended before.
+    file.ends_with_line_feed = !input.eof();
+    ++number;
+    if (number == 1) RemoveByteOrderMark(&line);
+    file.lines.push_back({G2oLine::Kind::kText, line, kNoId});
+    reader.Read(number, line);
+  }
+  if (input.bad()) throw Error(name, number, "cannot read on", "");
+  GraphAssembler(name, registry, &file, &records, graph).Assemble();
+  return file;
+}
 
 // -- Writing ------------------------------------------------------------------
 
@@ -1115,7 +1189,7 @@ class Writer {
 G2oFile ReadG2o(std::istream& input, const std::string& name,
                 const Registry& registry, Graph* graph,
                 const G2oOptions& options) {
-  return Reader(name, registry, options).Read(input, graph);
+  return ReadG2oFile(input, name, registry, options, graph);
 }
 
 void WriteG2o(const Graph& graph, const G2oFile* file, std::ostream& output) {

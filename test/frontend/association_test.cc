@@ -10,11 +10,11 @@ namespace plumbline {
 namespace {
 
 using testing::Observe;
-using testing::Wall;
+using testing::WallEnds;
 
 constexpr double kTight = 1e-12;
 
-AssociationOptions Options() {
+AssociationOptions GateOptions() {
   AssociationOptions options;
   options.gate = 9.21;
   options.max_offset = 0.5;
@@ -104,7 +104,7 @@ TEST(AssociationTest, HandWorkedInnovationCovariance) {
   observation.covariance << 1e-4, 2e-5, 2e-5, 4e-4;
   AssociationCandidate candidate =
       Candidate(Pose2::Zero(), 1.0, Eigen::Vector3d(0.1, 0.2, 0.05));
-  AssociationOptions options = Options();
+  AssociationOptions options = GateOptions();
   options.feature_offset_sigma = 0.03;
   options.feature_angle_sigma = 0.01;
   const Eigen::Matrix2d covariance =
@@ -120,10 +120,10 @@ TEST(AssociationTest, HandWorkedInnovationCovariance) {
 
 TEST(AssociationTest, PerfectMatch) {
   const Pose2 robot(0.3, 2.0, 0.4);
-  const Wall wall{{-1.0, 0.0}, {1.0, 0.0}};
+  const WallEnds wall{{-1.0, 0.0}, {1.0, 0.0}};
   const auto associations =
       Associate(robot, {Observe(robot, wall)},
-                {Candidate(Pose2::Zero(), 1.0, kSigmas)}, Options());
+                {Candidate(Pose2::Zero(), 1.0, kSigmas)}, GateOptions());
   ASSERT_EQ(associations.size(), 1u);
   EXPECT_EQ(associations[0].observation, 0);
   EXPECT_EQ(associations[0].candidate, 0);
@@ -135,9 +135,9 @@ TEST(AssociationTest, SquaredDistanceIsMahalanobis) {
   // are independent. Offset 0.1 against sqrt(0.01^2 + 0.1^2 + 0.03^2).
   const Pose2 robot(0.0, 2.0, 0.0);
   const auto associations =
-      Associate(robot, {Observe(robot, Wall{{-1.0, 0.1}, {1.0, 0.1}})},
+      Associate(robot, {Observe(robot, WallEnds{{-1.0, 0.1}, {1.0, 0.1}})},
                 {Candidate(Pose2::Zero(), 1.0, Eigen::Vector3d(0.1, 0.1, 0.0))},
-                Options());
+                GateOptions());
   ASSERT_EQ(associations.size(), 1u);
   EXPECT_NEAR(associations[0].squared_distance, 0.01 / 0.0110, 1e-9);
 }
@@ -145,8 +145,8 @@ TEST(AssociationTest, SquaredDistanceIsMahalanobis) {
 TEST(AssociationTest, GateOnMahalanobisDistance) {
   const Pose2 robot(0.0, 2.0, 0.0);
   const std::vector<SegmentObservation> observations = {
-      Observe(robot, Wall{{-1.0, 0.2}, {1.0, 0.2}})};
-  AssociationOptions options = Options();
+      Observe(robot, WallEnds{{-1.0, 0.2}, {1.0, 0.2}})};
+  AssociationOptions options = GateOptions();
   options.feature_offset_sigma = 0.03;
   // 0.2 m: far for a well known robot, near for a lost one.
   EXPECT_TRUE(Associate(robot, observations,
@@ -167,8 +167,8 @@ TEST(AssociationTest, FixedGatesHoldForALostRobot) {
   const Pose2 robot(0.0, 2.0, 0.0);
   const std::vector<AssociationCandidate> candidates = {
       Candidate(Pose2::Zero(), 1.0, lost)};
-  const auto count = [&](const Wall& wall) {
-    return Associate(robot, {Observe(robot, wall)}, candidates, Options())
+  const auto count = [&](const WallEnds& wall) {
+    return Associate(robot, {Observe(robot, wall)}, candidates, GateOptions())
         .size();
   };
   EXPECT_EQ(count({{-1.0, 0.49}, {1.0, 0.49}}), 1u);
@@ -186,8 +186,9 @@ TEST(AssociationTest, GateOnOverlap) {
   const std::vector<AssociationCandidate> candidates = {
       Candidate(Pose2(0.5, 0.0, 0.0), 1.0, kSigmas)};  // x from -0.5 to 1.5
   const auto count = [&](double begin, double end) {
-    return Associate(robot, {Observe(robot, Wall{{begin, 0.0}, {end, 0.0}})},
-                     candidates, Options())
+    return Associate(robot,
+                     {Observe(robot, WallEnds{{begin, 0.0}, {end, 0.0}})},
+                     candidates, GateOptions())
         .size();
   };
   EXPECT_EQ(count(1.85, 2.85), 1u);
@@ -204,28 +205,29 @@ TEST(AssociationTest, OppositeFacesOfAThinWallAreDifferent) {
   const Pose2 robot(0.0, -2.0, 0.0);
   const Eigen::Vector3d lost(100.0, 100.0, 10.0);
   const std::vector<SegmentObservation> observations = {
-      Observe(robot, Wall{{-1.0, -0.1}, {1.0, -0.1}})};
+      Observe(robot, WallEnds{{-1.0, -0.1}, {1.0, -0.1}})};
   EXPECT_TRUE(Associate(robot, observations,
-                        {Candidate(Pose2::Zero(), 1.0, lost)}, Options())
+                        {Candidate(Pose2::Zero(), 1.0, lost)}, GateOptions())
                   .empty());
-  EXPECT_EQ(Associate(robot, observations,
-                      {Candidate(Pose2(0.0, 0.0, kPi), 1.0, lost)}, Options())
-                .size(),
-            1u);
+  EXPECT_EQ(
+      Associate(robot, observations,
+                {Candidate(Pose2(0.0, 0.0, kPi), 1.0, lost)}, GateOptions())
+          .size(),
+      1u);
 }
 
 TEST(AssociationTest, NearestCandidateWinsAndMayTakeSeveral) {
   const Pose2 robot(0.0, 2.0, 0.0);
   const std::vector<SegmentObservation> observations = {
-      Observe(robot, Wall{{-1.0, 0.0}, {-0.2, 0.0}}),
-      Observe(robot, Wall{{0.0, 5.0}, {1.0, 5.0}}),  // nobody's
-      Observe(robot, Wall{{0.2, 0.02}, {1.0, 0.02}})};
+      Observe(robot, WallEnds{{-1.0, 0.0}, {-0.2, 0.0}}),
+      Observe(robot, WallEnds{{0.0, 5.0}, {1.0, 5.0}}),  // nobody's
+      Observe(robot, WallEnds{{0.2, 0.02}, {1.0, 0.02}})};
   const std::vector<AssociationCandidate> candidates = {
       Candidate(Pose2(0.0, 0.15, 0.0), 1.0, kSigmas),
       Candidate(Pose2(0.0, 0.01, 0.0), 1.0, kSigmas),
       Candidate(Pose2(0.0, -0.15, 0.0), 1.0, kSigmas)};
   const auto associations =
-      Associate(robot, observations, candidates, Options());
+      Associate(robot, observations, candidates, GateOptions());
   ASSERT_EQ(associations.size(), 2u);
   EXPECT_EQ(associations[0].observation, 0);
   EXPECT_EQ(associations[0].candidate, 1);
@@ -236,25 +238,25 @@ TEST(AssociationTest, NearestCandidateWinsAndMayTakeSeveral) {
 TEST(AssociationTest, NothingWithNothing) {
   const Pose2 robot(0.0, 2.0, 0.0);
   const std::vector<SegmentObservation> observations = {
-      Observe(robot, Wall{{-1.0, 0.0}, {1.0, 0.0}})};
+      Observe(robot, WallEnds{{-1.0, 0.0}, {1.0, 0.0}})};
   const std::vector<AssociationCandidate> candidates = {
       Candidate(Pose2::Zero(), 1.0, kSigmas)};
-  EXPECT_TRUE(Associate(robot, {}, candidates, Options()).empty());
-  EXPECT_TRUE(Associate(robot, observations, {}, Options()).empty());
+  EXPECT_TRUE(Associate(robot, {}, candidates, GateOptions()).empty());
+  EXPECT_TRUE(Associate(robot, observations, {}, GateOptions()).empty());
 }
 
 TEST(AssociationTest, SameResultTenKilometresAwayAndTurned) {
   const Pose2 robot(0.3, 2.0, 0.4);
   const Pose2 feature(0.2, -0.05, 0.03);
   const SegmentObservation observation =
-      Observe(robot, Wall{{-1.0, 0.0}, {1.0, 0.05}});
+      Observe(robot, WallEnds{{-1.0, 0.0}, {1.0, 0.05}});
   AssociationCandidate candidate =
       Candidate(feature, 1.0, Eigen::Vector3d(0.1, 0.1, 0.05));
-  const auto here = Associate(robot, {observation}, {candidate}, Options());
+  const auto here = Associate(robot, {observation}, {candidate}, GateOptions());
   const Pose2 move(10000.0, -10000.0, 2.0);
   candidate.pose = Compose(move, feature);
-  const auto there =
-      Associate(Compose(move, robot), {observation}, {candidate}, Options());
+  const auto there = Associate(Compose(move, robot), {observation}, {candidate},
+                               GateOptions());
   ASSERT_EQ(here.size(), 1u);
   ASSERT_EQ(there.size(), 1u);
   EXPECT_GT(here[0].squared_distance, 0.01);

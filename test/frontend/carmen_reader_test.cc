@@ -15,17 +15,18 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr double kTight = 1e-12;
+constexpr double kRounding = 1e-12;
 
-Log Read(const std::string& text, const LaserOptions& options = {}) {
+Log ReadCarmen(const std::string& text, const LaserOptions& options = {}) {
   InputStream input("test.log", text);
   return ReadCarmenLog(&input, options);
 }
 
 // The message of the Error that reading throws.
-std::string Refusal(const std::string& text, const LaserOptions& options = {}) {
+std::string WhyRefused(const std::string& text,
+                       const LaserOptions& options = {}) {
   try {
-    Read(text, options);
+    ReadCarmen(text, options);
   } catch (const Error& error) {
     return error.what();
   }
@@ -54,7 +55,7 @@ std::int64_t Skipped(const Log& log, const std::string& part) {
 
 TEST(CarmenReaderTest, Flaser) {
   // The robot stands at (1, 2) and looks along y, the laser 4 cm behind it.
-  const Log log = Read(
+  const Log log = ReadCarmen(
       "# comment\n"
       "FLASER 3 1.5 0.25 2 1 1.96 1.5707963267948966 1 2 1.5707963267948966 "
       "976052857.337530 nohost 0.000246\n");
@@ -64,12 +65,12 @@ TEST(CarmenReaderTest, Flaser) {
   EXPECT_EQ(scan.timestamp_text, "976052857.337530");
   EXPECT_THAT(scan.ranges, ElementsAre(1.5f, 0.25f, 2.0f));
   EXPECT_EQ(scan.line, 2);
-  EXPECT_NEAR(scan.odometry[0], 1.0, kTight);
-  EXPECT_NEAR(scan.odometry[1], 2.0, kTight);
-  EXPECT_NEAR(scan.odometry[2], kPi / 2, kTight);
-  EXPECT_NEAR(scan.laser_offset[0], -0.04, kTight);
-  EXPECT_NEAR(scan.laser_offset[1], 0.0, kTight);
-  EXPECT_NEAR(scan.laser_offset[2], 0.0, kTight);
+  EXPECT_NEAR(scan.odometry[0], 1.0, kRounding);
+  EXPECT_NEAR(scan.odometry[1], 2.0, kRounding);
+  EXPECT_NEAR(scan.odometry[2], kPi / 2, kRounding);
+  EXPECT_NEAR(scan.laser_offset[0], -0.04, kRounding);
+  EXPECT_NEAR(scan.laser_offset[1], 0.0, kRounding);
+  EXPECT_NEAR(scan.laser_offset[2], 0.0, kRounding);
   EXPECT_EQ(scan.maximum_range, 80.0);
   EXPECT_EQ(log.scan_message, "FLASER");
   EXPECT_EQ(log.messages.at("FLASER"), 1);
@@ -86,7 +87,7 @@ TEST(CarmenReaderTest, AnglesOfTheOldFormat) {
   for (const Case& c : {Case{180, -90, 1}, Case{181, -90, 1},
                         Case{360, -90, 0.5}, Case{361, -90, 0.5},
                         Case{90, -90, 2}, Case{91, -90, 2}, Case{1, 0, 0}}) {
-    const Log log = Read(Flaser(c.beams, "1", "0 0 0 0 0 0", "1"));
+    const Log log = ReadCarmen(Flaser(c.beams, "1", "0 0 0 0 0 0", "1"));
     EXPECT_NEAR(RadToDeg(log.scans[0].start_angle), c.start_degrees, 1e-9)
         << c.beams;
     EXPECT_NEAR(RadToDeg(log.scans[0].angle_step), c.step_degrees, 1e-9)
@@ -97,11 +98,13 @@ TEST(CarmenReaderTest, AnglesOfTheOldFormat) {
 TEST(CarmenReaderTest, ResolutionParameterSpacesUnusualBeams) {
   const std::string parameter =
       "PARAM laser_front_laser_resolution 0.25 1 h 1\n";
-  const Log unusual = Read(parameter + Flaser(401, "1", "0 0 0 0 0 0", "1"));
+  const Log unusual =
+      ReadCarmen(parameter + Flaser(401, "1", "0 0 0 0 0 0", "1"));
   EXPECT_NEAR(RadToDeg(unusual.scans[0].start_angle), -50.0, 1e-9);
   EXPECT_NEAR(RadToDeg(unusual.scans[0].angle_step), 0.25, 1e-9);
   // The table goes before.
-  const Log usual = Read(parameter + Flaser(181, "1", "0 0 0 0 0 0", "1"));
+  const Log usual =
+      ReadCarmen(parameter + Flaser(181, "1", "0 0 0 0 0 0", "1"));
   EXPECT_NEAR(RadToDeg(usual.scans[0].angle_step), 1.0, 1e-9);
 }
 
@@ -110,22 +113,23 @@ TEST(CarmenReaderTest, OptionsOverride) {
   options.laser_start_angle = -1.0;
   options.laser_step = 0.5;
   options.laser_max_range = 10.0;
-  const Log log = Read("FLASER 4 1 9.9 10 81 0 0 0 0 0 0 1 h 1\n", options);
+  const Log log =
+      ReadCarmen("FLASER 4 1 9.9 10 81 0 0 0 0 0 0 1 h 1\n", options);
   EXPECT_EQ(log.scans[0].start_angle, -1.0);
   EXPECT_EQ(log.scans[0].angle_step, 0.5);
   EXPECT_EQ(log.scans[0].maximum_range, 10.0);
   EXPECT_THAT(log.scans[0].ranges, ElementsAre(1.0f, 9.9f, 0.0f, 0.0f));
 
   options.laser_max_range = -1.0;
-  EXPECT_THAT(Refusal("", options), HasSubstr("laser_max_range"));
+  EXPECT_THAT(WhyRefused("", options), HasSubstr("laser_max_range"));
   options.laser_max_range = 10.0;
   options.laser_step = 0.0;
-  EXPECT_THAT(Refusal("", options), HasSubstr("laser_step"));
+  EXPECT_THAT(WhyRefused("", options), HasSubstr("laser_step"));
 }
 
 TEST(CarmenReaderTest, RobotLaser) {
   // Remissions of 2, robot at (1, 1, 0), laser 0.3 m ahead.
-  const Log log = Read(
+  const Log log = ReadCarmen(
       "ROBOTLASER1 0 -1.0 2.0 1.0 8.0 0.01 0 3 1 2 8 2 77 78 "
       "1.3 1 0 1 1 0 0.1 0.2 0.3 0.4 0.5 12.25 host 3\n");
   ASSERT_EQ(log.scans.size(), 1u);
@@ -135,12 +139,12 @@ TEST(CarmenReaderTest, RobotLaser) {
   EXPECT_EQ(scan.maximum_range, 8.0);
   EXPECT_THAT(scan.ranges, ElementsAre(1.0f, 2.0f, 0.0f));
   EXPECT_EQ(scan.odometry, Pose2(1, 1, 0));
-  EXPECT_NEAR(scan.laser_offset[0], 0.3, kTight);
+  EXPECT_NEAR(scan.laser_offset[0], 0.3, kRounding);
   EXPECT_EQ(scan.timestamp, 12.25);
 }
 
 TEST(CarmenReaderTest, RobotLaserWithoutRemissionsAndResolution) {
-  const Log log = Read(
+  const Log log = ReadCarmen(
       "ROBOTLASER1 0 -1.0 2.0 0 8.0 0.01 0 3 1 2 3 "
       "1 1 0 1 1 0 0.1 0.2 0.3 0.4 0.5 12.25 host 3\n");
   ASSERT_EQ(log.scans.size(), 1u);
@@ -150,26 +154,27 @@ TEST(CarmenReaderTest, RobotLaserWithoutRemissionsAndResolution) {
 
 TEST(CarmenReaderTest, RawLaserIsPlacedByOdometry) {
   const std::string raw = "RAWLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 0 ";
-  const Log log =
-      Read("PARAM robot_frontlaser_offset 0.2 nohost 0\n" + raw + "9.5 h 0\n" +
-           "ODOM 1 0 3.1 0 0 0 10.0 h 0\n" + raw + "10.25 h 0\n" +
-           "ODOM 2 4 -3.1 0 0 0 11.0 h 0\n" + raw + "11.5 h 0\n");
+  const Log log = ReadCarmen(
+      "PARAM robot_frontlaser_offset 0.2 nohost 0\n" + raw + "9.5 h 0\n" +
+      "ODOM 1 0 3.1 0 0 0 10.0 h 0\n" + raw + "10.25 h 0\n" +
+      "ODOM 2 4 -3.1 0 0 0 11.0 h 0\n" + raw + "11.5 h 0\n");
   ASSERT_EQ(log.scans.size(), 3u);
   // Before any odometry: the first there is.
   EXPECT_EQ(log.scans[0].odometry, Pose2(1, 0, 3.1));
   // A quarter of the way, the short way round past pi.
-  EXPECT_NEAR(log.scans[1].odometry[0], 1.25, kTight);
-  EXPECT_NEAR(log.scans[1].odometry[1], 1.0, kTight);
-  EXPECT_NEAR(log.scans[1].odometry[2], 3.1 + 0.25 * (2 * kPi - 6.2), kTight);
+  EXPECT_NEAR(log.scans[1].odometry[0], 1.25, kRounding);
+  EXPECT_NEAR(log.scans[1].odometry[1], 1.0, kRounding);
+  EXPECT_NEAR(log.scans[1].odometry[2], 3.1 + 0.25 * (2 * kPi - 6.2),
+              kRounding);
   // After the last.
   EXPECT_EQ(log.scans[2].odometry, Pose2(2, 4, -3.1));
-  EXPECT_NEAR(log.scans[2].laser_offset[0], 0.2, kTight);
+  EXPECT_NEAR(log.scans[2].laser_offset[0], 0.2, kRounding);
   EXPECT_TRUE(log.has_odometry);
 }
 
 TEST(CarmenReaderTest, RawLaserWithoutOdometry) {
   const std::string raw = "RAWLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 0 ";
-  const Log log = Read(raw + "1 h 0\n" + raw + "2 h 0\n");
+  const Log log = ReadCarmen(raw + "1 h 0\n" + raw + "2 h 0\n");
   EXPECT_EQ(log.scans.size(), 2u);
   EXPECT_FALSE(log.has_odometry);
   EXPECT_EQ(log.scans[1].odometry, Pose2(0, 0, 0));
@@ -177,15 +182,15 @@ TEST(CarmenReaderTest, RawLaserWithoutOdometry) {
 
 TEST(CarmenReaderTest, RawLaserOutOfTimeTakesTheLastOdometry) {
   const std::string raw = "RAWLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 0 ";
-  const Log log = Read("ODOM 1 0 0 0 0 0 10.0 h 0\n" + raw + "9.0 h 0\n" +
-                       "ODOM 2 0 0 0 0 0 10.0 h 0\n");
+  const Log log = ReadCarmen("ODOM 1 0 0 0 0 0 10.0 h 0\n" + raw + "9.0 h 0\n" +
+                             "ODOM 2 0 0 0 0 0 10.0 h 0\n");
   EXPECT_EQ(log.scans[0].odometry, Pose2(1, 0, 0));
 }
 
 TEST(CarmenReaderTest, OneLaserGivesTheScans) {
   const std::string front = Flaser(2, "1", "0 0 0 0 0 0", "1");
   const std::string rear = "RLASER 2 3 3 0 0 3.14159 0 0 0 1 h 1\n";
-  const Log both = Read(rear + front + rear);
+  const Log both = ReadCarmen(rear + front + rear);
   ASSERT_EQ(both.scans.size(), 1u);
   EXPECT_EQ(both.scans[0].ranges[0], 1.0f);
   EXPECT_EQ(both.messages.at("RLASER"), 2);
@@ -194,17 +199,17 @@ TEST(CarmenReaderTest, OneLaserGivesTheScans) {
   EXPECT_EQ(both.skipped[0].count, 2);
   EXPECT_THAT(both.skipped[0].first_lines, ElementsAre(1, 3));
 
-  const Log alone = Read(rear);
+  const Log alone = ReadCarmen(rear);
   ASSERT_EQ(alone.scans.size(), 1u);
   EXPECT_EQ(alone.scan_message, "RLASER");
-  EXPECT_NEAR(alone.scans[0].laser_offset[2], 3.14159, kTight);
+  EXPECT_NEAR(alone.scans[0].laser_offset[2], 3.14159, kRounding);
 }
 
 TEST(CarmenReaderTest, KeepsTheOrderOfLinesAndCountsReversals) {
-  const Log log = Read(Flaser(2, "1", "0 0 0 0 0 0", "10.0") +
-                       Flaser(2, "2", "1 0 0 1 0 0", "9.5") +
-                       Flaser(2, "3", "2 0 0 2 0 0", "9.75") +
-                       Flaser(2, "4", "3 0 0 3 0 0", "9.5"));
+  const Log log = ReadCarmen(Flaser(2, "1", "0 0 0 0 0 0", "10.0") +
+                             Flaser(2, "2", "1 0 0 1 0 0", "9.5") +
+                             Flaser(2, "3", "2 0 0 2 0 0", "9.75") +
+                             Flaser(2, "4", "3 0 0 3 0 0", "9.5"));
   ASSERT_EQ(log.scans.size(), 4u);
   EXPECT_EQ(log.scans[1].ranges[0], 2.0f);
   EXPECT_EQ(log.scans[3].ranges[0], 4.0f);
@@ -214,8 +219,8 @@ TEST(CarmenReaderTest, KeepsTheOrderOfLinesAndCountsReversals) {
 }
 
 TEST(CarmenReaderTest, ConstantOdometryIsNone) {
-  const Log log = Read(Flaser(2, "1", "1 2 3 1 2 3", "1") +
-                       Flaser(2, "1", "1 2 3 1 2 3", "2"));
+  const Log log = ReadCarmen(Flaser(2, "1", "1 2 3 1 2 3", "1") +
+                             Flaser(2, "1", "1 2 3 1 2 3", "2"));
   EXPECT_FALSE(log.has_odometry);
 }
 
@@ -226,19 +231,19 @@ TEST(CarmenReaderTest, CorrectedPosesAreNotOdometry) {
                    std::to_string(i * 2) + " 0 0 " + std::to_string(i) + " 0 0",
                    std::to_string(i));
   }
-  const Log log = Read(text);
+  const Log log = ReadCarmen(text);
   EXPECT_EQ(log.scans[9].odometry, Pose2(9, 0, 0));
   EXPECT_EQ(log.scans[9].laser_offset, Pose2(0, 0, 0));
   EXPECT_EQ(Skipped(log, "corrected log"), 10);
 
   // The corrected pose is not used where odometry is missing either.
-  const Log none = Read(Flaser(2, "1", "1 0 0 0 0 0", "1") +
-                        Flaser(2, "1", "5 0 0 0 0 0", "2"));
+  const Log none = ReadCarmen(Flaser(2, "1", "1 0 0 0 0 0", "1") +
+                              Flaser(2, "1", "5 0 0 0 0 0", "2"));
   EXPECT_FALSE(none.has_odometry);
 }
 
 TEST(CarmenReaderTest, MaximumRangeFromParameter) {
-  const Log log = Read(
+  const Log log = ReadCarmen(
       "PARAM robot_front_laser_max 20.0 1 h 1\n"
       "FLASER 4 1 19.9 19.96 81 0 0 0 0 0 0 1 h 1\n");
   EXPECT_EQ(log.scans[0].maximum_range, 20.0);
@@ -262,7 +267,7 @@ std::string CorridorLog(const std::string& far_value, int far) {
 }
 
 TEST(CarmenReaderTest, MaximumRangeFromWhereReadingsPileUp) {
-  const Log piled = Read(CorridorLog("51.06", 9));
+  const Log piled = ReadCarmen(CorridorLog("51.06", 9));
   EXPECT_NEAR(piled.scans[0].maximum_range, 51.055, 1e-9);
   int zeros = 0;
   for (const float range : piled.scans[0].ranges) zeros += range == 0.0f;
@@ -277,19 +282,19 @@ TEST(CarmenReaderTest, AFarWallIsNoMaximumRange) {
     for (int k = 8; k < 180; ++k) text += std::to_string(1 + k / 36.0) + " ";
     text += "0 0 0 0 0 0 " + std::to_string(i) + " h 0\n";
   }
-  const Log log = Read(text);
+  const Log log = ReadCarmen(text);
   EXPECT_EQ(log.scans[0].maximum_range, 80.0);
   EXPECT_EQ(log.scans[0].ranges[0], 25.0f);
 }
 
 TEST(CarmenReaderTest, EqualReadingsAreNoMaximumRange) {
-  const Log log = Read(Flaser(180, "10", "0 0 0 0 0 0", "1"));
+  const Log log = ReadCarmen(Flaser(180, "10", "0 0 0 0 0 0", "1"));
   EXPECT_EQ(log.scans[0].ranges[0], 10.0f);
 }
 
 TEST(CarmenReaderTest, ReadingsThatAreNoDistances) {
   const Log log =
-      Read("FLASER 7 nan -1 inf 1e9 0 2 1e-400 0 0 0 0 0 0 1 h 1\n");
+      ReadCarmen("FLASER 7 nan -1 inf 1e9 0 2 1e-400 0 0 0 0 0 0 1 h 1\n");
   EXPECT_THAT(log.scans[0].ranges, ElementsAre(0, 0, 0, 0, 0, 2.0f, 0));
   EXPECT_EQ(Skipped(log, "no distance"), 4);
   EXPECT_THAT(log.skipped[0].first_lines, ElementsAre(1));
@@ -297,19 +302,20 @@ TEST(CarmenReaderTest, ReadingsThatAreNoDistances) {
 
 TEST(CarmenReaderTest, GarbledLinesAreCountedWithTheirLines) {
   const std::string good = Flaser(2, "1", "0 0 0 0 0 0", "1");
-  const Log log = Read(good +
-                       "FLASER 2 1 1 0 0 0 0 0 0 976\n"      // cut
-                       "FLASER 5 1 1 0 0 0 0 0 0 1 h 1\n"    // n too large
-                       "FLASER 1 1 1 0 0 0 0 0 0 1 h 1\n"    // n too small
-                       "FLASER 2 1 1x 0 0 0 0 0 0 1 h 1\n"   // no number
-                       "FLASER two 1 1 0 0 0 0 0 0 1 h 1\n"  // no count
-                       "FLASER -3 1 1 0 0 0 0 0 0 1 h 1\n"   // negative
-                       "FLASER 2147483647 1 1 0 0 0 0 0 0 1 h 1\n"  // huge
-                       "FLASER\n"                                   //
-                       "FLASER 0 0 0 0 0 0 0 1 h 1\n"               // no beams
-                       "FLASER 2 1 1 0 0 0 nan 0 0 1 h 1\n"         // pose
-                       "FLASER 2 1 1 0 0 0 1e30 0 0 1 h 1\n" +      // pose
-                       good);
+  const Log log =
+      ReadCarmen(good +
+                 "FLASER 2 1 1 0 0 0 0 0 0 976\n"             // cut
+                 "FLASER 5 1 1 0 0 0 0 0 0 1 h 1\n"           // n too large
+                 "FLASER 1 1 1 0 0 0 0 0 0 1 h 1\n"           // n too small
+                 "FLASER 2 1 1x 0 0 0 0 0 0 1 h 1\n"          // no number
+                 "FLASER two 1 1 0 0 0 0 0 0 1 h 1\n"         // no count
+                 "FLASER -3 1 1 0 0 0 0 0 0 1 h 1\n"          // negative
+                 "FLASER 2147483647 1 1 0 0 0 0 0 0 1 h 1\n"  // huge
+                 "FLASER\n"                                   //
+                 "FLASER 0 0 0 0 0 0 0 1 h 1\n"               // no beams
+                 "FLASER 2 1 1 0 0 0 nan 0 0 1 h 1\n"         // pose
+                 "FLASER 2 1 1 0 0 0 1e30 0 0 1 h 1\n" +      // pose
+                 good);
   EXPECT_EQ(log.scans.size(), 2u);
   EXPECT_EQ(log.scans[1].line, 13);
   EXPECT_EQ(Skipped(log, "garbled or truncated FLASER"), 8);
@@ -319,21 +325,22 @@ TEST(CarmenReaderTest, GarbledLinesAreCountedWithTheirLines) {
 }
 
 TEST(CarmenReaderTest, OtherGarbledMessages) {
-  const Log log = Read(Flaser(2, "1", "0 0 0 0 0 0", "1") +
-                       "ODOM 1 2\n"
-                       "ODOM nan 2 3 0 0 0 1 h 1\n"
-                       "PARAM\n"
-                       "PARAM lonely\n"
-                       "ROBOTLASER1 0 -1.0 2.0\n"
-                       "ROBOTLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 7 1 2\n"
-                       "ROBOTLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 2147483647 1 2\n"
-                       "ROBOTLASER1 0 nan 2.0 0 8.0 0.01 0 3 1 2 3 "
-                       "1 1 0 1 1 0 0.1 0.2 0.3 0.4 0.5 12.25 host 3\n"
-                       "FANCY 1 2 3\n"
-                       "garbage\n"
-                       "\n"
-                       "SYNC tag 1 h 1\n"
-                       "TRUEPOS 0 0 0 0 0 0 1 h 1\n");
+  const Log log =
+      ReadCarmen(Flaser(2, "1", "0 0 0 0 0 0", "1") +
+                 "ODOM 1 2\n"
+                 "ODOM nan 2 3 0 0 0 1 h 1\n"
+                 "PARAM\n"
+                 "PARAM lonely\n"
+                 "ROBOTLASER1 0 -1.0 2.0\n"
+                 "ROBOTLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 7 1 2\n"
+                 "ROBOTLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 2147483647 1 2\n"
+                 "ROBOTLASER1 0 nan 2.0 0 8.0 0.01 0 3 1 2 3 "
+                 "1 1 0 1 1 0 0.1 0.2 0.3 0.4 0.5 12.25 host 3\n"
+                 "FANCY 1 2 3\n"
+                 "garbage\n"
+                 "\n"
+                 "SYNC tag 1 h 1\n"
+                 "TRUEPOS 0 0 0 0 0 0 1 h 1\n");
   EXPECT_EQ(log.scans.size(), 1u);
   EXPECT_EQ(Skipped(log, "ODOM"), 2);
   EXPECT_EQ(Skipped(log, "PARAM"), 2);
@@ -346,12 +353,12 @@ TEST(CarmenReaderTest, OtherGarbledMessages) {
 }
 
 TEST(CarmenReaderTest, Parameters) {
-  const Log log = Read(Flaser(2, "1", "0 0 0 0 0 0", "1") +
-                       "PARAM a 1 nohost 0\n"
-                       "PARAM b two words 1 host 2\n"
-                       "PARAM c only\n"
-                       "PARAM d old 1 h 1\n"
-                       "PARAM d new 2 h 2\n");
+  const Log log = ReadCarmen(Flaser(2, "1", "0 0 0 0 0 0", "1") +
+                             "PARAM a 1 nohost 0\n"
+                             "PARAM b two words 1 host 2\n"
+                             "PARAM c only\n"
+                             "PARAM d old 1 h 1\n"
+                             "PARAM d new 2 h 2\n");
   EXPECT_EQ(log.parameters.at("a"), "1");
   EXPECT_EQ(log.parameters.at("b"), "two words");
   EXPECT_EQ(log.parameters.at("c"), "only");
@@ -359,10 +366,10 @@ TEST(CarmenReaderTest, Parameters) {
 }
 
 TEST(CarmenReaderTest, NumberOfBeamsMayChange) {
-  const Log log = Read(Flaser(180, "1", "0 0 0 0 0 0", "1") +
-                       Flaser(360, "1", "0 0 0 0 0 0", "2") +
-                       Flaser(360, "1", "0 0 0 0 0 0", "3") +
-                       Flaser(180, "1", "0 0 0 0 0 0", "4"));
+  const Log log = ReadCarmen(Flaser(180, "1", "0 0 0 0 0 0", "1") +
+                             Flaser(360, "1", "0 0 0 0 0 0", "2") +
+                             Flaser(360, "1", "0 0 0 0 0 0", "3") +
+                             Flaser(180, "1", "0 0 0 0 0 0", "4"));
   EXPECT_EQ(log.scans.size(), 4u);
   EXPECT_EQ(log.beam_count_changes, 2);
   EXPECT_NEAR(RadToDeg(log.scans[1].angle_step), 0.5, 1e-9);
@@ -370,7 +377,7 @@ TEST(CarmenReaderTest, NumberOfBeamsMayChange) {
 }
 
 TEST(CarmenReaderTest, CarriageReturns) {
-  const Log log = Read(
+  const Log log = ReadCarmen(
       "ODOM 0 0 0 0 0 0 1 h 1\r\n"
       "FLASER 2 1 1 0 0 0 0 0 0 1.5 h 1\r\n");
   ASSERT_EQ(log.scans.size(), 1u);
@@ -379,23 +386,23 @@ TEST(CarmenReaderTest, CarriageReturns) {
 }
 
 TEST(CarmenReaderTest, NothingToReadIsRefused) {
-  EXPECT_THAT(Refusal(""), HasSubstr("test.log: no laser scan found: the "
-                                     "input is empty"));
-  EXPECT_THAT(Refusal("ODOM 0 0 0 0 0 0 1 h 1\n"),
+  EXPECT_THAT(WhyRefused(""), HasSubstr("test.log: no laser scan found: the "
+                                        "input is empty"));
+  EXPECT_THAT(WhyRefused("ODOM 0 0 0 0 0 0 1 h 1\n"),
               HasSubstr("1 lines, 1 ODOM: expected a CARMEN log"));
-  EXPECT_THAT(Refusal("hello\n"),
+  EXPECT_THAT(WhyRefused("hello\n"),
               HasSubstr("1 x line that starts with no message name (first in "
                         "line 1)"));
-  EXPECT_THAT(Refusal(std::string("\0\1\2\n\0", 5)),
+  EXPECT_THAT(WhyRefused(std::string("\0\1\2\n\0", 5)),
               HasSubstr("2 x line with zero bytes"));
-  EXPECT_THAT(Refusal("VERTEX_SE2 0 0 0 0\n"), HasSubstr("is a g2o graph"));
-  EXPECT_THAT(Refusal("\x1f\x8b\x08"), HasSubstr("gzip data breaks off"));
+  EXPECT_THAT(WhyRefused("VERTEX_SE2 0 0 0 0\n"), HasSubstr("is a g2o graph"));
+  EXPECT_THAT(WhyRefused("\x1f\x8b\x08"), HasSubstr("gzip data breaks off"));
 }
 
 TEST(CarmenReaderTest, ManyUnknownNamesMakeFewReports) {
   std::string text = Flaser(2, "1", "0 0 0 0 0 0", "1");
   for (int i = 0; i < 1000; ++i) text += "X" + std::to_string(i) + " 1\n";
-  const Log log = Read(text);
+  const Log log = ReadCarmen(text);
   EXPECT_EQ(log.skipped.size(), 21u);
   EXPECT_EQ(Skipped(log, "not used"), 1000);
 }
@@ -403,15 +410,15 @@ TEST(CarmenReaderTest, ManyUnknownNamesMakeFewReports) {
 TEST(CarmenReaderTest, ScansThatAreTooDenseAreThinned) {
   std::string dense = "FLASER 25000 ";
   for (int i = 0; i < 25000; ++i) dense += std::to_string(1 + i % 3) + " ";
-  const Log log = Read(Flaser(10000, "2", "0 0 0 0 0 0", "1") + dense +
-                       "0 0 0 0 0 0 2 host 0.5\n");
+  const Log log = ReadCarmen(Flaser(10000, "2", "0 0 0 0 0 0", "1") + dense +
+                             "0 0 0 0 0 0 2 host 0.5\n");
   ASSERT_EQ(log.scans.size(), 2u);
   EXPECT_EQ(log.scans[0].ranges.size(), 10000u);
-  EXPECT_NEAR(log.scans[0].angle_step, kPi / 10000, kTight);
+  EXPECT_NEAR(log.scans[0].angle_step, kPi / 10000, kRounding);
   const Scan& scan = log.scans[1];
   ASSERT_EQ(scan.ranges.size(), 8334u);
-  EXPECT_NEAR(scan.start_angle, -kPi / 2, kTight);
-  EXPECT_NEAR(scan.angle_step, 3 * kPi / 25000, kTight);
+  EXPECT_NEAR(scan.start_angle, -kPi / 2, kRounding);
+  EXPECT_NEAR(scan.angle_step, 3 * kPi / 25000, kRounding);
   for (const float range : scan.ranges) ASSERT_EQ(range, 1.0f);
   EXPECT_EQ(Skipped(log, "more than 10000"), 1);
   EXPECT_THAT(log.skipped.back().first_lines, ElementsAre(2));

@@ -16,19 +16,19 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-Log Read(const std::string& text, const LaserOptions& options = {}) {
+Log ReadCsv(const std::string& text, const LaserOptions& options = {}) {
   InputStream input("scans.csv", text);
   return ReadCsvLog(&input, options);
 }
 
 std::string WhyNot(const std::string& text, const LaserOptions& options = {}) {
-  return Refusal([&] { Read(text, options); });
+  return Refusal([&] { ReadCsv(text, options); });
 }
 
 const char kHeader[] = "time,start_angle,angle_step,r0,r1,r2\n";
 
 TEST(CsvReaderTest, ReadsColumnsInAnyOrder) {
-  const Log log = Read(
+  const Log log = ReadCsv(
       "# of a robot\n"
       "r1, r0 ,laser_theta,theta,y,x,time,angle_step,start_angle,max_range,"
       "laser_x,laser_y,battery\r\n"
@@ -56,7 +56,8 @@ TEST(CsvReaderTest, ReadsColumnsInAnyOrder) {
 }
 
 TEST(CsvReaderTest, DoesWithoutOdometryAndPlace) {
-  const Log log = Read(std::string(kHeader) + "1,-1,1,2,3,4\n2,-1,1,2,3,4\n");
+  const Log log =
+      ReadCsv(std::string(kHeader) + "1,-1,1,2,3,4\n2,-1,1,2,3,4\n");
   EXPECT_FALSE(log.has_odometry);
   EXPECT_EQ(log.odometry_source, "");
   EXPECT_EQ(log.scans[1].laser_offset, Pose2(0.0, 0.0, 0.0));
@@ -68,14 +69,14 @@ TEST(CsvReaderTest, OptionsReplaceColumns) {
   options.laser_start_angle = -0.5;
   options.laser_step = 0.25;
   options.laser_max_range = 3.5;
-  const Log log = Read("time,r0,r1\n1,3,4\n", options);
+  const Log log = ReadCsv("time,r0,r1\n1,3,4\n", options);
   EXPECT_EQ(log.scans[0].start_angle, -0.5);
   EXPECT_EQ(log.scans[0].angle_step, 0.25);
   EXPECT_THAT(log.scans[0].ranges, ElementsAre(3.0f, 0.0f));
 }
 
 TEST(CsvReaderTest, WhatIsNoReturn) {
-  const Log log = Read(
+  const Log log = ReadCsv(
       "time,start_angle,angle_step,max_range,r0,r1,r2,r3,r4,r5,r6,r7\n"
       "1,-1,0.1,10,,nan,inf,0,-1,10,none,9.9\n");
   EXPECT_THAT(log.scans[0].ranges,
@@ -83,14 +84,16 @@ TEST(CsvReaderTest, WhatIsNoReturn) {
 }
 
 TEST(CsvReaderTest, TurnsClockwiseScans) {
-  const Log log = Read("time,start_angle,angle_step,r0,r1,r2\n1,1,-1,2,3,4\n");
+  const Log log =
+      ReadCsv("time,start_angle,angle_step,r0,r1,r2\n1,1,-1,2,3,4\n");
   EXPECT_EQ(log.scans[0].start_angle, -1.0);
   EXPECT_EQ(log.scans[0].angle_step, 1.0);
   EXPECT_THAT(log.scans[0].ranges, ElementsAre(4.0f, 3.0f, 2.0f));
 }
 
 TEST(CsvReaderTest, TimeThatJumpsBackIsCounted) {
-  const Log log = Read(std::string(kHeader) + "5,-1,1,2,3,4\n3.5,-1,1,2,3,4\n");
+  const Log log =
+      ReadCsv(std::string(kHeader) + "5,-1,1,2,3,4\n3.5,-1,1,2,3,4\n");
   EXPECT_EQ(log.time_reversals, 1);
   EXPECT_EQ(log.largest_time_reversal, 1.5);
 }
@@ -119,7 +122,7 @@ TEST(CsvReaderTest, HeadersThatCannotBe) {
 }
 
 TEST(CsvReaderTest, PassesOverLinesThatCannotBe) {
-  const Log log = Read(
+  const Log log = ReadCsv(
       "time,start_angle,angle_step,x,y,theta,max_range,r0,r1\n"
       "1,-1,1,0,0,0,10,2,3\n"
       "2,-1,1,0,0,0,10,2\n"

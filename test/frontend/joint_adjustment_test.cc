@@ -17,7 +17,7 @@ namespace {
 
 using testing::MakeScan;
 using testing::Noise;
-using testing::Wall;
+using testing::WallEnds;
 
 // A room of 10 m by 6 m with a pillar, driven round twice. Every scan is a key
 // scan; the refined odometry is the truth with a little drift. In the map the
@@ -27,7 +27,7 @@ class JointAdjustmentTest : public ::testing::Test {
   JointAdjustmentTest() {
     RegisterBuiltinRelations(&registry_);
     world_ = testing::Room(10.0, 6.0);
-    for (const Wall& wall :
+    for (const WallEnds& wall :
          testing::Moved(testing::Room(0.8, 0.8), Pose2(1.0, 0.3, 0.0))) {
       world_.push_back(wall);
     }
@@ -121,7 +121,7 @@ class JointAdjustmentTest : public ::testing::Test {
 
   Registry registry_;
   Graph graph_;
-  std::vector<Wall> world_;
+  std::vector<WallEnds> world_;
   std::vector<Scan> scans_;
   std::vector<RefinedScan> refined_;
   std::vector<KeyScanRecord> records_;

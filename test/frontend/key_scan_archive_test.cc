@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-UncertainPose2 Motion(double x) {
+UncertainPose2 OdometryMotion(double x) {
   UncertainPose2 motion;
   motion.mean = Pose2(x, 0.1, 0.2);
   motion.covariance << 0.01, 0.001, 0.002, 0.001, 0.02, 0.003, 0.002, 0.003,
@@ -49,7 +49,7 @@ struct SmallLog {
       if (!one.is_key) continue;
       KeyScanRecord record;
       record.scan = i;
-      record.motion = Motion(i);
+      record.motion = OdometryMotion(i);
       record.is_loose = i == 2;
       record.from = i == 4 ? 0 : -1;
       record.matches.resize(3);
@@ -91,8 +91,9 @@ TEST(KeyScanArchiveTest, KeepsKeyScans) {
     EXPECT_EQ(archive.trajectory[k], log.trajectory[2 * k]);
     const KeyScanRecord& record = archive.records[k];
     EXPECT_EQ(record.scan, static_cast<int>(k));
-    EXPECT_EQ(record.motion.mean, Motion(2.0 * static_cast<double>(k)).mean);
-    EXPECT_EQ(record.motion.covariance, Motion(0).covariance);
+    EXPECT_EQ(record.motion.mean,
+              OdometryMotion(2.0 * static_cast<double>(k)).mean);
+    EXPECT_EQ(record.motion.covariance, OdometryMotion(0).covariance);
     EXPECT_EQ(record.pose, log.trajectory[2 * k]);
     EXPECT_TRUE(record.matches.empty());
     EXPECT_TRUE(archive.refined[k].is_key);

@@ -13,9 +13,9 @@ namespace {
 using testing::HeadingError;
 using testing::Observe;
 using testing::PositionError;
-using testing::Wall;
+using testing::WallEnds;
 
-AssociationOptions Options() {
+AssociationOptions NoiseOptions() {
   AssociationOptions options;
   options.feature_offset_sigma = 0.03;
   options.feature_angle_sigma = DegToRad(0.7);
@@ -30,9 +30,9 @@ struct Sight {
   std::vector<Association> associations;
 };
 
-Sight Look(const Pose2& truth, const std::vector<Wall>& walls) {
+Sight Look(const Pose2& truth, const std::vector<WallEnds>& walls) {
   Sight sight;
-  for (const Wall& wall : walls) {
+  for (const WallEnds& wall : walls) {
     const int index = static_cast<int>(sight.observations.size());
     sight.observations.push_back(Observe(truth, wall));
     AssociationCandidate candidate;
@@ -54,11 +54,11 @@ Sight Look(const Pose2& truth, const std::vector<Wall>& walls) {
 Localization Localize(const Pose2& predicted, const Eigen::Matrix3d& prior,
                       const Sight& sight) {
   return LocalizeRobot(predicted, prior, sight.observations, sight.candidates,
-                       sight.associations, Options());
+                       sight.associations, NoiseOptions());
 }
 
-const Wall kFloor{{-1.0, 0.0}, {3.0, 0.0}};
-const Wall kSide{{5.0, -1.0}, {5.0, 3.0}};
+const WallEnds kFloor{{-1.0, 0.0}, {3.0, 0.0}};
+const WallEnds kSide{{5.0, -1.0}, {5.0, 3.0}};
 
 TEST(LocalizationTest, TwoPerpendicularWallsGiveThePose) {
   const Pose2 truth(2.0, 1.0, 0.3);

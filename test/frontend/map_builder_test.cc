@@ -25,9 +25,9 @@ using testing::Observe;
 using testing::PointsOf;
 using testing::PositionError;
 using testing::Room;
-using testing::Wall;
+using testing::WallEnds;
 
-MapBuilderOptions Options() {
+MapBuilderOptions LinkOptions() {
   MapBuilderOptions options;
   options.link_radius = 10.0;
   options.association_depth = 3;
@@ -55,9 +55,10 @@ UncertainPose2 Motion(const Pose2& mean, double position_sigma = 0.03,
 }
 
 std::vector<SegmentObservation> ObserveAll(const Pose2& robot,
-                                           const std::vector<Wall>& walls) {
+                                           const std::vector<WallEnds>& walls) {
   std::vector<SegmentObservation> observations;
-  for (const Wall& wall : walls) observations.push_back(Observe(robot, wall));
+  for (const WallEnds& wall : walls)
+    observations.push_back(Observe(robot, wall));
   return observations;
 }
 
@@ -91,9 +92,9 @@ class MapBuilderTest : public ::testing::Test {
 };
 
 TEST_F(MapBuilderTest, FirstScanMakesFeaturesAndFixesTheBest) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   const Pose2 start(5.0, -2.0, 0.5);
-  const std::vector<Wall> walls =
+  const std::vector<WallEnds> walls =
       testing::Moved(Room(6.0, 4.0), Pose2(5.0, -1.0, 0.2));
   // The walls of 6 m come first and third; shorten the first.
   std::vector<SegmentObservation> observations = ObserveAll(start, walls);
@@ -136,11 +137,11 @@ TEST_F(MapBuilderTest, FirstScanMakesFeaturesAndFixesTheBest) {
 }
 
 TEST_F(MapBuilderTest, WithinScanRelationsAreLimitedAndToTheNearest) {
-  MapBuilderOptions options = Options();
+  MapBuilderOptions options = LinkOptions();
   options.links_within_scan = 2;
   MapBuilder builder(&graph_, registry_, options);
   // Five parallel walls, 2 m apart.
-  std::vector<Wall> walls;
+  std::vector<WallEnds> walls;
   for (int i = 0; i < 5; ++i) {
     walls.push_back({{-1.0, 2.0 * i}, {1.0, 2.0 * i}});
   }
@@ -158,11 +159,11 @@ TEST_F(MapBuilderTest, WithinScanRelationsAreLimitedAndToTheNearest) {
 }
 
 TEST_F(MapBuilderTest, SquareRoomDrivenAroundGivesFourWalls) {
-  const std::vector<Wall> walls = Room(8.0, 6.0);
+  const std::vector<WallEnds> walls = Room(8.0, 6.0);
   Laser laser;  // the half circle ahead
   laser.sigma = 0.01;
   Noise noise(21);
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   SegmentExtractionOptions extraction;
   std::vector<Pose2> motions;
   for (int side = 0; side < 4; ++side) {
@@ -220,14 +221,14 @@ TEST_F(MapBuilderTest, SquareRoomDrivenAroundGivesFourWalls) {
 
 TEST_F(MapBuilderTest, RelationsHoldAndTheirInformationIsSound) {
   // Noise free: what relations expect is what the features are.
-  MapBuilder builder(&graph_, registry_, Options());
-  std::vector<Wall> walls = Room(8.0, 6.0);
+  MapBuilder builder(&graph_, registry_, LinkOptions());
+  std::vector<WallEnds> walls = Room(8.0, 6.0);
   Pose2 robot(0.0, -1.0, 0.3);
   const Pose2 step(0.3, 0.0, 0.1);
   for (int i = 0; i < 8; ++i) {
     // One wall after the other comes into sight.
-    const std::vector<Wall> seen(walls.begin(),
-                                 walls.begin() + std::min(4, 1 + i / 2));
+    const std::vector<WallEnds> seen(walls.begin(),
+                                     walls.begin() + std::min(4, 1 + i / 2));
     builder.AddKeyScan(i, Motion(step), ObserveAll(robot, seen), robot);
     ASSERT_LT((builder.robot() - robot).norm(), 1e-6);
     robot = Compose(robot, step);
@@ -256,8 +257,8 @@ TEST_F(MapBuilderTest, RelationsHoldAndTheirInformationIsSound) {
 }
 
 TEST_F(MapBuilderTest, FeaturesStayWhileTheRobotIsCorrected) {
-  MapBuilder builder(&graph_, registry_, Options());
-  const std::vector<Wall> walls = Room(8.0, 6.0);
+  MapBuilder builder(&graph_, registry_, LinkOptions());
+  const std::vector<WallEnds> walls = Room(8.0, 6.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()), ObserveAll(Pose2::Zero(), walls),
                      Pose2::Zero());
   std::vector<Pose2> before;
@@ -283,11 +284,12 @@ TEST_F(MapBuilderTest, FeaturesStayWhileTheRobotIsCorrected) {
 }
 
 TEST_F(MapBuilderTest, ExtentsGrowAndNeverShrink) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   const Pose2 robot(0.0, 2.0, 0.0);
   const auto look = [&](double begin, double end) {
     builder.AddKeyScan(0, Motion(Pose2::Zero()),
-                       {Observe(robot, Wall{{begin, 0.0}, {end, 0.0}})}, robot);
+                       {Observe(robot, WallEnds{{begin, 0.0}, {end, 0.0}})},
+                       robot);
     const std::vector<const Feature*> segments = Segments();
     EXPECT_EQ(segments.size(), 1u);
     return Eigen::Vector2d(segments[0]->extent_begin, segments[0]->extent_end);
@@ -299,7 +301,7 @@ TEST_F(MapBuilderTest, ExtentsGrowAndNeverShrink) {
 }
 
 TEST_F(MapBuilderTest, TheLastLinkStaysWhenAllAreBeyondTheRadius) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      ObserveAll(Pose2::Zero(), {{{-1.0, 1.0}, {1.0, 1.0}},
                                                 {{-1.0, -1.0}, {1.0, -1.0}}}),
@@ -339,7 +341,7 @@ TEST_F(MapBuilderTest, TheLastLinkStaysWhenAllAreBeyondTheRadius) {
 
 // The scan begins in the middle of a wall, or a column hides it.
 TEST_F(MapBuilderTest, TwoPiecesOfAWallInTheFirstScanAreOneFeature) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   const Pose2 robot(0.0, 2.0, 0.0);
   const std::vector<SegmentObservation> pieces =
       ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
@@ -364,7 +366,7 @@ TEST_F(MapBuilderTest, TwoPiecesOfAWallInTheFirstScanAreOneFeature) {
 
 // The longest piece belongs to a wall that a shorter one has made.
 TEST_F(MapBuilderTest, TheGaugeIsFixedWhereTheLongestPieceIsOfAnothersWall) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   const Pose2 robot(0.0, 2.0, 0.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
@@ -379,15 +381,16 @@ TEST_F(MapBuilderTest, TheGaugeIsFixedWhereTheLongestPieceIsOfAnothersWall) {
 
 // What begins where a wall ended may be another wall at a small angle.
 TEST_F(MapBuilderTest, AContinuationIsNoSighting) {
-  MapBuilderOptions options = Options();
+  MapBuilderOptions options = LinkOptions();
   options.association.max_gap = 0.0;
   MapBuilder builder(&graph_, registry_, options);
   const Pose2 robot(0.0, 2.0, 0.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
-                     {Observe(robot, Wall{{-2.0, 0.0}, {0.0, 0.0}})}, robot);
+                     {Observe(robot, WallEnds{{-2.0, 0.0}, {0.0, 0.0}})},
+                     robot);
   builder.AddKeyScan(1, Motion(Pose2::Zero()),
-                     {Observe(robot, Wall{{-2.0, 0.0}, {0.0, 0.0}}),
-                      Observe(robot, Wall{{0.02, 0.0}, {2.0, 0.06}})},
+                     {Observe(robot, WallEnds{{-2.0, 0.0}, {0.0, 0.0}}),
+                      Observe(robot, WallEnds{{0.02, 0.0}, {2.0, 0.06}})},
                      robot);
   const std::vector<const Feature*> segments = Segments();
   ASSERT_EQ(segments.size(), 2u);
@@ -396,7 +399,7 @@ TEST_F(MapBuilderTest, AContinuationIsNoSighting) {
 
 // A door leaf 10 cm behind its wall, or a wall at an angle, is another feature.
 TEST_F(MapBuilderTest, WhatIsNotInLineInTheFirstScanStaysApart) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   const Pose2 robot(0.0, 2.0, 0.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      ObserveAll(robot, {{{-2.0, 0.0}, {-0.05, 0.0}},
@@ -407,23 +410,24 @@ TEST_F(MapBuilderTest, WhatIsNotInLineInTheFirstScanStaysApart) {
 }
 
 TEST_F(MapBuilderTest, PiecesOfAWallBehindAColumnAreOneFeature) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   const Pose2 robot(0.0, 2.0, 0.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
-                     {Observe(robot, Wall{{-2.0, 0.0}, {2.0, 0.0}})}, robot);
+                     {Observe(robot, WallEnds{{-2.0, 0.0}, {2.0, 0.0}})},
+                     robot);
   builder.AddKeyScan(1, Motion(Pose2::Zero()),
-                     {Observe(robot, Wall{{-2.0, 0.0}, {-0.5, 0.0}}),
-                      Observe(robot, Wall{{0.5, 0.0}, {2.0, 0.0}})},
+                     {Observe(robot, WallEnds{{-2.0, 0.0}, {-0.5, 0.0}}),
+                      Observe(robot, WallEnds{{0.5, 0.0}, {2.0, 0.0}})},
                      robot);
   EXPECT_EQ(Segments().size(), 1u);
   EXPECT_EQ(builder.num_matches(), 2);
 }
 
 TEST_F(MapBuilderTest, OppositeFacesOfAThinWallAreTwoFeatures) {
-  MapBuilder builder(&graph_, registry_, Options());
-  const Wall above{{-1.0, 0.05}, {1.0, 0.05}};
-  const Wall below{{-1.0, -0.05}, {1.0, -0.05}};
-  const Wall end{{3.0, -3.0}, {3.0, 3.0}};
+  MapBuilder builder(&graph_, registry_, LinkOptions());
+  const WallEnds above{{-1.0, 0.05}, {1.0, 0.05}};
+  const WallEnds below{{-1.0, -0.05}, {1.0, -0.05}};
+  const WallEnds end{{3.0, -3.0}, {3.0, 3.0}};
   const Pose2 first(0.0, 1.5, 0.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()), ObserveAll(first, {above, end}),
                      first);
@@ -435,9 +439,9 @@ TEST_F(MapBuilderTest, OppositeFacesOfAThinWallAreTwoFeatures) {
 }
 
 TEST_F(MapBuilderTest, LinksBeyondTheRadiusAreCut) {
-  MapBuilder builder(&graph_, registry_, Options());
-  const Wall near{{0.0, 1.0}, {2.0, 1.0}};
-  const Wall ahead{{9.0, 1.0}, {12.0, 1.0}};
+  MapBuilder builder(&graph_, registry_, LinkOptions());
+  const WallEnds near{{0.0, 1.0}, {2.0, 1.0}};
+  const WallEnds ahead{{9.0, 1.0}, {12.0, 1.0}};
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      ObserveAll(Pose2::Zero(), {near, ahead}), Pose2::Zero());
   EXPECT_THAT(builder.Neighborhood(1), ElementsAre(0, 1));
@@ -465,12 +469,12 @@ TEST_F(MapBuilderTest, AssociationGoesAsDeepAsAllowed) {
   for (int depth : {1, 2}) {
     SCOPED_TRACE(depth);
     Graph graph;
-    MapBuilderOptions options = Options();
+    MapBuilderOptions options = LinkOptions();
     options.association_depth = depth;
     options.link_radius = 3.0;
     MapBuilder builder(&graph, registry_, options);
-    const Wall first{{-2.0, 1.0}, {0.0, 1.0}};
-    const Wall second{{1.0, -1.0}, {6.0, -1.0}};
+    const WallEnds first{{-2.0, 1.0}, {0.0, 1.0}};
+    const WallEnds second{{1.0, -1.0}, {6.0, -1.0}};
     builder.AddKeyScan(0, Motion(Pose2::Zero()),
                        ObserveAll(Pose2::Zero(), {first, second}),
                        Pose2::Zero());
@@ -484,14 +488,14 @@ TEST_F(MapBuilderTest, AssociationGoesAsDeepAsAllowed) {
 }
 
 TEST_F(MapBuilderTest, NewFeaturesAreBoundToLinkedOnes) {
-  MapBuilderOptions options = Options();
+  MapBuilderOptions options = LinkOptions();
   options.links_per_feature = 2;
   MapBuilder builder(&graph_, registry_, options);
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      ObserveAll(Pose2::Zero(), Room(6.0, 4.0)), Pose2::Zero());
-  const Wall pillar{{1.0, 0.5}, {1.0, 1.2}};
+  const WallEnds pillar{{1.0, 0.5}, {1.0, 1.2}};
   const Pose2 robot(0.1, 0.0, 0.0);
-  std::vector<Wall> walls = Room(6.0, 4.0);
+  std::vector<WallEnds> walls = Room(6.0, 4.0);
   walls.push_back(pillar);
   builder.AddKeyScan(1, Motion(robot), ObserveAll(robot, walls), Pose2::Zero());
   ASSERT_EQ(Segments().size(), 5u);
@@ -507,14 +511,14 @@ TEST_F(MapBuilderTest, NewFeaturesAreBoundToLinkedOnes) {
 }
 
 TEST_F(MapBuilderTest, SecondLooksRaiseTheInformation) {
-  MapBuilderOptions options = Options();
+  MapBuilderOptions options = LinkOptions();
   options.second_look_weight = 0.2;
   options.relation_floor_angle = DegToRad(0.1);
   options.relation_floor_position = 0.001;
   options.along_sigma = 0.02;
   MapBuilder builder(&graph_, registry_, options);
-  const std::vector<Wall> walls = {{{-2.0, -1.0}, {2.0, -1.0}},
-                                   {{-2.0, 1.0}, {2.0, 1.0}}};
+  const std::vector<WallEnds> walls = {{{-2.0, -1.0}, {2.0, -1.0}},
+                                       {{-2.0, 1.0}, {2.0, 1.0}}};
   const std::vector<SegmentObservation> observations =
       ObserveAll(Pose2::Zero(), walls);
   double angle = 0.0;
@@ -539,7 +543,7 @@ TEST_F(MapBuilderTest, SecondLooksRaiseTheInformation) {
 }
 
 TEST_F(MapBuilderTest, SecondLooksNeverPassTheFloor) {
-  MapBuilderOptions options = Options();
+  MapBuilderOptions options = LinkOptions();
   options.second_look_weight = 0.2;
   options.relation_floor_angle = DegToRad(0.2);
   options.relation_floor_position = 0.005;
@@ -569,7 +573,7 @@ TEST_F(MapBuilderTest, SecondLooksNeverPassTheFloor) {
 }
 
 TEST_F(MapBuilderTest, WriteAndReadTheRobot) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   builder.ReadRobot();  // nothing there yet
   EXPECT_EQ(builder.robot_id(), kNoId);
   EXPECT_EQ(builder.robot(), Pose2::Zero());
@@ -616,8 +620,8 @@ TEST_F(MapBuilderTest, WriteAndReadTheRobot) {
 
 TEST_F(MapBuilderTest, FollowsAMovedMap) {
   // The back-end moved features and robot: the next scan is recognized there.
-  MapBuilder builder(&graph_, registry_, Options());
-  const std::vector<Wall> walls = Room(6.0, 4.0);
+  MapBuilder builder(&graph_, registry_, LinkOptions());
+  const std::vector<WallEnds> walls = Room(6.0, 4.0);
   builder.AddKeyScan(0, Motion(Pose2::Zero()), ObserveAll(Pose2::Zero(), walls),
                      Pose2::Zero());
   builder.WriteRobot();
@@ -635,14 +639,15 @@ TEST_F(MapBuilderTest, FollowsAMovedMap) {
 }
 
 TEST_F(MapBuilderTest, ScansWithoutSegments) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   builder.AddKeyScan(0, Motion(Pose2::Zero()), {}, Pose2(1.0, 1.0, 0.0));
   builder.AddKeyScan(1, Motion(Pose2(0.5, 0.0, 0.1)), {}, Pose2::Zero());
   EXPECT_EQ(graph_.num_features(), 0u);
   EXPECT_LT((builder.robot() - Pose2(1.5, 1.0, 0.1)).norm(), 1e-12);
-  builder.AddKeyScan(2, Motion(Pose2::Zero()),
-                     {Observe(builder.robot(), Wall{{0.0, 0.0}, {2.0, 0.0}})},
-                     Pose2::Zero());
+  builder.AddKeyScan(
+      2, Motion(Pose2::Zero()),
+      {Observe(builder.robot(), WallEnds{{0.0, 0.0}, {2.0, 0.0}})},
+      Pose2::Zero());
   ASSERT_EQ(graph_.num_features(), 1u);
   // The first that there is fixes the gauge.
   EXPECT_TRUE(graph_.GetFeature(0).fixed);
@@ -650,7 +655,7 @@ TEST_F(MapBuilderTest, ScansWithoutSegments) {
 }
 
 TEST_F(MapBuilderTest, UncertaintyGrowsWhileBlind) {
-  MapBuilder builder(&graph_, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
   builder.AddKeyScan(0, Motion(Pose2::Zero()),
                      ObserveAll(Pose2::Zero(), Room(6.0, 4.0)), Pose2::Zero());
   builder.WriteRobot();
@@ -675,8 +680,8 @@ TEST_F(MapBuilderTest, UncertaintyGrowsWhileBlind) {
 
 TEST_F(MapBuilderTest, SameMapTenKilometresAway) {
   Graph there;
-  MapBuilder builder(&graph_, registry_, Options());
-  MapBuilder far(&there, registry_, Options());
+  MapBuilder builder(&graph_, registry_, LinkOptions());
+  MapBuilder far(&there, registry_, LinkOptions());
   const Pose2 shift(10000.0, -10000.0, 0.0);
   Pose2 robot(0.0, -1.0, 0.3);
   const Pose2 start = robot;

@@ -14,7 +14,7 @@ using testing::Laser;
 using testing::MakeScan;
 using testing::Noise;
 using testing::Room;
-using testing::Wall;
+using testing::WallEnds;
 
 // Two rounds through a hall of 12 m x 9 m with pillars, 0.3 m a key scan.
 struct Rounds {
@@ -26,10 +26,10 @@ struct Rounds {
 };
 
 Rounds TwoRounds() {
-  std::vector<Wall> walls = Room(12.0, 9.0);
+  std::vector<WallEnds> walls = Room(12.0, 9.0);
   for (const Pose2& place : {Pose2(0.5, 0.3, 0.4), Pose2(-5.2, 1.0, 0.0),
                              Pose2(3.5, -3.9, 0.0), Pose2(1.0, 4.0, 0.2)}) {
-    for (const Wall& side : testing::Moved(Room(1.2, 0.8), place)) {
+    for (const WallEnds& side : testing::Moved(Room(1.2, 0.8), place)) {
       walls.push_back(side);
     }
   }
@@ -157,7 +157,7 @@ TEST(FindConfirmedTiesTest, WhatNothingShowsIsNot) {
 
 // Along a corridor all agrees wherever it lies.
 TEST(FindConfirmedTiesTest, ACorridorSaysNothingAlongItself) {
-  const std::vector<Wall> walls = Room(80.0, 2.0);
+  const std::vector<WallEnds> walls = Room(80.0, 2.0);
   Laser laser;
   laser.sigma = 0.01;
   laser.maximum_range = 8.0;

@@ -23,9 +23,9 @@ using testing::MakeScan;
 using testing::Noise;
 using testing::PositionError;
 using testing::Room;
-using testing::Wall;
+using testing::WallEnds;
 
-OdometryRefinementOptions Options() {
+OdometryRefinementOptions RefinerOptions() {
   OdometryRefinementOptions options;
   options.key_distance = 0.3;
   options.key_rotation = 0.15;
@@ -34,9 +34,9 @@ OdometryRefinementOptions Options() {
 }
 
 // A room of 10 m x 8 m with a pillar.
-std::vector<Wall> Hall() {
-  std::vector<Wall> walls = Room(10.0, 8.0);
-  for (const Wall& side : testing::Moved(Room(0.8, 0.8), {1.0, 0.5, 0.0})) {
+std::vector<WallEnds> Hall() {
+  std::vector<WallEnds> walls = Room(10.0, 8.0);
+  for (const WallEnds& side : testing::Moved(Room(0.8, 0.8), {1.0, 0.5, 0.0})) {
     walls.push_back(side);
   }
   return walls;
@@ -60,7 +60,7 @@ Drive Along(const Pose2& start, const std::vector<Pose2>& motions,
   return drive;
 }
 
-std::vector<RefinedScan> Refine(const std::vector<Wall>& walls,
+std::vector<RefinedScan> Refine(const std::vector<WallEnds>& walls,
                                 const Drive& drive, const Laser& laser,
                                 const OdometryRefinementOptions& options,
                                 Noise* noise = nullptr) {
@@ -97,7 +97,7 @@ TEST(OdometryCovarianceTest, HandWorked) {
 }
 
 TEST(OdometryRefinerTest, FirstScanIsAKeyWhereOdometryStarts) {
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   Scan scan = MakeScan(Hall(), Pose2::Zero(), FullCircle());
   scan.odometry = Pose2(5.0, -3.0, 2.0);
   const RefinedScan refined = refiner.Process(scan);
@@ -128,7 +128,7 @@ TEST(OdometryRefinerTest, CorrectsWrongTurns) {
   laser.sigma = 0.01;
   Noise noise(1);
   const std::vector<RefinedScan> refined =
-      Refine(Hall(), drive, laser, Options(), &noise);
+      Refine(Hall(), drive, laser, RefinerOptions(), &noise);
   ASSERT_GT(HeadingError(drive.odometry.back(), drive.truth.back()),
             DegToRad(90.0));
   for (std::size_t i = 0; i < refined.size(); ++i) {
@@ -147,7 +147,7 @@ TEST(OdometryRefinerTest, CorrectsOneWrongTurnBetweenTwoScans) {
     motions[5] = Pose2(0.1, 0.0, DegToRad(40.0));
     reported[5] = Pose2(0.1, 0.0, DegToRad(40.0 + wrong));
     const Drive drive = Along(Pose2(-3.0, -2.5, 0.0), motions, reported);
-    OdometryRefiner refiner(Options());
+    OdometryRefiner refiner(RefinerOptions());
     RefinedScan refined;
     for (std::size_t i = 0; i < drive.truth.size(); ++i) {
       Scan scan = MakeScan(Hall(), drive.truth[i], FullCircle());
@@ -171,7 +171,7 @@ TEST(OdometryRefinerTest, KeepsOdometryAlongAFeaturelessCorridor) {
   laser.sigma = 0.01;
   Noise noise(2);
   const std::vector<RefinedScan> refined =
-      Refine(Corridor(), drive, laser, Options(), &noise);
+      Refine(Corridor(), drive, laser, RefinerOptions(), &noise);
   EXPECT_GT(HeadingError(drive.odometry.back(), drive.truth.back()),
             DegToRad(19.0));
   EXPECT_NEAR(refined.back().pose[0], 10.0, 0.3);
@@ -193,7 +193,7 @@ TEST(OdometryRefinerTest, CovarianceIsInTheAxesOfTheKeyScan) {
   laser.maximum_range = 8.0;
   const std::vector<RefinedScan> refined =
       Refine(testing::Moved(Corridor(), turn), Along(turn, motions, motions),
-             laser, Options());
+             laser, RefinerOptions());
   for (std::size_t i = 1; i < refined.size(); ++i) {
     const Eigen::Matrix3d& covariance = refined[i].since_key.covariance;
     EXPECT_GT(covariance(0, 0), 4.0 * covariance(1, 1)) << i;
@@ -207,7 +207,7 @@ TEST(OdometryRefinerTest, CovarianceGrowsAlongACorridor) {
   const std::vector<Pose2> motions(9, step);
   Laser laser = FullCircle();
   laser.maximum_range = 8.0;
-  const OdometryRefinementOptions options = Options();
+  const OdometryRefinementOptions options = RefinerOptions();
   const std::vector<RefinedScan> refined = Refine(
       Corridor(), Along(Pose2::Zero(), motions, motions), laser, options);
   UncertainPose2 odometry;
@@ -235,7 +235,7 @@ TEST(OdometryRefinerTest, BackwardsGivenAsForwards) {
   const std::vector<Pose2> motions(10, Pose2(-0.4, 0.0, 0.0));
   const std::vector<Pose2> reported(10, Pose2(0.4, 0.0, 0.0));
   const Drive drive = Along(Pose2(3.0, -2.0, 0.2), motions, reported);
-  OdometryRefinementOptions options = Options();
+  OdometryRefinementOptions options = RefinerOptions();
   options.search_translation = 0.1;
   const std::vector<RefinedScan> refined =
       Refine(Hall(), drive, FullCircle(), options);
@@ -255,7 +255,7 @@ TEST(OdometryRefinerTest, OdometryThatJumps) {
     reported[5] = Pose2(jump, -jump, 0.5);
     const std::vector<RefinedScan> refined =
         Refine(Hall(), Along(Pose2(-2.0, -1.5, 0.2), motions, reported),
-               FullCircle(), Options());
+               FullCircle(), RefinerOptions());
     EXPECT_FALSE(refined[5].odometry_only);
     EXPECT_TRUE(refined[6].odometry_only);
     EXPECT_TRUE(refined[6].is_key);
@@ -276,7 +276,7 @@ TEST(OdometryRefinerTest, ScansOfAnotherTimeAreNotFollowed) {
                             std::vector<Pose2>(30, Pose2(0.02, 0.0, 0.01)));
   const Pose2 ahead(0.5, 0.1, 0.1);
   const auto largest_error = [&](double gap_speed) {
-    OdometryRefinementOptions options = Options();
+    OdometryRefinementOptions options = RefinerOptions();
     options.tracking.gap_speed = gap_speed;
     OdometryRefiner refiner(options);
     double largest = 0.0;
@@ -303,7 +303,7 @@ TEST(OdometryRefinerTest, WheelsThatSlipAreCorrected) {
   const std::vector<Pose2> motions(40, Pose2(0.12, 0.0, 0.02));
   const Drive drive = Along(Pose2(-3.0, -2.5, 0.0), motions,
                             std::vector<Pose2>(40, Pose2::Zero()));
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   for (std::size_t i = 0; i < drive.truth.size(); ++i) {
     Scan scan = MakeScan(Hall(), drive.truth[i], FullCircle());
     scan.odometry = drive.odometry[i];
@@ -322,7 +322,7 @@ TEST(OdometryRefinerTest, NoOdometryAtAll) {
   const Drive drive = Along(Pose2(-3.5, -2.5, 0.0), motions, reported);
   ASSERT_EQ(drive.odometry.back(), drive.odometry.front());
   const std::vector<RefinedScan> refined =
-      Refine(Hall(), drive, FullCircle(), Options());
+      Refine(Hall(), drive, FullCircle(), RefinerOptions());
   for (std::size_t i = 0; i < refined.size(); ++i) {
     EXPECT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.08) << i;
     EXPECT_LT(HeadingError(refined[i].pose, drive.truth[i]), DegToRad(1.0))
@@ -337,7 +337,7 @@ TEST(OdometryRefinerTest, StandingStillMakesNoKeys) {
   laser.sigma = 0.015;
   Noise noise(4);
   const std::vector<RefinedScan> refined =
-      Refine(Hall(), drive, laser, Options(), &noise);
+      Refine(Hall(), drive, laser, RefinerOptions(), &noise);
   EXPECT_TRUE(refined[0].is_key);
   for (std::size_t i = 1; i < refined.size(); ++i) {
     EXPECT_FALSE(refined[i].is_key) << i;
@@ -347,7 +347,7 @@ TEST(OdometryRefinerTest, StandingStillMakesNoKeys) {
 }
 
 TEST(OdometryRefinerTest, KeysComeByDistanceAndByRotation) {
-  OdometryRefinementOptions options = Options();
+  OdometryRefinementOptions options = RefinerOptions();
   options.key_distance = 0.3;
   options.key_rotation = DegToRad(10.0);
   std::vector<Pose2> motions(10, Pose2(0.11, 0.0, 0.0));
@@ -375,7 +375,7 @@ TEST(OdometryRefinerTest, SinceKeyIsRelativeToTheKeyBefore) {
   }
   const Drive drive = Along(Pose2(-2.0, -2.0, 2.8), motions, motions);
   for (bool match : {true, false}) {
-    OdometryRefinementOptions options = Options();
+    OdometryRefinementOptions options = RefinerOptions();
     options.match_scans = match;
     const std::vector<RefinedScan> refined =
         Refine(Hall(), drive, FullCircle(), options);
@@ -392,7 +392,7 @@ TEST(OdometryRefinerTest, SinceKeyIsRelativeToTheKeyBefore) {
 }
 
 TEST(OdometryRefinerTest, WithoutMatchingItIsRawOdometry) {
-  OdometryRefinementOptions options = Options();
+  OdometryRefinementOptions options = RefinerOptions();
   options.match_scans = false;
   options.key_distance = 0.45;
   options.noise.translation = 0.0;
@@ -434,11 +434,11 @@ TEST(OdometryRefinerTest, TooFewReturnsLeaveOdometry) {
   const std::vector<Pose2> motions(6, Pose2(0.1, 0.0, 0.0));
   const std::vector<Pose2> reported(6, Pose2(0.12, 0.0, 0.0));
   const Drive drive = Along(Pose2(-3.0, -2.0, 0.0), motions, reported);
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   RefinedScan before;
   for (std::size_t i = 0; i < drive.truth.size(); ++i) {
-    Scan scan = MakeScan(i < 3 ? Hall() : std::vector<Wall>(), drive.truth[i],
-                         FullCircle());
+    Scan scan = MakeScan(i < 3 ? Hall() : std::vector<WallEnds>(),
+                         drive.truth[i], FullCircle());
     scan.odometry = drive.odometry[i];
     const RefinedScan refined = refiner.Process(scan);
     if (i >= 3) {
@@ -454,11 +454,11 @@ TEST(OdometryRefinerTest, SightComesBackAfterDarkness) {
   // Blind from the start: there is nothing to match with until walls come.
   const std::vector<Pose2> motions(20, Pose2(0.1, 0.0, 0.0));
   const Drive drive = Along(Pose2(-3.0, -2.0, 0.0), motions, motions);
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   RefinedScan refined;
   for (std::size_t i = 0; i < drive.truth.size(); ++i) {
-    Scan scan = MakeScan(i < 8 ? std::vector<Wall>() : Hall(), drive.truth[i],
-                         FullCircle());
+    Scan scan = MakeScan(i < 8 ? std::vector<WallEnds>() : Hall(),
+                         drive.truth[i], FullCircle());
     scan.odometry = drive.odometry[i];
     refined = refiner.Process(scan);
   }
@@ -468,7 +468,7 @@ TEST(OdometryRefinerTest, SightComesBackAfterDarkness) {
 
 TEST(OdometryRefinerTest, AnotherPlaceIsRefused) {
   // The robot is carried to a place that looks like nothing seen before.
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   refiner.Process(MakeScan(Room(10.0, 8.0), Pose2::Zero(), FullCircle()));
   Scan scan = MakeScan(Room(2.0, 1.5), Pose2::Zero(), FullCircle());
   scan.odometry = Pose2(0.1, 0.0, 0.0);
@@ -486,7 +486,7 @@ TEST(OdometryRefinerTest, LaserOffsetIsAccountedFor) {
   const std::vector<Pose2> reported(30, Pose2(0.0, 0.0, DegToRad(5.0)));
   const Drive drive = Along(Pose2(-1.0, -1.0, 0.0), motions, reported);
   const std::vector<RefinedScan> refined =
-      Refine(Hall(), drive, laser, Options());
+      Refine(Hall(), drive, laser, RefinerOptions());
   for (std::size_t i = 0; i < refined.size(); ++i) {
     EXPECT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.04) << i;
     EXPECT_LT(HeadingError(refined[i].pose, drive.truth[i]), DegToRad(0.5))
@@ -501,8 +501,8 @@ TEST(OdometryRefinerTest, SameResultTenKilometresAway) {
   const Drive here = Along(Pose2(-3.0, -2.0, 0.0), motions, reported);
   Drive there = here;
   for (Pose2& pose : there.odometry) pose += shift;
-  const auto a = Refine(Hall(), here, FullCircle(), Options());
-  const auto b = Refine(Hall(), there, FullCircle(), Options());
+  const auto a = Refine(Hall(), here, FullCircle(), RefinerOptions());
+  const auto b = Refine(Hall(), there, FullCircle(), RefinerOptions());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_LT((b[i].pose - shift - a[i].pose).norm(), 1e-5) << i;
     EXPECT_EQ(a[i].is_key, b[i].is_key);
@@ -522,12 +522,14 @@ std::vector<RefinedScan> TakeAll(OdometryRefiner* refiner,
 }
 
 // The hall with two niches, so that it looks like itself from one place alone.
-std::vector<Wall> PlainHall() {
-  std::vector<Wall> walls = Hall();
-  for (const Wall& side : testing::Moved(Room(1.0, 2.0), {-4.5, 3.0, 0.0})) {
+std::vector<WallEnds> PlainHall() {
+  std::vector<WallEnds> walls = Hall();
+  for (const WallEnds& side :
+       testing::Moved(Room(1.0, 2.0), {-4.5, 3.0, 0.0})) {
     walls.push_back(side);
   }
-  for (const Wall& side : testing::Moved(Room(2.5, 0.6), {3.0, -3.7, 0.0})) {
+  for (const WallEnds& side :
+       testing::Moved(Room(2.5, 0.6), {3.0, -3.7, 0.0})) {
     walls.push_back(side);
   }
   return walls;
@@ -544,7 +546,7 @@ TEST(OdometryRefinerTest, StaleOdometryAfterAGap) {
       Laser laser;
       laser.sigma = 0.01;
       Noise noise(5);
-      OdometryRefiner refiner(Options());
+      OdometryRefiner refiner(RefinerOptions());
       Pose2 truth(-2.5, -2.0, 0.3);
       Pose2 before = truth;
       double time = 100.0;
@@ -579,8 +581,8 @@ TEST(OdometryRefinerTest, StaleOdometryAfterAGap) {
 }
 
 // A corridor of 10 m along x from the origin, with a pillar and a niche.
-std::vector<Wall> ShortCorridor(const Pose2& at) {
-  const std::vector<Wall> walls = {
+std::vector<WallEnds> ShortCorridor(const Pose2& at) {
+  const std::vector<WallEnds> walls = {
       {{0.0, -1.0}, {4.0, -1.0}},  {{4.0, -1.0}, {4.0, -1.8}},
       {{4.0, -1.8}, {5.5, -1.8}},  {{5.5, -1.8}, {5.5, -1.0}},
       {{5.5, -1.0}, {10.0, -1.0}}, {{0.0, 1.0}, {2.5, 1.0}},
@@ -612,13 +614,13 @@ struct DarkHall {
 };
 
 DarkHall DriveThroughADarkHall(double heading_error, double jump) {
-  std::vector<Wall> walls = ShortCorridor(Pose2::Zero());
-  for (const Wall& wall : ShortCorridor({18.0, 0.0, 0.0})) {
+  std::vector<WallEnds> walls = ShortCorridor(Pose2::Zero());
+  for (const WallEnds& wall : ShortCorridor({18.0, 0.0, 0.0})) {
     walls.push_back(wall);
   }
   Noise noise(9);
   DarkHall result;
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   Pose2 truth(0.3, 0.0, 0.0);
   Pose2 odometry = truth;
   for (int i = 0; i < 245; ++i) {
@@ -691,11 +693,11 @@ TEST(OdometryRefinerTest, OdometryThatJumpedInTheDarkIsNotBelieved) {
 
 // Carried into another building: nothing tells where it is, and that is said.
 TEST(OdometryRefinerTest, CarriedIntoTheUnknown) {
-  const std::vector<Wall> there = Room(3.0, 5.5);
+  const std::vector<WallEnds> there = Room(3.0, 5.5);
   Laser laser;
   laser.sigma = 0.01;
   Noise noise(6);
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   Pose2 truth(-2.5, -2.0, 0.3);
   std::vector<RefinedScan> refined;
   for (int i = 0; i < 40; ++i) {
@@ -781,7 +783,7 @@ TEST(OdometryRefinerTest, CarriedAlongACorridorOfEqualDoors) {
 TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
   // A hall of 20 m by 6 m with pillars, none like another, and a corridor of
   // 22 m that begins where the hall ends.
-  std::vector<Wall> walls = {
+  std::vector<WallEnds> walls = {
       {{-20.0, 3.0}, {-20.0, -3.0}}, {{-20.0, -3.0}, {0.0, -3.0}},
       {{0.0, -3.0}, {0.0, -1.2}},    {{0.0, -1.2}, {22.0, -1.2}},
       {{22.0, -1.2}, {22.0, 1.2}},   {{22.0, 1.2}, {0.0, 1.2}},
@@ -794,7 +796,7 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
                       0.5 * layout.Normal(1.0));
     const double width = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
     const double depth = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
-    for (const Wall& side : testing::Moved(Room(width, depth), place)) {
+    for (const WallEnds& side : testing::Moved(Room(width, depth), place)) {
       walls.push_back(side);
     }
   }
@@ -804,7 +806,7 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
   laser.maximum_range = 5.0;
   laser.sigma = 0.01;
   Noise noise(4);
-  OdometryRefinementOptions options = Options();
+  OdometryRefinementOptions options = RefinerOptions();
   options.tracking.max_open_keys = 30;
   OdometryRefiner refiner(options);
   // Is interrupted while it looks for the part.
@@ -864,7 +866,7 @@ TEST(OdometryRefinerTest, AGapWithoutMotion) {
   Laser laser;
   laser.sigma = 0.01;
   Noise noise(7);
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   Pose2 truth(-2.5, -2.0, 0.3);
   for (int i = 0; i < 30; ++i) {
     if (i > 0) truth = Compose(truth, {0.1, 0.0, DegToRad(2.0)});
@@ -881,7 +883,7 @@ TEST(OdometryRefinerTest, AGapWithoutMotion) {
 // Three people go along with the robot through a corridor with niches. Near as
 // they are they have more returns than all that tells how far the robot went.
 TEST(OdometryRefinerTest, PeopleWhoWalkAlong) {
-  std::vector<Wall> walls;
+  std::vector<WallEnds> walls;
   for (int k = -4; k < 20; ++k) {
     const double x = 2.0 * k;
     walls.push_back({{x, -1.0}, {x + 1.3, -1.0}});
@@ -893,7 +895,7 @@ TEST(OdometryRefinerTest, PeopleWhoWalkAlong) {
   Laser laser;
   laser.sigma = 0.01;
   Noise noise(9);
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   struct Person {
     int beam;
     double distance;
@@ -950,8 +952,8 @@ TEST(OdometryRefinerTest, SomeReturnsThatFitDoNotOutweighOdometry) {
       std::string(folder == nullptr ? "" : folder) + "/fr079.clf.bz2";
   if (!std::ifstream(path)) GTEST_SKIP() << path << " is not there";
   const Log log = ReadCarmenLog(path, {});
-  OdometryRefiner wide(Options());
-  OdometryRefiner narrow(Options());
+  OdometryRefiner wide(RefinerOptions());
+  OdometryRefiner narrow(RefinerOptions());
   std::vector<RefinedScan> all;
   std::vector<RefinedScan> part;
   for (std::size_t i = 1000; i < 1300; ++i) {

@@ -116,7 +116,7 @@ std::vector<std::pair<std::string, std::string>> Logs() {
           {"mcap", MakeMcap(cdr, {})}};
 }
 
-Log Read(const std::string& bytes) {
+Log ReadPacked(const std::string& bytes) {
   static const Registry* const registry = [] {
     auto* const all = new Registry;
     RegisterBuiltinLogReaders(all);
@@ -131,13 +131,13 @@ Log Read(const std::string& bytes) {
 
 TEST(PackedLogsTest, EveryReaderReadsEveryKind) {
   for (const auto& [format, plain] : Logs()) {
-    const Log log = Read(plain);
+    const Log log = ReadPacked(plain);
     ASSERT_EQ(log.scans.size(), kScans) << format;
     for (const std::string& kind : Kinds()) {
       SCOPED_TRACE(format + " in " + kind);
       const std::string packed = Packed(kind, {plain});
       ASSERT_NE(packed, plain);
-      const Log unpacked = Read(packed);
+      const Log unpacked = ReadPacked(packed);
       EXPECT_THAT(unpacked.skipped, IsEmpty());
       ASSERT_EQ(unpacked.scans.size(), kScans);
       for (std::size_t i = 0; i < kScans; ++i) {
@@ -156,7 +156,7 @@ TEST(PackedLogsTest, EveryCutIsSaidOrRefused) {
         SCOPED_TRACE(format + " in " + kind + " cut at " + std::to_string(k) +
                      "/50");
         try {
-          const Log log = Read(packed.substr(0, packed.size() * k / 50));
+          const Log log = ReadPacked(packed.substr(0, packed.size() * k / 50));
           if (log.scans.size() < kScans) {
             EXPECT_THAT(log.skipped, Not(IsEmpty()));
           }
@@ -171,7 +171,7 @@ TEST(PackedLogsTest, EveryCutIsSaidOrRefused) {
 // What is damaged is read to the damage, never differently without a word.
 TEST(PackedLogsTest, DamagedBytesAreSaidOrRefused) {
   for (const auto& [format, plain] : Logs()) {
-    const Log whole = Read(plain);
+    const Log whole = ReadPacked(plain);
     for (const std::string& kind : Kinds()) {
       // libarchive writes zstd without a checksum.
       if (kind == "zst") continue;
@@ -182,7 +182,7 @@ TEST(PackedLogsTest, DamagedBytesAreSaidOrRefused) {
         std::string damaged = packed;
         damaged[packed.size() * k / 50] ^= 0x10;
         try {
-          const Log log = Read(damaged);
+          const Log log = ReadPacked(damaged);
           if (!log.skipped.empty()) continue;
           ASSERT_EQ(log.scans.size(), kScans);
           for (std::size_t i = 0; i < kScans; ++i) {
@@ -198,7 +198,7 @@ TEST(PackedLogsTest, DamagedBytesAreSaidOrRefused) {
 
 TEST(PackedLogsTest, OfAZipOfSeveralFilesTheFirstIsRead) {
   const std::string carmen = Logs().front().second;
-  const Log log = Read(Packed("zip", {carmen, "and another"}));
+  const Log log = ReadPacked(Packed("zip", {carmen, "and another"}));
   EXPECT_EQ(log.scans.size(), kScans);
   ASSERT_THAT(log.skipped, Not(IsEmpty()));
   EXPECT_THAT(log.skipped.back().reason, HasSubstr("more than one file"));

@@ -26,10 +26,10 @@ using testing::Observe;
 using testing::PointsOf;
 using testing::PositionError;
 using testing::Room;
-using testing::Wall;
+using testing::WallEnds;
 
-UncertainPose2 Motion(const Pose2& mean, double position_sigma = 0.02,
-                      double angle_sigma = DegToRad(0.7)) {
+UncertainPose2 QuietMotion(const Pose2& mean, double position_sigma = 0.02,
+                           double angle_sigma = DegToRad(0.7)) {
   UncertainPose2 motion;
   motion.mean = mean;
   motion.covariance = Eigen::Vector3d(position_sigma * position_sigma,
@@ -39,10 +39,10 @@ UncertainPose2 Motion(const Pose2& mean, double position_sigma = 0.02,
   return motion;
 }
 
-std::vector<SegmentObservation> ObserveAll(const Pose2& robot,
-                                           const std::vector<Wall>& walls) {
+std::vector<SegmentObservation> ObserveSurfaces(
+    const Pose2& robot, const std::vector<WallEnds>& walls) {
   std::vector<SegmentObservation> surfaces;
-  for (const Wall& wall : walls) surfaces.push_back(Observe(robot, wall));
+  for (const WallEnds& wall : walls) surfaces.push_back(Observe(robot, wall));
   return surfaces;
 }
 
@@ -85,9 +85,9 @@ class PointMapBuilderTest : public ::testing::Test {
 
   // Without the robot's own pose.
   void AddKeyScan(PointMapBuilder* builder, int scan,
-                  const std::vector<Wall>& walls, const Pose2& robot,
+                  const std::vector<WallEnds>& walls, const Pose2& robot,
                   const UncertainPose2& motion) {
-    builder->AddKeyScan(scan, motion, ObserveAll(robot, walls),
+    builder->AddKeyScan(scan, motion, ObserveSurfaces(robot, walls),
                         Eigen::Vector2d::Zero(), robot);
   }
 
@@ -100,7 +100,7 @@ TEST_F(PointMapBuilderTest, FirstScanPutsPointsOnTheWalls) {
   PointMapBuilder builder(&graph_, registry_, options_);
   const Pose2 robot(0.5, -0.5, 0.3);
   // The motion of the first scan does not count.
-  AddKeyScan(&builder, 17, Room(6.0, 4.0), robot, Motion(Pose2(9, 9, 1)));
+  AddKeyScan(&builder, 17, Room(6.0, 4.0), robot, QuietMotion(Pose2(9, 9, 1)));
   EXPECT_EQ(builder.robot(), robot);
   EXPECT_EQ(builder.feature_type(), "point");
   // 5.8 m and 3.8 m between the margins: 12 and 8 points a wall.
@@ -165,8 +165,8 @@ TEST_F(PointMapBuilderTest, LinksGoInDifferentDirections) {
   // A corridor: along one wall there are nearer points than across, but with
   // these alone the walls could bend.
   PointMapBuilder builder(&graph_, registry_, options_);
-  const std::vector<Wall> walls = {{{-4, -1}, {4, -1}}, {{4, 1}, {-4, 1}}};
-  AddKeyScan(&builder, 0, walls, Pose2::Zero(), Motion(Pose2::Zero()));
+  const std::vector<WallEnds> walls = {{{-4, -1}, {4, -1}}, {{4, 1}, {-4, 1}}};
+  AddKeyScan(&builder, 0, walls, Pose2::Zero(), QuietMotion(Pose2::Zero()));
   ASSERT_EQ(builder.num_created(), 32);
   std::map<FeatureId, std::pair<int, int>> links;  // along, across
   for (const Constraint* distance : Distances()) {
@@ -185,7 +185,7 @@ TEST_F(PointMapBuilderTest, LinksGoInDifferentDirections) {
 }
 
 TEST_F(PointMapBuilderTest, RoomDrivenAroundKeepsItsPoints) {
-  const std::vector<Wall> walls = Room(8.0, 6.0);
+  const std::vector<WallEnds> walls = Room(8.0, 6.0);
   Laser laser;  // the half circle ahead
   laser.sigma = 0.01;
   Noise noise(21);
@@ -198,7 +198,7 @@ TEST_F(PointMapBuilderTest, RoomDrivenAroundKeepsItsPoints) {
     for (int i = 0; i < 6; ++i) motions.emplace_back(0.0, 0.0, DegToRad(15.0));
   }
   Pose2 truth(-2.4, -1.4, 0.0);
-  UncertainPose2 reported = Motion(Pose2::Zero());
+  UncertainPose2 reported = QuietMotion(Pose2::Zero());
   for (std::size_t i = 0; i <= motions.size(); ++i) {
     builder.AddScan(
         KeyScanOf(MakeScan(walls, truth, laser, &noise), reported, truth));
@@ -206,8 +206,9 @@ TEST_F(PointMapBuilderTest, RoomDrivenAroundKeepsItsPoints) {
     ASSERT_LT(HeadingError(builder.robot(), truth), DegToRad(1.0)) << i;
     if (i == motions.size()) break;
     truth = Compose(truth, motions[i]);
-    reported = Motion(motions[i] + Pose2(noise.Normal(0.02), noise.Normal(0.02),
-                                         noise.Normal(DegToRad(0.7))));
+    reported =
+        QuietMotion(motions[i] + Pose2(noise.Normal(0.02), noise.Normal(0.02),
+                                       noise.Normal(DegToRad(0.7))));
   }
   // 28 m of walls, a point each half metre, and none twice.
   EXPECT_GE(builder.num_created(), 45);
@@ -230,8 +231,8 @@ TEST_F(PointMapBuilderTest, RoomDrivenAroundKeepsItsPoints) {
 
 TEST_F(PointMapBuilderTest, SecondLooksSharpenWhatTheySee) {
   PointMapBuilder builder(&graph_, registry_, options_);
-  const std::vector<Wall> walls = {{{-1, -1}, {1, -1}}, {{1, 1}, {-1, 1}}};
-  AddKeyScan(&builder, 0, walls, Pose2::Zero(), Motion(Pose2::Zero()));
+  const std::vector<WallEnds> walls = {{{-1, -1}, {1, -1}}, {{1, 1}, {-1, 1}}};
+  AddKeyScan(&builder, 0, walls, Pose2::Zero(), QuietMotion(Pose2::Zero()));
   // Across from each other, and neighbours on a wall.
   const auto find = [&](const Eigen::Vector2d& arm) -> const Constraint* {
     for (const Constraint* distance : Distances()) {
@@ -249,9 +250,9 @@ TEST_F(PointMapBuilderTest, SecondLooksSharpenWhatTheySee) {
   const double across_before = across->information(0, 0);
   const double along_before = along->information(0, 0);
   // Both walls a centimetre farther out.
-  const std::vector<Wall> seen = {{{-1, -1.01}, {1, -1.01}},
-                                  {{1, 1.01}, {-1, 1.01}}};
-  AddKeyScan(&builder, 1, seen, Pose2::Zero(), Motion(Pose2::Zero()));
+  const std::vector<WallEnds> seen = {{{-1, -1.01}, {1, -1.01}},
+                                      {{1, 1.01}, {-1, 1.01}}};
+  AddKeyScan(&builder, 1, seen, Pose2::Zero(), QuietMotion(Pose2::Zero()));
   EXPECT_EQ(builder.num_created(), 8);
   EXPECT_EQ(builder.num_matches(), 8);
   EXPECT_GT(across->information(0, 0), 1.1 * across_before);
@@ -262,7 +263,7 @@ TEST_F(PointMapBuilderTest, SecondLooksSharpenWhatTheySee) {
   EXPECT_NEAR(along->expected[0], 0.45, 1e-3);
   // However often they are seen.
   for (int i = 2; i < 200; ++i) {
-    AddKeyScan(&builder, i, seen, Pose2::Zero(), Motion(Pose2::Zero()));
+    AddKeyScan(&builder, i, seen, Pose2::Zero(), QuietMotion(Pose2::Zero()));
   }
   EXPECT_EQ(builder.num_created(), 8);
   EXPECT_LE(across->information(0, 0),
@@ -275,9 +276,9 @@ TEST_F(PointMapBuilderTest, AWallThatComesIntoSightGetsPointsInStep) {
   const Pose2 step(0.4, 0.0, 0.0);
   for (int i = 0; i < 6; ++i) {
     const double end = 2.0 + 0.8 * i;
-    const std::vector<Wall> walls = {{{-2, -1}, {end, -1}},
-                                     {{end, 1}, {-2, 1}}};
-    AddKeyScan(&builder, i, walls, Pose2(0.4 * i, 0.0, 0.0), Motion(step));
+    const std::vector<WallEnds> walls = {{{-2, -1}, {end, -1}},
+                                         {{end, 1}, {-2, 1}}};
+    AddKeyScan(&builder, i, walls, Pose2(0.4 * i, 0.0, 0.0), QuietMotion(step));
   }
   std::vector<double> places;
   for (const Feature* point : Points()) {
@@ -294,9 +295,9 @@ TEST_F(PointMapBuilderTest, AWallThatComesIntoSightGetsPointsInStep) {
 TEST_F(PointMapBuilderTest, FarSurfacesMakeNoPoints) {
   PointMapBuilder builder(&graph_, registry_, options_);
   // At 7 m of 8 m range, 3.87 m of it each way.
-  const std::vector<Wall> walls = {{{-20, -7}, {20, -7}},
-                                   {{20, 8.5}, {-20, 8.5}}};
-  AddKeyScan(&builder, 0, walls, Pose2::Zero(), Motion(Pose2::Zero()));
+  const std::vector<WallEnds> walls = {{{-20, -7}, {20, -7}},
+                                       {{20, 8.5}, {-20, 8.5}}};
+  AddKeyScan(&builder, 0, walls, Pose2::Zero(), QuietMotion(Pose2::Zero()));
   EXPECT_EQ(builder.num_created(), 15);
   for (const Feature* point : Points()) {
     EXPECT_LE(PositionOf(*point).norm(), 8.0);
@@ -306,13 +307,15 @@ TEST_F(PointMapBuilderTest, FarSurfacesMakeNoPoints) {
 
 TEST_F(PointMapBuilderTest, FacesOfAThinWallHaveTheirOwnPoints) {
   PointMapBuilder builder(&graph_, registry_, options_);
-  const std::vector<Wall> this_side = {{{-2, 0}, {2, 0}},
-                                       {{-2.2, -1.5}, {-2.2, 0}}};
-  const std::vector<Wall> that_side = {{{2, 0.05}, {-2, 0.05}},
-                                       {{-2.2, 0}, {-2.2, 1.5}}};
-  AddKeyScan(&builder, 0, this_side, Pose2(0, -1, 0), Motion(Pose2::Zero()));
+  const std::vector<WallEnds> this_side = {{{-2, 0}, {2, 0}},
+                                           {{-2.2, -1.5}, {-2.2, 0}}};
+  const std::vector<WallEnds> that_side = {{{2, 0.05}, {-2, 0.05}},
+                                           {{-2.2, 0}, {-2.2, 1.5}}};
+  AddKeyScan(&builder, 0, this_side, Pose2(0, -1, 0),
+             QuietMotion(Pose2::Zero()));
   const std::int64_t created = builder.num_created();
-  AddKeyScan(&builder, 1, that_side, Pose2(0, 1, 0), Motion(Pose2(0, 2, 0)));
+  AddKeyScan(&builder, 1, that_side, Pose2(0, 1, 0),
+             QuietMotion(Pose2(0, 2, 0)));
   EXPECT_EQ(builder.num_matches(), 0);
   EXPECT_GT(builder.num_created(), created + 7);
 }
@@ -323,9 +326,9 @@ TEST_F(PointMapBuilderTest, LinksAreCutBehind) {
   const Pose2 step(0.5, 0.0, 0.0);
   for (int i = 0; i < 30; ++i) {
     const double x = 0.5 * i;
-    const std::vector<Wall> walls = {{{x - 3, -1}, {x + 3, -1}},
-                                     {{x + 3, 1}, {x - 3, 1}}};
-    AddKeyScan(&builder, i, walls, Pose2(x, 0.0, 0.0), Motion(step));
+    const std::vector<WallEnds> walls = {{{x - 3, -1}, {x + 3, -1}},
+                                         {{x + 3, 1}, {x - 3, 1}}};
+    AddKeyScan(&builder, i, walls, Pose2(x, 0.0, 0.0), QuietMotion(step));
     const std::vector<FeatureId> near = builder.Neighborhood(1);
     // 6 m of two walls.
     EXPECT_LE(near.size(), 28u) << i;
@@ -353,7 +356,7 @@ TEST_F(PointMapBuilderTest, ScansThatSeeNothing) {
   std::fill(broken[4].ranges.begin(), broken[4].ranges.end(), -1.0f);
   Pose2 expected = start;
   for (std::size_t i = 0; i < broken.size(); ++i) {
-    builder.AddScan(KeyScanOf(broken[i], Motion(step), start));
+    builder.AddScan(KeyScanOf(broken[i], QuietMotion(step), start));
     if (i > 0) expected = Compose(expected, step);
     EXPECT_LT((builder.robot() - expected).norm(), 1e-12) << i;
     builder.WriteRobot();
@@ -365,23 +368,23 @@ TEST_F(PointMapBuilderTest, ScansThatSeeNothing) {
   // The first that sees something begins the map; every third beam broken.
   scan = MakeScan(Room(6.0, 4.0), Compose(expected, step), FullCircle());
   for (std::size_t i = 0; i < scan.ranges.size(); i += 3) scan.ranges[i] = nan;
-  builder.AddScan(KeyScanOf(scan, Motion(step), start));
+  builder.AddScan(KeyScanOf(scan, QuietMotion(step), start));
   EXPECT_GE(builder.num_created(), 8);
   int fixed = 0;
   for (const Feature* point : Points()) fixed += point->fixed;
   EXPECT_EQ(fixed, 2);
   // And blind again: the links hold.
-  builder.AddScan(KeyScanOf(broken[1], Motion(step), start));
+  builder.AddScan(KeyScanOf(broken[1], QuietMotion(step), start));
   EXPECT_TRUE(builder.robot().allFinite());
 }
 
 TEST_F(PointMapBuilderTest, TheRobotInTheGraph) {
   PointMapBuilder builder(&graph_, registry_, options_);
   EXPECT_EQ(builder.robot_id(), kNoId);
-  const std::vector<Wall> walls = Room(6.0, 4.0);
-  AddKeyScan(&builder, 0, walls, Pose2::Zero(), Motion(Pose2::Zero()));
+  const std::vector<WallEnds> walls = Room(6.0, 4.0);
+  AddKeyScan(&builder, 0, walls, Pose2::Zero(), QuietMotion(Pose2::Zero()));
   const Pose2 step(0.3, 0.0, 0.1);
-  AddKeyScan(&builder, 1, walls, step, Motion(step));
+  AddKeyScan(&builder, 1, walls, step, QuietMotion(step));
   for (int round = 0; round < 2; ++round) {
     builder.WriteRobot();
     const FeatureId robot = builder.robot_id();
@@ -415,7 +418,7 @@ TEST_F(PointMapBuilderTest, SameMapTenKilometresAway) {
   PointMapBuilder builder(&graph_, registry_, options_);
   PointMapBuilder far(&there, registry_, options_);
   const Eigen::Vector2d away(10000.0, -10000.0);
-  const std::vector<Wall> walls = Room(8.0, 6.0);
+  const std::vector<WallEnds> walls = Room(8.0, 6.0);
   Laser laser = FullCircle();
   laser.sigma = 0.01;
   Noise noise(3);
@@ -424,9 +427,9 @@ TEST_F(PointMapBuilderTest, SameMapTenKilometresAway) {
   for (int i = 0; i < 12; ++i) {
     const Scan scan = MakeScan(walls, robot, laser, &noise);
     Pose2 start = robot;
-    builder.AddScan(KeyScanOf(scan, Motion(step), start));
+    builder.AddScan(KeyScanOf(scan, QuietMotion(step), start));
     start.head<2>() += away;
-    far.AddScan(KeyScanOf(scan, Motion(step), start));
+    far.AddScan(KeyScanOf(scan, QuietMotion(step), start));
     robot = Compose(robot, step);
   }
   ASSERT_EQ(graph_.num_features(), there.num_features());

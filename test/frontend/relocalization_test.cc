@@ -16,7 +16,7 @@ using testing::HeadingError;
 using testing::Observe;
 using testing::PositionError;
 using testing::Room;
-using testing::Wall;
+using testing::WallEnds;
 
 class RelocalizationTest : public ::testing::Test {
  protected:
@@ -29,9 +29,9 @@ class RelocalizationTest : public ::testing::Test {
   // Walls of a room as features, and a drive of `count` key scans that see all
   // of them.
   void Build(int count) {
-    const std::vector<Wall> walls = Room(8.0, 6.0);
+    const std::vector<WallEnds> walls = Room(8.0, 6.0);
     Transaction transaction;
-    for (const Wall& wall : walls) {
+    for (const WallEnds& wall : walls) {
       const SegmentObservation seen = Observe(Pose2::Zero(), wall);
       Feature feature;
       feature.type = &registry_.GetFeature("segment");
@@ -247,11 +247,12 @@ TEST_F(RelocalizationTest, OffsetIsObservedAtTheMiddleOfThePiece) {
   KeyScanRecord record;
   FeatureMatch match;
   match.feature = ids[0];
-  match.observation = Observe(Pose2::Zero(), Wall{{5.0, -1.0}, {7.0, -1.0}});
+  match.observation =
+      Observe(Pose2::Zero(), WallEnds{{5.0, -1.0}, {7.0, -1.0}});
   match.observation.pose[2] += kTurn;
   record.matches.push_back(match);
   match.feature = ids[1];
-  match.observation = Observe(Pose2::Zero(), Wall{{3.0, -1.0}, {3.0, 1.0}});
+  match.observation = Observe(Pose2::Zero(), WallEnds{{3.0, -1.0}, {3.0, 1.0}});
   record.matches.push_back(match);
   records_.push_back(record);
   const std::vector<Pose2> poses = Relocalize();
@@ -284,7 +285,7 @@ TEST_F(RelocalizationTest, APieceOfACorridorStaysWhereItWas) {
       const double y = k == 0 ? -1.0 : 1.0;
       FeatureMatch match;
       match.feature = ids[k];
-      match.observation = Observe(robot, Wall{{-20.0, y}, {20.0, y}});
+      match.observation = Observe(robot, WallEnds{{-20.0, y}, {20.0, y}});
       record.matches.push_back(match);
     }
     records_.push_back(record);

@@ -14,7 +14,7 @@ namespace plumbline {
 namespace {
 
 using Eigen::Vector2d;
-using testing::ElementsAre;
+using ::testing::ElementsAre;
 
 constexpr double kCell = 0.05;
 constexpr double kRadius = 0.3;

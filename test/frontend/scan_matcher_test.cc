@@ -23,9 +23,9 @@ using testing::PointsOf;
 using testing::PositionError;
 using testing::Room;
 using testing::Transformed;
-using testing::Wall;
+using testing::WallEnds;
 
-ScanMatcherOptions Options() {
+ScanMatcherOptions MatcherOptions() {
   ScanMatcherOptions options;
   options.point_sigma = 0.03;
   options.independence = 0.3;
@@ -40,23 +40,24 @@ ScanMatcherOptions Options() {
 }
 
 // A room of 7 m x 5 m with a pillar that makes it tell its corners apart.
-std::vector<Wall> RoomWithPillar() {
-  std::vector<Wall> walls = Room(7.0, 5.0);
-  for (const Wall& side : testing::Moved(Room(0.8, 0.8), {2.0, 1.2, 0.0})) {
+std::vector<WallEnds> RoomWithPillar() {
+  std::vector<WallEnds> walls = Room(7.0, 5.0);
+  for (const WallEnds& side : testing::Moved(Room(0.8, 0.8), {2.0, 1.2, 0.0})) {
     walls.push_back(side);
   }
   return walls;
 }
 
 // What was seen from `robot`, in the map frame.
-std::vector<ScanPoint> Seen(const std::vector<Wall>& walls, const Pose2& robot,
+std::vector<ScanPoint> Seen(const std::vector<WallEnds>& walls,
+                            const Pose2& robot,
                             const ScanPointsOptions& options = {}) {
   return Transformed(PointsOf(MakeScan(walls, robot, FullCircle()), options),
                      robot);
 }
 
 TEST(ScanMatcherTest, RefineRecoversADisplacement) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   EXPECT_TRUE(matcher.empty());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)));
   EXPECT_FALSE(matcher.empty());
@@ -82,7 +83,7 @@ TEST(ScanMatcherTest, CovarianceCoversTheErrorsOfNoisyScans) {
   laser.sigma = 0.01;
   Noise noise(7);
   const Pose2 truth(0.3, -0.1, -2.0);
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   double sum = 0.0;
   constexpr int kScans = 20;
   for (int i = 0; i < kScans; ++i) {
@@ -120,7 +121,7 @@ TEST(ScanMatcherTest, EveryStepPairsWithTheNearest) {
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), truth, laser, &noise));
   const Pose2 guess = truth + Pose2(0.15, -0.1, DegToRad(3.0));
-  ScanMatcherOptions options = Options();
+  ScanMatcherOptions options = MatcherOptions();
   options.convergence = 0.0;
   Pose2 pose = guess;
   for (int steps = 1; steps <= 12; ++steps) {
@@ -167,7 +168,7 @@ TEST(ScanMatcherTest, EveryStepPairsWithTheNearest) {
 }
 
 TEST(ScanMatcherTest, SearchFindsAWrongTurn) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)));
   const Pose2 truth(-0.3, 0.3, 0.3);
   const std::vector<ScanPoint> scan =
@@ -233,7 +234,7 @@ TEST(ScanMatcherTest, AWideSearchFindsWhatALookAtEveryPoseFinds) {
 }
 
 TEST(ScanMatcherTest, SearchStaysInItsWindow) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
@@ -248,7 +249,7 @@ TEST(ScanMatcherTest, SearchStaysInItsWindow) {
 }
 
 TEST(ScanMatcherTest, ScoreIsHigherAtTheTruth) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
@@ -263,7 +264,7 @@ TEST(ScanMatcherTest, ScoreIsHigherAtTheTruth) {
 TEST(ScanMatcherTest, CorridorSaysNothingAlong) {
   ScanPointsOptions points;
   points.usable_range = 10.0;
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(Corridor(), Pose2::Zero(), points));
   const Pose2 truth(0.5, 0.1, 0.05);
   const std::vector<ScanPoint> scan =
@@ -287,7 +288,7 @@ TEST(ScanMatcherTest, CorridorSaysNothingAlong) {
 }
 
 TEST(ScanMatcherTest, PriorPullsOnlyWhereTheReturnsAreSilent) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), Pose2(0.1, 0.1, 0.1), FullCircle()));
@@ -299,7 +300,7 @@ TEST(ScanMatcherTest, PriorPullsOnlyWhereTheReturnsAreSilent) {
 }
 
 TEST(ScanMatcherTest, InformationAndCovarianceAreSymmetricPositive) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
   const MatchResult match = matcher.Refine(
       PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle())),
@@ -323,10 +324,10 @@ TEST(ScanMatcherTest, SameResultTenKilometresAway) {
   prior.pose = guess;
   prior.information = Eigen::Matrix3d::Identity();
 
-  ScanMatcher here(Options());
+  ScanMatcher here(MatcherOptions());
   here.SetReference(reference);
   const MatchResult match_here = here.Refine(scan, guess, prior);
-  ScanMatcher there(Options());
+  ScanMatcher there(MatcherOptions());
   there.SetReference(Transformed(reference, shift));
   prior.pose += shift;
   const MatchResult match_there = there.Refine(scan, guess + shift, prior);
@@ -346,7 +347,7 @@ TEST(ScanMatcherTest, TurnedWorldTurnsTheResult) {
   const Pose2 truth(-0.2, 0.3, 0.25);
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(
       Transformed(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)), turn));
   const Pose2 guess = truth + Pose2(0.1, -0.1, DegToRad(3.0));
@@ -370,7 +371,7 @@ TEST(ScanMatcherTest, OverlapByTryingEveryReferencePoint) {
     }
     return points;
   };
-  const ScanMatcherOptions options = Options();
+  const ScanMatcherOptions options = MatcherOptions();
   for (int round = 0; round < 50; ++round) {
     const std::vector<ScanPoint> reference = cloud(1 + 2 * round, 1.0);
     // Also beyond the reference's bounds.
@@ -407,7 +408,7 @@ TEST(ScanMatcherTest, RefineTakesTheNearestReferencePoint) {
         reference.push_back(point);
       }
     }
-    ScanMatcherOptions options = Options();
+    ScanMatcherOptions options = MatcherOptions();
     options.max_iterations = 1;
     ScanMatcher matcher(options);
     matcher.SetReference(reference);
@@ -421,7 +422,7 @@ TEST(ScanMatcherTest, RefineTakesTheNearestReferencePoint) {
 TEST(ScanMatcherTest, EmptyReferenceLeavesTheGuess) {
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference({});
   EXPECT_TRUE(matcher.empty());
   const Pose2 guess(1.0, 2.0, 0.5);
@@ -435,7 +436,7 @@ TEST(ScanMatcherTest, EmptyReferenceLeavesTheGuess) {
 TEST(ScanMatcherTest, EmptyReferenceAfterAFullOne) {
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(scan);
   EXPECT_FALSE(matcher.empty());
   EXPECT_GT(matcher.Refine(scan, Pose2::Zero(), MatchPrior()).inliers, 500);
@@ -453,7 +454,7 @@ TEST(ScanMatcherTest, SearchWithNothingToScoreReturnsTheCenter) {
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
   const Pose2 center(100.0, 2.0, 0.5);
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   double score = -1.0;
   EXPECT_EQ(matcher.Search(scan, center, 0.45, 0.1, &score), center);
   EXPECT_EQ(score, 0.0);
@@ -471,7 +472,7 @@ TEST(ScanMatcherTest, WildPointsInTheReferenceDoNotMatter) {
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), truth, FullCircle()));
   const Pose2 guess = truth + Pose2(0.1, -0.1, DegToRad(3.0));
-  ScanMatcher clean(Options());
+  ScanMatcher clean(MatcherOptions());
   clean.SetReference(reference);
   const MatchResult expected = clean.Refine(scan, guess, MatchPrior());
   EXPECT_GT(expected.inliers, 500);
@@ -484,7 +485,7 @@ TEST(ScanMatcherTest, WildPointsInTheReferenceDoNotMatter) {
       ScanPoint point = reference.front();
       point.position = wild;
       points.insert(first ? points.begin() : points.end(), point);
-      ScanMatcher matcher(Options());
+      ScanMatcher matcher(MatcherOptions());
       matcher.SetReference(points);
       const MatchResult match = matcher.Refine(scan, guess, MatchPrior());
       EXPECT_EQ(match.inliers, expected.inliers);
@@ -499,7 +500,7 @@ TEST(ScanMatcherTest, WildPointsInTheReferenceDoNotMatter) {
 }
 
 TEST(ScanMatcherTest, EmptyScanLeavesTheGuess) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
   const Pose2 guess(1.0, 2.0, 0.5);
   const MatchResult match = matcher.Refine({}, guess, MatchPrior());
@@ -511,7 +512,7 @@ TEST(ScanMatcherTest, EmptyScanLeavesTheGuess) {
 }
 
 TEST(ScanMatcherTest, ScanFarFromTheReferenceHasNoInliers) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
@@ -523,7 +524,7 @@ TEST(ScanMatcherTest, ScanFarFromTheReferenceHasNoInliers) {
 
 TEST(ScanMatcherTest, OtherFaceOfAThinWallIsNoPartner) {
   // Seen from above at y = 0.05, from below at y = -0.05.
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(
       Seen({{{-2.0, 0.05}, {2.0, 0.05}}}, Pose2(0.0, 1.5, 0.0)));
   const Pose2 below(0.0, -1.5, 0.0);
@@ -534,10 +535,10 @@ TEST(ScanMatcherTest, OtherFaceOfAThinWallIsNoPartner) {
 }
 
 TEST(ScanMatcherTest, PeopleInTheScanDoNotDragIt) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));
   // Somebody stands 0.3 m before the wall at y = -2.5, over 1.5 m.
-  std::vector<Wall> crowded = RoomWithPillar();
+  std::vector<WallEnds> crowded = RoomWithPillar();
   crowded.push_back({{-1.5, -2.2}, {0.0, -2.2}});
   const Pose2 truth(0.1, 0.1, 0.05);
   const MatchResult match =
@@ -551,7 +552,7 @@ TEST(ScanMatcherTest, PeopleInTheScanDoNotDragIt) {
 TEST(ScanMatcherTest, NewReferenceReplacesTheOld) {
   const std::vector<ScanPoint> scan =
       PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), FullCircle()));
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(scan);
   double before = 0.0;
   matcher.Search(scan, Pose2::Zero(), 0.0, 0.0, &before);
@@ -573,7 +574,7 @@ std::vector<Eigen::Vector2d> Positions(const std::vector<ScanPoint>& points) {
 }
 
 TEST(ScanMatcherTest, PeaksFindThePoseFromAnywhere) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   const Pose2 from(-0.5, 0.2, 0.1);
   matcher.SetReference(Seen(RoomWithPillar(), from), {{from.head<2>(), 0}});
   const Pose2 truth(0.6, -0.8, 2.8);
@@ -634,7 +635,7 @@ TEST(ScanMatcherTest, NoPoseScoresMoreThanTheFirstPeak) {
 }
 
 TEST(ScanMatcherTest, PeaksOfARoomThatLooksTheSameTurnedRound) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(Room(7.0, 5.0), Pose2::Zero()),
                        {{Eigen::Vector2d::Zero(), 0}});
   const std::vector<ScanPoint> scan =
@@ -650,12 +651,13 @@ TEST(ScanMatcherTest, PeaksOfARoomThatLooksTheSameTurnedRound) {
 }
 
 TEST(ScanMatcherTest, CompareTellsSolidFromFree) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(Room(7.0, 5.0), Pose2::Zero()),
                        {{Eigen::Vector2d::Zero(), 0}});
   const Eigen::Vector2d laser = Eigen::Vector2d::Zero();
   const Pose2 pose(0.5, 0.5, 0.2);
-  const auto compare = [&](const std::vector<Wall>& walls, const Pose2& seen) {
+  const auto compare = [&](const std::vector<WallEnds>& walls,
+                           const Pose2& seen) {
     return matcher.Compare(PointsOf(MakeScan(walls, seen, FullCircle())), pose,
                            laser);
   };
@@ -665,8 +667,9 @@ TEST(ScanMatcherTest, CompareTellsSolidFromFree) {
   EXPECT_GT(same.seen, 100);
   EXPECT_EQ(same.seen_through, 0);
   // A pillar that was not there.
-  std::vector<Wall> walls = Room(7.0, 5.0);
-  for (const Wall& side : testing::Moved(Room(0.8, 0.8), {-1.5, 0.0, 0.0})) {
+  std::vector<WallEnds> walls = Room(7.0, 5.0);
+  for (const WallEnds& side :
+       testing::Moved(Room(0.8, 0.8), {-1.5, 0.0, 0.0})) {
     walls.push_back(side);
   }
   const ScanAgreement pillar = compare(walls, pose);

@@ -26,7 +26,7 @@ Scan Beams(const std::vector<float>& ranges) {
   return scan;
 }
 
-ScanPointsOptions Options() {
+ScanPointsOptions PointOptions() {
   ScanPointsOptions options;
   options.usable_range = 50.0;
   options.minimum_range = 0.1;
@@ -43,7 +43,7 @@ TEST(ScanPointsTest, PointsAndNormalsOfARoomWithLaserOffset) {
   Laser laser = FullCircle();
   laser.offset = Pose2(0.2, 0.1, 0.3);
   const std::vector<ScanPoint> points =
-      PointsOf(MakeScan(Room(6.0, 4.0), robot, laser), Options());
+      PointsOf(MakeScan(Room(6.0, 4.0), robot, laser), PointOptions());
   ASSERT_EQ(points.size(), 720u);
   int with_normal = 0;
   for (const ScanPoint& point : points) {
@@ -73,7 +73,7 @@ TEST(ScanPointsTest, HandWorkedPositionAndBeam) {
   scan.start_angle = 0.0;
   scan.angle_step = 0.5 * kPi;
   scan.laser_offset = Pose2(1.0, 0.5, 0.5 * kPi);
-  const std::vector<ScanPoint> points = PointsOf(scan, Options());
+  const std::vector<ScanPoint> points = PointsOf(scan, PointOptions());
   ASSERT_EQ(points.size(), 1u);
   // Beam 1 points to the laser's left, which is the robot's back.
   EXPECT_NEAR(points[0].position.x(), -1.0, 1e-12);
@@ -87,7 +87,7 @@ TEST(ScanPointsTest, SkipsWhatIsNoReturnTooNearOrTooFar) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<ScanPoint> points = PointsOf(
       Beams({0.0f, 1.0f, nan, 0.09f, 0.11f, 49.0f, 51.0f, -1.0f, 3.0f}),
-      Options());
+      PointOptions());
   ASSERT_EQ(points.size(), 4u);
   EXPECT_EQ(points[0].beam, 1);
   EXPECT_EQ(points[1].beam, 4);
@@ -97,16 +97,16 @@ TEST(ScanPointsTest, SkipsWhatIsNoReturnTooNearOrTooFar) {
 
 TEST(ScanPointsTest, EmptyScanEmptiesTheVector) {
   std::vector<ScanPoint> points(3);
-  ExtractScanPoints(Scan(), Options(), &points);
+  ExtractScanPoints(Scan(), PointOptions(), &points);
   EXPECT_TRUE(points.empty());
   points.resize(2);
-  ExtractScanPoints(Beams({0.0f, 0.0f, 0.0f}), Options(), &points);
+  ExtractScanPoints(Beams({0.0f, 0.0f, 0.0f}), PointOptions(), &points);
   EXPECT_TRUE(points.empty());
 }
 
 TEST(ScanPointsTest, NoNormalAtACorner) {
   const std::vector<ScanPoint> points = PointsOf(
-      MakeScan(Room(4.0, 4.0), Pose2::Zero(), FullCircle()), Options());
+      MakeScan(Room(4.0, 4.0), Pose2::Zero(), FullCircle()), PointOptions());
   int corners = 0;
   for (const ScanPoint& point : points) {
     const Eigen::Vector2d to_wall =
@@ -125,7 +125,7 @@ TEST(ScanPointsTest, NoNormalOnClutter) {
   for (int i = 0; i < 60; ++i) ranges.push_back(i % 2 == 0 ? 1.0f : 1.6f);
   Scan scan = Beams(ranges);
   scan.angle_step = DegToRad(1.0);
-  for (const ScanPoint& point : PointsOf(scan, Options())) {
+  for (const ScanPoint& point : PointsOf(scan, PointOptions())) {
     EXPECT_EQ(point.normal, Eigen::Vector2d::Zero());
   }
 }
@@ -133,22 +133,23 @@ TEST(ScanPointsTest, NoNormalOnClutter) {
 TEST(ScanPointsTest, NoNormalFromOneOrTwoReturns) {
   Scan scan = Beams({2.0f, 2.0f});
   scan.angle_step = DegToRad(1.0);
-  for (const ScanPoint& point : PointsOf(scan, Options())) {
+  for (const ScanPoint& point : PointsOf(scan, PointOptions())) {
     EXPECT_EQ(point.normal, Eigen::Vector2d::Zero());
   }
   scan.ranges = {2.0f, 2.0f, 2.0f};
-  for (const ScanPoint& point : PointsOf(scan, Options())) {
+  for (const ScanPoint& point : PointsOf(scan, PointOptions())) {
     EXPECT_NEAR(point.normal.norm(), 1.0, 1e-12);
   }
 }
 
 TEST(ScanPointsTest, NormalsOfOneSurfaceDoNotBendAtAStep) {
   // Two walls across the view at x = 2 (left) and x = 2.6 (right).
-  const std::vector<testing::Wall> walls = {{{2.0, 0.0}, {2.0, 3.0}},
-                                            {{2.6, -3.0}, {2.6, 0.0}}};
+  const std::vector<testing::WallEnds> walls = {{{2.0, 0.0}, {2.0, 3.0}},
+                                                {{2.6, -3.0}, {2.6, 0.0}}};
   int seen = 0;
-  for (const ScanPoint& point : PointsOf(
-           MakeScan(walls, Pose2(0.0, 0.01, 0.0), FullCircle()), Options())) {
+  for (const ScanPoint& point :
+       PointsOf(MakeScan(walls, Pose2(0.0, 0.01, 0.0), FullCircle()),
+                PointOptions())) {
     ASSERT_NEAR((point.normal - Eigen::Vector2d(-1.0, 0.0)).norm(), 0.0, 1e-4);
     ++seen;
   }
@@ -159,8 +160,9 @@ TEST(ScanPointsTest, NormalTurnsTowardsTheLaserAndNotTheRobot) {
   // The wall at x = 0.5 stands between the robot and the laser at x = 1.
   Laser laser = FullCircle();
   laser.offset = Pose2(1.0, 0.0, 0.0);
-  const std::vector<ScanPoint> points = PointsOf(
-      MakeScan({{{0.5, -1.0}, {0.5, 1.0}}}, Pose2::Zero(), laser), Options());
+  const std::vector<ScanPoint> points =
+      PointsOf(MakeScan({{{0.5, -1.0}, {0.5, 1.0}}}, Pose2::Zero(), laser),
+               PointOptions());
   ASSERT_GT(points.size(), 50u);
   for (const ScanPoint& point : points) {
     EXPECT_NEAR((point.normal - Eigen::Vector2d(1.0, 0.0)).norm(), 0.0, 1e-5);
@@ -171,8 +173,9 @@ TEST(ScanPointsTest, LaserUpsideDownSeesTheSameNormals) {
   Laser laser = FullCircle();
   laser.start_angle = kPi;
   laser.angle_step = -laser.angle_step;
-  const std::vector<ScanPoint> points = PointsOf(
-      MakeScan({{{-3.0, 2.0}, {3.0, 2.0}}}, Pose2::Zero(), laser), Options());
+  const std::vector<ScanPoint> points =
+      PointsOf(MakeScan({{{-3.0, 2.0}, {3.0, 2.0}}}, Pose2::Zero(), laser),
+               PointOptions());
   ASSERT_GT(points.size(), 100u);
   for (const ScanPoint& point : points) {
     EXPECT_NEAR(point.position.y(), 2.0, 1e-6);
@@ -186,7 +189,7 @@ TEST(ScanPointsTest, OneLostBeamDoesNotCostItsNeighboursTheirNormals) {
   // Straight ahead.
   ASSERT_GT(scan.ranges[360], 0.0f);
   scan.ranges[360] = 0.0f;
-  for (const ScanPoint& point : PointsOf(scan, Options())) {
+  for (const ScanPoint& point : PointsOf(scan, PointOptions())) {
     EXPECT_NEAR(point.normal.norm(), 1.0, 1e-12) << point.beam;
   }
 }
@@ -195,7 +198,7 @@ std::vector<int> Clutter(const std::vector<float>& ranges) {
   Scan scan = Beams(ranges);
   scan.angle_step = DegToRad(2.0);
   std::vector<ScanPoint> points;
-  ExtractScanPoints(scan, Options(), &points);
+  ExtractScanPoints(scan, PointOptions(), &points);
   std::vector<bool> clutter;
   const int marked = MarkClutter(scan, points, ClutterOptions(), &clutter);
   EXPECT_EQ(clutter.size(), points.size());

@@ -20,12 +20,12 @@ using testing::Laser;
 using testing::MakeScan;
 using testing::Noise;
 using testing::PointsOf;
-using testing::Wall;
+using testing::WallEnds;
 
 class ScanRelationsTest : public ::testing::Test {
  protected:
   // A robot drives along y = 0 twice, or more often.
-  void Drive(const std::vector<Wall>& walls, int visits = 2) {
+  void Drive(const std::vector<WallEnds>& walls, int visits = 2) {
     Noise noise(5);
     Laser laser = testing::FullCircle();
     laser.angle_step = DegToRad(2.0);

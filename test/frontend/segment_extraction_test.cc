@@ -17,9 +17,9 @@ using testing::MakeScan;
 using testing::Noise;
 using testing::PointsOf;
 using testing::Room;
-using testing::Wall;
+using testing::WallEnds;
 
-SegmentExtractionOptions Options() {
+SegmentExtractionOptions SegmentOptions() {
   SegmentExtractionOptions options;
   options.min_points = 6;
   options.min_length = 0.4;
@@ -35,7 +35,8 @@ SegmentExtractionOptions Options() {
 }
 
 std::vector<SegmentObservation> Extract(
-    const Scan& scan, const SegmentExtractionOptions& options = Options()) {
+    const Scan& scan,
+    const SegmentExtractionOptions& options = SegmentOptions()) {
   return ExtractSegments(PointsOf(scan), scan.laser_offset.head<2>(),
                          scan.angle_step, options);
 }
@@ -113,8 +114,8 @@ TEST(SegmentExtractionTest, LaserOnTheLeftAlsoWhenTheRobotIsOnTheRight) {
 }
 
 TEST(SegmentExtractionTest, FacesOfAThinWallHaveOppositeDirections) {
-  const std::vector<Wall> faces = {{{-1.0, 0.05}, {1.0, 0.05}},
-                                   {{-1.0, -0.05}, {1.0, -0.05}}};
+  const std::vector<WallEnds> faces = {{{-1.0, 0.05}, {1.0, 0.05}},
+                                       {{-1.0, -0.05}, {1.0, -0.05}}};
   const Laser laser = FullCircle();
   const Pose2 above(0.0, 2.0, 0.0);
   const Pose2 below(0.0, -2.0, 0.0);
@@ -130,8 +131,8 @@ TEST(SegmentExtractionTest, FacesOfAThinWallHaveOppositeDirections) {
 
 TEST(SegmentExtractionTest, DoorSplitsAWall) {
   // Open to a room whose far wall is out of range.
-  const std::vector<Wall> walls = {{{-3.0, 2.0}, {0.0, 2.0}},
-                                   {{1.0, 2.0}, {3.0, 2.0}}};
+  const std::vector<WallEnds> walls = {{{-3.0, 2.0}, {0.0, 2.0}},
+                                       {{1.0, 2.0}, {3.0, 2.0}}};
   const std::vector<SegmentObservation> segments =
       Extract(MakeScan(walls, Pose2::Zero(), FullCircle()));
   ASSERT_EQ(segments.size(), 2u);
@@ -147,8 +148,8 @@ TEST(SegmentExtractionTest, DoorSplitsAWall) {
 }
 
 TEST(SegmentExtractionTest, StepInAWallGivesTwoOffsets) {
-  const std::vector<Wall> walls = {{{2.0, 0.0}, {2.0, 2.0}},
-                                   {{2.2, -2.0}, {2.2, 0.0}}};
+  const std::vector<WallEnds> walls = {{{2.0, 0.0}, {2.0, 2.0}},
+                                       {{2.2, -2.0}, {2.2, 0.0}}};
   const std::vector<SegmentObservation> segments =
       Extract(MakeScan(walls, Pose2::Zero(), FullCircle()));
   ASSERT_EQ(segments.size(), 2u);
@@ -158,9 +159,9 @@ TEST(SegmentExtractionTest, StepInAWallGivesTwoOffsets) {
 
 // A line through a wall and its door would be turned by up to a degree.
 TEST(SegmentExtractionTest, DoorSetBackByCentimetresIsAPieceOfItsOwn) {
-  const std::vector<Wall> walls = {{{-2.0, 2.0}, {1.0, 2.0}},
-                                   {{1.0, 2.0}, {1.0, 2.05}},
-                                   {{1.0, 2.05}, {1.9, 2.05}}};
+  const std::vector<WallEnds> walls = {{{-2.0, 2.0}, {1.0, 2.0}},
+                                       {{1.0, 2.0}, {1.0, 2.05}},
+                                       {{1.0, 2.05}, {1.9, 2.05}}};
   Laser laser = FullCircle();
   for (const double sigma : {0.0, 0.005, 0.01}) {
     laser.sigma = sigma;
@@ -196,7 +197,7 @@ TEST(SegmentExtractionTest, DoorSetBackByCentimetresIsAPieceOfItsOwn) {
 // with 1 cm of noise is often cut, but the pieces stay in line, so the map
 // takes them for one wall again.
 TEST(SegmentExtractionTest, NoiseAloneSeldomSplitsAWall) {
-  const std::vector<Wall> wall = {{{-2.0, 2.0}, {2.0, 2.0}}};
+  const std::vector<WallEnds> wall = {{{-2.0, 2.0}, {2.0, 2.0}}};
   Laser laser = FullCircle();
   const auto whole = [&](double sigma,
                          const SegmentExtractionOptions& options) {
@@ -236,7 +237,7 @@ TEST(SegmentExtractionTest, CovarianceIsHonestWithoutBias) {
   laser.angle_step = DegToRad(1.0);
   laser.beams = 61;
   laser.sigma = 0.005;
-  SegmentExtractionOptions options = Options();
+  SegmentExtractionOptions options = SegmentOptions();
   options.point_sigma = 0.005;
   options.bias_sigma = 0.0;
   options.angle_bias_sigma = 0.0;
@@ -272,7 +273,7 @@ TEST(SegmentExtractionTest, CovarianceIsHonestWithoutBias) {
 }
 
 TEST(SegmentExtractionTest, BiasBoundsTheCovarianceFromBelow) {
-  SegmentExtractionOptions options = Options();
+  SegmentExtractionOptions options = SegmentOptions();
   options.bias_sigma = 0.01;
   options.angle_bias_sigma = DegToRad(0.2);
   Laser laser = FullCircle();
@@ -294,11 +295,11 @@ TEST(SegmentExtractionTest, RougherWallHasLargerCovariance) {
   smooth.sigma = 0.001;
   Laser rough = smooth;
   rough.sigma = 0.006;
-  SegmentExtractionOptions options = Options();
+  SegmentExtractionOptions options = SegmentOptions();
   options.point_sigma = 0.001;
   options.bias_sigma = 0.0;
   options.angle_bias_sigma = 0.0;
-  const std::vector<Wall> wall = {{{2.0, -2.0}, {2.0, 2.0}}};
+  const std::vector<WallEnds> wall = {{{2.0, -2.0}, {2.0, 2.0}}};
   Noise noise(3);
   const auto a =
       Extract(MakeScan(wall, Pose2::Zero(), smooth, &noise), options);
@@ -312,7 +313,8 @@ TEST(SegmentExtractionTest, RougherWallHasLargerCovariance) {
 
 TEST(SegmentExtractionTest, NothingFromNothing) {
   EXPECT_TRUE(
-      ExtractSegments({}, Eigen::Vector2d::Zero(), 0.01, Options()).empty());
+      ExtractSegments({}, Eigen::Vector2d::Zero(), 0.01, SegmentOptions())
+          .empty());
   EXPECT_TRUE(Extract(MakeScan({}, Pose2::Zero(), FullCircle())).empty());
 }
 
@@ -320,20 +322,20 @@ TEST(SegmentExtractionTest, TooFewReturnsAndTooShortGiveNothing) {
   Laser laser;
   laser.start_angle = 0.0;
   laser.angle_step = DegToRad(5.0);
-  const std::vector<Wall> wall = {{{2.0, -5.0}, {2.0, 5.0}}};
+  const std::vector<WallEnds> wall = {{{2.0, -5.0}, {2.0, 5.0}}};
   laser.beams = 5;
   EXPECT_TRUE(Extract(MakeScan(wall, Pose2::Zero(), laser)).empty());
   laser.beams = 7;
   // So few returns leave the ends unsure by 1.3 to 2 cm.
   EXPECT_TRUE(Extract(MakeScan(wall, Pose2::Zero(), laser)).empty());
-  SegmentExtractionOptions options = Options();
+  SegmentExtractionOptions options = SegmentOptions();
   options.max_end_sigma = 0.02;
   EXPECT_EQ(Extract(MakeScan(wall, Pose2::Zero(), laser), options).size(), 1u);
   options.min_points = 8;
   EXPECT_TRUE(Extract(MakeScan(wall, Pose2::Zero(), laser), options).empty());
 
-  const std::vector<Wall> stub = {{{2.0, -0.3}, {2.0, 0.3}}};
-  options = Options();
+  const std::vector<WallEnds> stub = {{{2.0, -0.3}, {2.0, 0.3}}};
+  options = SegmentOptions();
   options.min_length = 0.7;
   const Scan scan = MakeScan(stub, Pose2::Zero(), FullCircle());
   EXPECT_TRUE(Extract(scan, options).empty());
@@ -359,8 +361,9 @@ TEST(SegmentExtractionTest, PointsOnOneSpotAreNoSegment) {
     point.beam = i;
     points.push_back(point);
   }
-  EXPECT_TRUE(ExtractSegments(points, Eigen::Vector2d::Zero(), 0.01, Options())
-                  .empty());
+  EXPECT_TRUE(
+      ExtractSegments(points, Eigen::Vector2d::Zero(), 0.01, SegmentOptions())
+          .empty());
 }
 
 TEST(SegmentExtractionTest, SameResultFarFromTheOrigin) {
@@ -371,7 +374,7 @@ TEST(SegmentExtractionTest, SameResultFarFromTheOrigin) {
   const std::vector<ScanPoint> points =
       PointsOf(MakeScan(Room(6.0, 4.0), robot, laser, &noise));
   const Pose2 shift(10000.0, -10000.0, 0.0);
-  SegmentExtractionOptions options = Options();
+  SegmentExtractionOptions options = SegmentOptions();
   options.bend_sigmas = 5.0;
   const auto here = ExtractSegments(points, Eigen::Vector2d::Zero(),
                                     laser.angle_step, options);

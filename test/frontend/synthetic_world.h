@@ -36,14 +36,14 @@ class Noise {
 };
 
 /// A straight wall from a to b, map frame, m.
-struct Wall {
+struct WallEnds {
   Eigen::Vector2d a;
   Eigen::Vector2d b;
 };
 
 /// A rectangle of four walls about the origin: y = -height/2, x = width/2,
 /// y = height/2, x = -width/2.
-inline std::vector<Wall> Room(double width, double height) {
+inline std::vector<WallEnds> Room(double width, double height) {
   const double x = 0.5 * width;
   const double y = 0.5 * height;
   return {{{-x, -y}, {x, -y}},
@@ -53,15 +53,15 @@ inline std::vector<Wall> Room(double width, double height) {
 }
 
 /// Two walls at y = -1 and y = 1, whose ends are out of sight.
-inline std::vector<Wall> Corridor() {
+inline std::vector<WallEnds> Corridor() {
   return {{{-200.0, -1.0}, {200.0, -1.0}}, {{-200.0, 1.0}, {200.0, 1.0}}};
 }
 
 /// The world moved by `pose`.
-inline std::vector<Wall> Moved(const std::vector<Wall>& walls,
-                               const Pose2& pose) {
-  std::vector<Wall> moved;
-  for (const Wall& wall : walls) {
+inline std::vector<WallEnds> Moved(const std::vector<WallEnds>& walls,
+                                   const Pose2& pose) {
+  std::vector<WallEnds> moved;
+  for (const WallEnds& wall : walls) {
     moved.push_back(
         {TransformPoint(pose, wall.a), TransformPoint(pose, wall.b)});
   }
@@ -70,11 +70,11 @@ inline std::vector<Wall> Moved(const std::vector<Wall>& walls,
 
 /// Distance from `from` to the nearest wall in direction `angle`; infinity
 /// when there is none.
-inline double CastRay(const std::vector<Wall>& walls,
+inline double CastRay(const std::vector<WallEnds>& walls,
                       const Eigen::Vector2d& from, double angle) {
   const Eigen::Vector2d ray(std::cos(angle), std::sin(angle));
   double nearest = std::numeric_limits<double>::infinity();
-  for (const Wall& wall : walls) {
+  for (const WallEnds& wall : walls) {
     const Eigen::Vector2d side = wall.b - wall.a;
     const Eigen::Vector2d to = wall.a - from;
     const double cross = ray.x() * side.y() - ray.y() * side.x();
@@ -108,7 +108,7 @@ inline Laser FullCircle() {
 }
 
 /// What a robot at `robot` (map frame) sees. `noise` may be null.
-inline Scan MakeScan(const std::vector<Wall>& walls, const Pose2& robot,
+inline Scan MakeScan(const std::vector<WallEnds>& walls, const Pose2& robot,
                      const Laser& laser, Noise* noise = nullptr) {
   Scan scan;
   scan.odometry = robot;
@@ -147,7 +147,7 @@ inline std::vector<ScanPoint> Transformed(std::vector<ScanPoint> points,
 
 /// The observation of a whole wall without error: direction with the robot on
 /// the left, covariance diag(offset_sigma^2, angle_sigma^2).
-inline SegmentObservation Observe(const Pose2& robot, const Wall& wall,
+inline SegmentObservation Observe(const Pose2& robot, const WallEnds& wall,
                                   double offset_sigma = 0.01,
                                   double angle_sigma = DegToRad(0.3)) {
   Eigen::Vector2d side = wall.b - wall.a;

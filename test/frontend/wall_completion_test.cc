@@ -15,7 +15,7 @@ namespace {
 
 using testing::MakeScan;
 using testing::Noise;
-using testing::Wall;
+using testing::WallEnds;
 
 class WallCompletionTest : public ::testing::Test {
  protected:
@@ -54,7 +54,7 @@ class WallCompletionTest : public ::testing::Test {
 
   Registry registry_;
   Graph graph_;
-  std::vector<Wall> world_;
+  std::vector<WallEnds> world_;
   testing::Laser laser_;
   std::vector<Scan> scans_;
   std::vector<Pose2> poses_;
@@ -72,7 +72,7 @@ TEST(WallCompletionKinkTest, AWallIsCutAtAKink) {
   Registry registry;
   RegisterBuiltinRelations(&registry);
   for (const double bend : {0.0, DegToRad(2.0)}) {
-    const std::vector<Wall> world = {
+    const std::vector<WallEnds> world = {
         {{-4.0, 2.0}, {0.0, 2.0}},
         {{0.0, 2.0}, {6.0 * std::cos(bend), 2.0 + 6.0 * std::sin(bend)}}};
     testing::Laser laser;
@@ -113,7 +113,7 @@ TEST(WallCompletionKinkTest, AnEndThatTurnsAwayIsCutOff) {
   Registry registry;
   RegisterBuiltinRelations(&registry);
   const double bend = DegToRad(3.0);
-  const std::vector<Wall> world = {
+  const std::vector<WallEnds> world = {
       {{-4.0, 2.0}, {0.0, 2.0}},
       {{0.0, 2.0}, {0.7 * std::cos(bend), 2.0 + 0.7 * std::sin(bend)}}};
   testing::Laser laser;
@@ -148,10 +148,10 @@ TEST(WallCompletionKinkTest, AnEndThatTurnsAwayIsCutOff) {
 TEST(WallCompletionStrayTest, StraysHideNoWalls) {
   Registry registry;
   RegisterBuiltinRelations(&registry);
-  const std::vector<Wall> world = {{{-2.0, -1.5}, {2.0, -1.5}},
-                                   {{2.0, -1.5}, {2.0, 1.5}},
-                                   {{2.0, 1.5}, {-2.0, 1.5}},
-                                   {{-2.0, 1.5}, {-2.0, -1.5}}};
+  const std::vector<WallEnds> world = {{{-2.0, -1.5}, {2.0, -1.5}},
+                                       {{2.0, -1.5}, {2.0, 1.5}},
+                                       {{2.0, 1.5}, {-2.0, 1.5}},
+                                       {{-2.0, 1.5}, {-2.0, -1.5}}};
   testing::Laser laser;
   laser.start_angle = 0.0;
   laser.angle_step = DegToRad(1.0);
@@ -189,7 +189,7 @@ TEST(WallCompletionStrayTest, StraysHideNoWalls) {
 TEST(WallCompletionThreadsTest, TheSameWallsWithAnyNumberOfThreads) {
   Registry registry;
   RegisterBuiltinRelations(&registry);
-  std::vector<Wall> world;
+  std::vector<WallEnds> world;
   for (int i = 0; i < 12; ++i) {
     const Eigen::Vector2d corner(-6.0 + i, 2.0 + 0.3 * (i % 3));
     world.push_back({corner, corner + Eigen::Vector2d(0.9, 0.02 * i)});

@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-std::vector<std::string> Lines(const std::string& text) {
+std::vector<std::string> LinesOf(const std::string& text) {
   std::vector<std::string> lines;
   std::istringstream stream(text);
   std::string line;
@@ -93,12 +93,12 @@ TEST(HelpTest, FitsEightyColumnsAndGroupsFlags) {
                         "--output_dir=and/a/folder \\\n      --more=1\n"));
   // Libraries' flags stay out.
   EXPECT_THAT(help, Not(HasSubstr("--logtostderr")));
-  for (const std::string& line : Lines(help)) {
+  for (const std::string& line : LinesOf(help)) {
     EXPECT_LE(line.size(), 80u) << line;
   }
   // The long word is all there.
   std::string joined;
-  for (const std::string& line : Lines(help)) {
+  for (const std::string& line : LinesOf(help)) {
     joined += line.substr(std::min(line.size(), line.find_first_not_of(' ')));
   }
   EXPECT_THAT(joined, HasSubstr("eta,theta/iota,kappa/lambda,mu/nu,xi/omicron,"
@@ -123,7 +123,7 @@ TEST(HelpTest, ManPage) {
   // Lines with a value that cannot be broken are not stretched.
   EXPECT_THAT(page, HasSubstr("\n.ad l\n"));
   // No line is taken for a command that is none.
-  for (const std::string& line : Lines(page)) {
+  for (const std::string& line : LinesOf(page)) {
     if (line[0] != '.') continue;
     const std::string command = line.substr(0, line.find(' '));
     EXPECT_THAT((std::vector<std::string>{".TH", ".SH", ".SS", ".TP", ".B",
@@ -180,7 +180,7 @@ TEST_F(BinariesTest, HelpHasEveryFlagInEightyColumns) {
     int status = -1;
     const std::string help = OutputOf(binary + " --help", &status);
     EXPECT_EQ(status, 0);
-    for (const std::string& line : Lines(help)) {
+    for (const std::string& line : LinesOf(help)) {
       EXPECT_LE(line.size(), 80u) << line;
     }
     EXPECT_THAT(help, HasSubstr("\nExample:\n  " + NameOf(binary)));
@@ -253,7 +253,7 @@ std::vector<std::string> Complete(const std::string& binary,
              "; printf \"%s\\n\" \"${COMPREPLY[@]}\"'";
   int status = -1;
   std::vector<std::string> offers;
-  for (const std::string& line : Lines(OutputOf(command, &status))) {
+  for (const std::string& line : LinesOf(OutputOf(command, &status))) {
     if (!line.empty()) offers.push_back(line);
   }
   EXPECT_EQ(status, 0);

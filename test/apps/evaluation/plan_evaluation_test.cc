@@ -18,7 +18,7 @@ Polygon Box(double x1, double y1, double x2, double y2) {
   return box;
 }
 
-PlanWall Wall(double x1, double y1, double x2, double y2) {
+PlanWall StraightWall(double x1, double y1, double x2, double y2) {
   PlanWall wall;
   wall.begin = {x1, y1};
   wall.end = {x2, y2};
@@ -93,7 +93,8 @@ MapTruth ADoor() {
 TEST(PlanEvaluationTest, DoorsAndWalls) {
   const MapTruth truth = ADoor();
   BuildingPlan plan;
-  plan.walls = {Wall(0.0, 0.0, 2.0, 0.0), Wall(2.9, 0.0, 6.0, 0.0)};
+  plan.walls = {StraightWall(0.0, 0.0, 2.0, 0.0),
+                StraightWall(2.9, 0.0, 6.0, 0.0)};
   PlanDoor door;
   door.begin = {2.0, 0.0};
   door.end = {2.8, 0.0};
@@ -116,17 +117,17 @@ TEST(PlanEvaluationTest, DoorsAndWalls) {
   EXPECT_EQ(result.doors_false, 1);
   EXPECT_LT(result.wall_completeness, 0.9);
 
-  plan.walls.push_back(Wall(3.0, 0.05, 5.0, 0.05));
+  plan.walls.push_back(StraightWall(3.0, 0.05, 5.0, 0.05));
   EXPECT_EQ(EvaluatePlan(plan, truth, Pose2::Zero()).double_walls, 1);
 }
 
-BuildingPlan Parse(const std::string& text) {
+BuildingPlan ParsePlan(const std::string& text) {
   InputStream input("plan.geojson", text);
   return ReadBuildingPlan(&input);
 }
 
 TEST(ReadBuildingPlanTest, RoomsDoorsWalls) {
-  const BuildingPlan plan = Parse(R"({"features":[
+  const BuildingPlan plan = ParsePlan(R"({"features":[
     {"properties":{"kind":"room"},"geometry":{"type":"Polygon",
      "coordinates":[[[0,0],[4,0],[4,3],[0,3],[0,0]]]}},
     {"properties":{"kind":"door"},"geometry":{"type":"LineString",
@@ -147,7 +148,7 @@ TEST(ReadBuildingPlanTest, RoomsDoorsWalls) {
 
 TEST(ReadBuildingPlanTest, BrokenPlansAreNamed) {
   const auto error_of = [](const std::string& text) {
-    return Refusal([&] { Parse(text); });
+    return Refusal([&] { ParsePlan(text); });
   };
   EXPECT_THAT(error_of("{"), HasSubstr("plan.geojson:1: is no valid JSON"));
   EXPECT_THAT(error_of("{}"), HasSubstr("'features' is missing"));

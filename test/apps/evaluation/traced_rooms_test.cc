@@ -31,13 +31,13 @@ std::string TwoRooms() {
          first + R"(]},{"area_px":500,"runs":[)" + second + "]}]}";
 }
 
-TracedRooms Parse(const std::string& text) {
+TracedRooms ParseRooms(const std::string& text) {
   InputStream input("rooms.json", text);
   return ReadTracedRooms(&input);
 }
 
 TEST(ReadTracedRoomsTest, Labels) {
-  const TracedRooms rooms = Parse(TwoRooms());
+  const TracedRooms rooms = ParseRooms(TwoRooms());
   EXPECT_EQ(rooms.name, "two");
   EXPECT_EQ(rooms.count, 2);
   EXPECT_EQ(rooms.width, 100);
@@ -45,7 +45,7 @@ TEST(ReadTracedRoomsTest, Labels) {
   EXPECT_EQ(std::count(rooms.labels.begin(), rooms.labels.end(), 1), 2400);
   EXPECT_EQ(std::count(rooms.labels.begin(), rooms.labels.end(), 2), 500);
   // Rows of the file run down, those of the labels up.
-  const TracedRooms top = Parse(
+  const TracedRooms top = ParseRooms(
       R"({"name":"","metres_per_pixel":1,"size":[3,2],
           "rooms":[{"runs":[[0,1,1]]}]})");
   EXPECT_EQ(top.labels, (std::vector<std::uint16_t>{0, 0, 0, 0, 0, 1}));
@@ -53,11 +53,12 @@ TEST(ReadTracedRoomsTest, Labels) {
 
 TEST(ReadTracedRoomsTest, BrokenFilesAreNamed) {
   const auto error_of = [](const std::string& members) {
-    return Refusal([&] { Parse("{\"name\":\"a\"," + members + "}"); });
+    return Refusal([&] { ParseRooms("{\"name\":\"a\"," + members + "}"); });
   };
-  EXPECT_THAT(Refusal([] { Parse("{"); }),
+  EXPECT_THAT(Refusal([] { ParseRooms("{"); }),
               HasSubstr("rooms.json:1: is no valid JSON"));
-  EXPECT_THAT(Refusal([] { Parse("{}"); }), HasSubstr("'name' is missing"));
+  EXPECT_THAT(Refusal([] { ParseRooms("{}"); }),
+              HasSubstr("'name' is missing"));
   EXPECT_THAT(error_of(R"("metres_per_pixel":0)"),
               HasSubstr("'metres_per_pixel' is no side of a pixel"));
   EXPECT_THAT(error_of(R"("metres_per_pixel":1,"size":[2])"),
@@ -122,20 +123,21 @@ struct Seen {
 TEST(TracedRoomsTest, ArePlacedOverFreeSpace) {
   const Seen seen;
   const TracedPlacement placement =
-      PlaceTracedRooms(Parse(TwoRooms()), seen.space);
+      PlaceTracedRooms(ParseRooms(TwoRooms()), seen.space);
   EXPECT_NEAR(placement.turn, seen.turn, DegToRad(0.6));
   EXPECT_NEAR(placement.scale, seen.scale, 0.011);
   EXPECT_LT((placement.center - seen.middle).norm(), 0.15);
   EXPECT_GT(placement.overlap, 0.95);
   SpaceGrid nothing = seen.space;
   std::fill(nothing.cells.begin(), nothing.cells.end(), Space::kUnknown);
-  EXPECT_THAT(Refusal([&] { PlaceTracedRooms(Parse(TwoRooms()), nothing); }),
-              HasSubstr("nothing in the grid was seen free"));
+  EXPECT_THAT(
+      Refusal([&] { PlaceTracedRooms(ParseRooms(TwoRooms()), nothing); }),
+      HasSubstr("nothing in the grid was seen free"));
 }
 
 TEST(TracedRoomsTest, PlansAreMeasured) {
   Seen seen;
-  const TracedRooms rooms = Parse(TwoRooms());
+  const TracedRooms rooms = ParseRooms(TwoRooms());
   TracedEvaluation result = EvaluateTracedRooms(seen.plan, rooms, seen.space);
   EXPECT_EQ(result.traced, 2);
   EXPECT_EQ(result.seen, 2);

@@ -140,7 +140,7 @@ Scan RoomScan(double x, double y) {
 }
 
 // Rows from the top, '#' occupied, '.' free, ' ' unknown.
-std::string Drawing(const OccupancyGrid& grid) {
+std::string Picture(const OccupancyGrid& grid) {
   std::string text;
   for (int row = grid.height() - 1; row >= 0; --row) {
     for (int column = 0; column < grid.width(); ++column) {
@@ -174,7 +174,7 @@ TEST(OccupancyGridTest, RaysClearTheirWayAndHitTheirEnd) {
   EXPECT_EQ(grid.height(), 4);
   // Two beams from (0.5, 0.5): along x to (4.5, 0.5), along y to (0.5, 2.5).
   grid.AddScan(MakeScan(0.0, 90.0, {4.0f, 2.0f}), Pose2(0.5, 0.5, 0.0));
-  EXPECT_EQ(Drawing(grid),
+  EXPECT_EQ(Picture(grid),
             "      \n"
             "#     \n"
             ".     \n"
@@ -184,7 +184,7 @@ TEST(OccupancyGridTest, RaysClearTheirWayAndHitTheirEnd) {
   Scan scan = MakeScan(0.0, 1.0, {2.0f});
   scan.laser_offset = Pose2(1.0, 0.0, DegToRad(-90.0));
   grid.AddScan(scan, Pose2(2.5, 3.5, 0.0));
-  EXPECT_EQ(Drawing(grid),
+  EXPECT_EQ(Picture(grid),
             "   .  \n"
             "#  .  \n"
             ".  #  \n"
@@ -197,7 +197,7 @@ TEST(OccupancyGridTest, SlantedRaysLeaveNoHoles) {
   // two rows are as near, the upper one.
   grid.AddScan(MakeScan(RadToDeg(std::atan2(3.0, 4.0)), 1.0, {10.0f}),
                Pose2(0.5, 0.5, 0.0));
-  EXPECT_EQ(Drawing(grid),
+  EXPECT_EQ(Picture(grid),
             "          \n"
             "          \n"
             "          \n"
@@ -217,7 +217,7 @@ TEST(OccupancyGridTest, NoReturnsAndFarReturns) {
   // The first beam returns from too far, the second not at all, the third from
   // the robot itself.
   grid.AddScan(MakeScan(0.0, 90.0, {5.0f, 0.0f, 0.05f}), Pose2(0.5, 0.5, 0.0));
-  EXPECT_EQ(Drawing(grid),
+  EXPECT_EQ(Picture(grid),
             "      \n"
             "....  \n");
 }
@@ -231,35 +231,35 @@ TEST(OccupancyGridTest, EvidenceIsCountedScanByScan) {
   const Scan far = MakeScan(0.0, 1e-4, {8.0f, 8.0f, 8.0f});
   // Three beams of one scan are one hit: no evidence yet.
   grid.AddScan(near, pose);
-  EXPECT_EQ(Drawing(grid), "....      \n");
+  EXPECT_EQ(Picture(grid), "....      \n");
   grid.AddScan(near, pose);
-  EXPECT_EQ(Drawing(grid), "....#     \n");
+  EXPECT_EQ(Picture(grid), "....#     \n");
   // Two hits of eight are a quarter, of nine less.
   for (int i = 0; i < 6; ++i) grid.AddScan(far, pose);
-  EXPECT_EQ(Drawing(grid), "....#...# \n");
+  EXPECT_EQ(Picture(grid), "....#...# \n");
   grid.AddScan(far, pose);
-  EXPECT_EQ(Drawing(grid), "........# \n");
+  EXPECT_EQ(Picture(grid), "........# \n");
 }
 
 TEST(OccupancyGridTest, CountersDoNotRunOver) {
   OccupancyGrid grid(Vector2d(0, 0), Vector2d(3.5, 0.5), Coarse());
   const Scan scan = MakeScan(0.0, 1.0, {2.0f});
   for (int i = 0; i < 200000; ++i) grid.AddScan(scan, Pose2(0.5, 0.5, 0.0));
-  EXPECT_EQ(Drawing(grid), "..# \n");
+  EXPECT_EQ(Picture(grid), "..# \n");
 }
 
 TEST(OccupancyGridTest, WhatLiesOutsideIsLeftOut) {
   OccupancyGrid grid(Vector2d(0, 0), Vector2d(3.5, 0.5), Coarse());
   grid.AddScan(MakeScan(0.0, 180.0, {40.0f, 40.0f}), Pose2(1.5, 0.5, 0.0));
-  EXPECT_EQ(Drawing(grid), "....\n");
+  EXPECT_EQ(Picture(grid), "....\n");
   // From outside through the grid.
   OccupancyGrid other(Vector2d(0, 0), Vector2d(3.5, 0.5), Coarse());
   other.AddScan(MakeScan(0.0, 1.0, {42.0f}), Pose2(-40.5, 0.5, 0.0));
-  EXPECT_EQ(Drawing(other), ".#  \n");
+  EXPECT_EQ(Picture(other), ".#  \n");
   other.AddScan(MakeScan(0.0, 1.0, {2.0f}), Pose2(std::nan(""), 0.5, 0.0));
   other.AddScan(MakeScan(0.0, 1.0, {2.0f}), Pose2(1e30, 0.5, 0.0));
   other.AddScan(MakeScan(0.0, 1.0, {std::nanf("")}), Pose2(0.5, 0.5, 0.0));
-  EXPECT_EQ(Drawing(other), ".#  \n");
+  EXPECT_EQ(Picture(other), ".#  \n");
 }
 
 TEST(OccupancyGridTest, CellsAreAlignedAndHoldBothCorners) {
@@ -281,13 +281,13 @@ TEST(OccupancyGridTest, SoManyScansInEvenSteps) {
     poses.emplace_back(0.5, i + 0.5, 0.0);
   }
   OccupancyOptions options = Coarse();
-  EXPECT_EQ(Drawing(MakeOccupancyGrid(scans, poses, options)),
+  EXPECT_EQ(Picture(MakeOccupancyGrid(scans, poses, options)),
             "..#\n..#\n..#\n..#\n..#\n");
   options.max_scans = 3;
-  EXPECT_EQ(Drawing(MakeOccupancyGrid(scans, poses, options)),
+  EXPECT_EQ(Picture(MakeOccupancyGrid(scans, poses, options)),
             "..#\n   \n..#\n   \n..#\n");
   options.max_scans = 5;
-  EXPECT_EQ(Drawing(MakeOccupancyGrid(scans, poses, options)),
+  EXPECT_EQ(Picture(MakeOccupancyGrid(scans, poses, options)),
             "..#\n..#\n..#\n..#\n..#\n");
 }
 

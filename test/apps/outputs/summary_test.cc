@@ -13,15 +13,15 @@
 namespace plumbline {
 namespace {
 
-WallDirection Wall(double degrees, double length) {
+WallDirection WallAtDegrees(double degrees, double length) {
   return {DegToRad(degrees), length};
 }
 
 TEST(OrthogonalityTest, PerfectAtAnyAngle) {
   for (const double turn : {0.0, 17.0, 44.9, 45.0, -45.0, 89.99, 123.4}) {
-    const auto rms =
-        OrthogonalityDeg({Wall(turn, 3.0), Wall(turn + 90.0, 2.0),
-                          Wall(turn + 180.0, 1.0), Wall(turn - 90.0, 5.0)});
+    const auto rms = OrthogonalityDeg(
+        {WallAtDegrees(turn, 3.0), WallAtDegrees(turn + 90.0, 2.0),
+         WallAtDegrees(turn + 180.0, 1.0), WallAtDegrees(turn - 90.0, 5.0)});
     ASSERT_TRUE(rms.has_value());
     EXPECT_NEAR(*rms, 0.0, 1e-9) << turn;
   }
@@ -29,24 +29,31 @@ TEST(OrthogonalityTest, PerfectAtAnyAngle) {
 
 TEST(OrthogonalityTest, WorkedByHand) {
   // Folded: 0 and 1 degree, mean 0.5, deviations of half a degree.
-  EXPECT_NEAR(*OrthogonalityDeg({Wall(0.0, 2.0), Wall(91.0, 2.0)}), 0.5, 1e-9);
+  EXPECT_NEAR(
+      *OrthogonalityDeg({WallAtDegrees(0.0, 2.0), WallAtDegrees(91.0, 2.0)}),
+      0.5, 1e-9);
   // Weights 3 and 1: mean 0.5, (3 * 0.25 + 1 * 2.25) / 4 = 0.75.
-  EXPECT_NEAR(*OrthogonalityDeg({Wall(0.0, 3.0), Wall(92.0, 1.0)}),
-              std::sqrt(0.75), 1e-9);
+  EXPECT_NEAR(
+      *OrthogonalityDeg({WallAtDegrees(0.0, 3.0), WallAtDegrees(92.0, 1.0)}),
+      std::sqrt(0.75), 1e-9);
   // Across the cut of the folding: 44.5 and 45.5 (= -44.5 mod 90).
-  EXPECT_NEAR(*OrthogonalityDeg({Wall(44.5, 1.0), Wall(45.5, 1.0)}), 0.5, 1e-9);
+  EXPECT_NEAR(
+      *OrthogonalityDeg({WallAtDegrees(44.5, 1.0), WallAtDegrees(45.5, 1.0)}),
+      0.5, 1e-9);
 }
 
 TEST(OrthogonalityTest, ObliqueAndShortWallsAreLeftOut) {
   // 30 and 45 degrees lie farther than 10 from every multiple of 90; the wall
   // of 0.99 m at 5 degrees is too short to count.
   EXPECT_NEAR(
-      *OrthogonalityDeg({Wall(0.0, 3.0), Wall(92.0, 1.0), Wall(30.0, 1.5),
-                         Wall(45.0, 1.5), Wall(5.0, 0.99)}),
+      *OrthogonalityDeg({WallAtDegrees(0.0, 3.0), WallAtDegrees(92.0, 1.0),
+                         WallAtDegrees(30.0, 1.5), WallAtDegrees(45.0, 1.5),
+                         WallAtDegrees(5.0, 0.99)}),
       std::sqrt(0.75), 1e-9);
   // At 1.00 m it counts: mean (2 + 5) / 5 = 1.4 and deviations -1.4, 0.6, 3.6.
   EXPECT_NEAR(
-      *OrthogonalityDeg({Wall(0.0, 3.0), Wall(92.0, 1.0), Wall(5.0, 1.0)}),
+      *OrthogonalityDeg({WallAtDegrees(0.0, 3.0), WallAtDegrees(92.0, 1.0),
+                         WallAtDegrees(5.0, 1.0)}),
       std::sqrt((3 * 1.96 + 0.36 + 12.96) / 5.0), 1e-9);
 }
 
@@ -55,21 +62,25 @@ TEST(OrthogonalityTest, DominantIsTheMostLengthAndNotTheMean) {
   // dominant direction: one metre of the main part is off by 3 degrees.
   // Mean 0.3: (9 * 0.09 + 1 * 7.29) / 10 = 0.81.
   EXPECT_NEAR(
-      *OrthogonalityDeg({Wall(0.0, 9.0), Wall(93.0, 1.0), Wall(24.0, 9.0)}),
+      *OrthogonalityDeg({WallAtDegrees(0.0, 9.0), WallAtDegrees(93.0, 1.0),
+                         WallAtDegrees(24.0, 9.0)}),
       0.9, 1e-9);
   // Circular mean over all would lie at 8 degrees between the two, where
   // both are within the window; the mode is at the longer one.
-  EXPECT_NEAR(*OrthogonalityDeg({Wall(0.0, 10.0), Wall(16.0, 9.0)}), 0.0, 1e-9);
+  EXPECT_NEAR(
+      *OrthogonalityDeg({WallAtDegrees(0.0, 10.0), WallAtDegrees(16.0, 9.0)}),
+      0.0, 1e-9);
 }
 
 TEST(OrthogonalityTest, NothingToMeasure) {
   EXPECT_FALSE(OrthogonalityDeg(std::vector<WallDirection>{}).has_value());
-  EXPECT_FALSE(OrthogonalityDeg({Wall(0.0, 0.5)}).has_value());
+  EXPECT_FALSE(OrthogonalityDeg({WallAtDegrees(0.0, 0.5)}).has_value());
   EXPECT_FALSE(
-      OrthogonalityDeg({Wall(std::nan(""), 5.0),
-                        Wall(0.0, std::numeric_limits<double>::infinity())})
+      OrthogonalityDeg(
+          {WallAtDegrees(std::nan(""), 5.0),
+           WallAtDegrees(0.0, std::numeric_limits<double>::infinity())})
           .has_value());
-  EXPECT_NEAR(*OrthogonalityDeg({Wall(33.0, 5.0)}), 0.0, 1e-9);
+  EXPECT_NEAR(*OrthogonalityDeg({WallAtDegrees(33.0, 5.0)}), 0.0, 1e-9);
 }
 
 TEST(MeanOfTenthTest, Tenths) {

@@ -29,42 +29,43 @@ std::string Line(const std::string& layer, const std::string& x1,
          "\n30\n0\n11\n" + x2 + "\n21\n" + y2 + "\n31\n0\n";
 }
 
-std::vector<PlanLine> Read(const std::string& text,
-                           const std::vector<std::string>& layers = {},
-                           std::vector<std::string>* notes = nullptr) {
+std::vector<PlanLine> ReadLines(const std::string& text,
+                                const std::vector<std::string>& layers = {},
+                                std::vector<std::string>* notes = nullptr) {
   return ReadPlanDxf(text, "plan.dxf", layers, notes);
 }
 
 std::string WhyNot(const std::string& text) {
-  return Refusal([&] { Read(text); });
+  return Refusal([&] { ReadLines(text); });
 }
 
 TEST(PlanDxfTest, ReadsLinesInMetres) {
   std::vector<std::string> notes;
-  std::vector<PlanLine> lines =
-      Read(Drawing(Line("A-WALL-EXT", "1000", "2000", "4000", "2500"), "4"), {},
-           &notes);
+  std::vector<PlanLine> lines = ReadLines(
+      Drawing(Line("A-WALL-EXT", "1000", "2000", "4000", "2500"), "4"), {},
+      &notes);
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(lines[0].begin, Eigen::Vector2d(1.0, 2.0));
   EXPECT_EQ(lines[0].end, Eigen::Vector2d(4.0, 2.5));
   EXPECT_EQ(lines[0].layer, "A-WALL-EXT");
   EXPECT_THAT(notes, IsEmpty());
-  lines = Read(Drawing(Line("walls", "0", "0", "10", "0"), "2"));
+  lines = ReadLines(Drawing(Line("walls", "0", "0", "10", "0"), "2"));
   EXPECT_NEAR(lines[0].end.x(), 3.048, 1e-9);
-  lines = Read(Drawing(Line("walls", "0", "0", "10", "0"), "0"), {}, &notes);
+  lines =
+      ReadLines(Drawing(Line("walls", "0", "0", "10", "0"), "0"), {}, &notes);
   EXPECT_EQ(lines[0].end.x(), 10.0);
   EXPECT_THAT(notes, ElementsAre(HasSubstr("no unit")));
 }
 
 TEST(PlanDxfTest, ReadsPolylines) {
   // Closed, the second side an arc; then an old one that is open.
-  const std::vector<PlanLine> lines =
-      Read(Drawing("0\nLWPOLYLINE\n8\nWALLS\n90\n3\n70\n1\n10\n0\n20\n0\n10\n4"
-                   "\n20\n0\n42\n0.5\n"
-                   "10\n4\n20\n3\n"
-                   "0\nPOLYLINE\n8\nWALLS\n66\n1\n70\n0\n10\n0\n20\n0\n"
-                   "0\nVERTEX\n8\n0\n10\n1\n20\n1\n0\nVERTEX\n8\n0\n10\n6\n20\n"
-                   "1\n0\nSEQEND\n"));
+  const std::vector<PlanLine> lines = ReadLines(
+      Drawing("0\nLWPOLYLINE\n8\nWALLS\n90\n3\n70\n1\n10\n0\n20\n0\n10\n4"
+              "\n20\n0\n42\n0.5\n"
+              "10\n4\n20\n3\n"
+              "0\nPOLYLINE\n8\nWALLS\n66\n1\n70\n0\n10\n0\n20\n0\n"
+              "0\nVERTEX\n8\n0\n10\n1\n20\n1\n0\nVERTEX\n8\n0\n10\n6\n20\n"
+              "1\n0\nSEQEND\n"));
   ASSERT_EQ(lines.size(), 3u);
   EXPECT_EQ(lines[0].end, Eigen::Vector2d(4.0, 0.0));
   EXPECT_EQ(lines[1].begin, Eigen::Vector2d(4.0, 3.0));
@@ -78,12 +79,12 @@ TEST(PlanDxfTest, LayersAreChosen) {
       Line("WALLS", "0", "0", "1", "0") + Line("DOORS", "0", "0", "2", "0") +
       Line("Door-2", "0", "0", "3", "0") + "0\nINSERT\n8\nWALLS\n2\nchair\n");
   std::vector<std::string> notes;
-  EXPECT_EQ(Read(text, {}, &notes).size(), 1u);
+  EXPECT_EQ(ReadLines(text, {}, &notes).size(), 1u);
   EXPECT_THAT(notes, ElementsAre(HasSubstr("1 blocks")));
-  EXPECT_EQ(Read(text, {"door*"}).size(), 2u);
-  EXPECT_EQ(Read(text, {"walls", "DOORS"}).size(), 2u);
-  EXPECT_EQ(Read(text, {"*"}).size(), 3u);
-  EXPECT_THAT(Refusal([&] { Read(text, {"WALL"}); }),
+  EXPECT_EQ(ReadLines(text, {"door*"}).size(), 2u);
+  EXPECT_EQ(ReadLines(text, {"walls", "DOORS"}).size(), 2u);
+  EXPECT_EQ(ReadLines(text, {"*"}).size(), 3u);
+  EXPECT_THAT(Refusal([&] { ReadLines(text, {"WALL"}); }),
               HasSubstr("DOORS (1 lines), Door-2 (1 lines), WALLS (1 lines)"));
 }
 
@@ -114,7 +115,7 @@ TEST(PlanDxfTest, CutAnywhere) {
                                    Line("WALLS", "0", "0", "0", "5"));
   for (std::size_t size = 0; size < text.size(); ++size) {
     try {
-      EXPECT_LE(Read(text.substr(0, size)).size(), 2u);
+      EXPECT_LE(ReadLines(text.substr(0, size)).size(), 2u);
     } catch (const Error&) {
       // A refusal is an answer.
     }

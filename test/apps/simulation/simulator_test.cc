@@ -21,14 +21,14 @@ using ::testing::StartsWith;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-World Read(const std::string& text) {
+World ReadSimulated(const std::string& text) {
   std::istringstream input(text);
   return ReadWorld(input, "test.world");
 }
 
 // A room of 10 m by 6 m with a way through its middle.
 World Room() {
-  return Read(
+  return ReadSimulated(
       "wall 0 0 10 0\nwall 10 0 10 6\nwall 10 6 0 6\nwall 0 6 0 0\n"
       "path 2 3 8 3\n");
 }
@@ -61,7 +61,7 @@ std::string ReadGzip(const std::string& path) {
   return text;
 }
 
-std::string ReadFile(const std::string& path) {
+std::string Contents(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   EXPECT_TRUE(file.good()) << path;
   std::ostringstream text;
@@ -70,8 +70,8 @@ std::string ReadFile(const std::string& path) {
 }
 
 TEST(CastBeamsTest, HitsTheNearestSurface) {
-  const WorldSurfaces surfaces =
-      MakeSurfaces(Read("wall 5 -1 5 1\nwall 3 -1 3 0.5\nwall -2 -9 -2 9\n"));
+  const WorldSurfaces surfaces = MakeSurfaces(
+      ReadSimulated("wall 5 -1 5 1\nwall 3 -1 3 0.5\nwall -2 -9 -2 9\n"));
   std::vector<std::pair<int, double>> hits;
   const std::vector<double> ranges = CastBeams(
       surfaces, Pose2(1.0, 0.0, 0.0), -kPi / 2, kPi / 2, 3, 50.0, &hits);
@@ -84,7 +84,8 @@ TEST(CastBeamsTest, HitsTheNearestSurface) {
 }
 
 TEST(CastBeamsTest, SeesWhatStandsAcrossTheCutBehind) {
-  const WorldSurfaces surfaces = MakeSurfaces(Read("wall -2 -9 -2 9\n"));
+  const WorldSurfaces surfaces =
+      MakeSurfaces(ReadSimulated("wall -2 -9 -2 9\n"));
   // 0, 90, 180 and 270 degrees.
   const std::vector<double> ranges =
       CastBeams(surfaces, Pose2(0.0, 0.0, 0.0), 0.0, kPi / 2, 4, 50.0, nullptr);
@@ -110,8 +111,8 @@ TEST(CastBeamsTest, EveryBeamOfAClosedRoomReturnsItsDistance) {
 }
 
 TEST(CastBeamsTest, ColumnsAndCurvedWalls) {
-  const WorldSurfaces surfaces =
-      MakeSurfaces(Read("circle 5 0 1\narc 0 0 3 45 135\narc 0 -6 2 -45 45\n"));
+  const WorldSurfaces surfaces = MakeSurfaces(
+      ReadSimulated("circle 5 0 1\narc 0 0 3 45 135\narc 0 -6 2 -45 45\n"));
   const std::vector<double> ranges = CastBeams(
       surfaces, Pose2(0.0, 0.0, 0.0), -kPi / 2, kPi / 2, 3, 50.0, nullptr);
   // Straight down the third arc has no part on the y axis.
@@ -125,7 +126,7 @@ TEST(CastBeamsTest, ColumnsAndCurvedWalls) {
 }
 
 TEST(CastBeamsTest, NothingBeyondTheMaximumRange) {
-  const WorldSurfaces surfaces = MakeSurfaces(Read("wall 5 -9 5 9\n"));
+  const WorldSurfaces surfaces = MakeSurfaces(ReadSimulated("wall 5 -9 5 9\n"));
   const Pose2 laser(0.0, 0.0, 0.0);
   EXPECT_EQ(CastBeams(surfaces, laser, 0.0, 1.0, 1, 4.9, nullptr)[0],
             kInfinity);
@@ -139,7 +140,7 @@ TEST(CastBeamsTest, NothingBeyondTheMaximumRange) {
 
 TEST(DriveTest, FollowsThePathToItsEnd) {
   const std::vector<SimulatedState> states =
-      Drive(Read("path 0 0 5 0 5 5 5 0\n"), DriveOptions(), 1);
+      Drive(ReadSimulated("path 0 0 5 0 5 5 5 0\n"), DriveOptions(), 1);
   EXPECT_EQ(states.front().pose, Pose2(0.0, 0.0, 0.0));
   EXPECT_EQ(states.front().time, 1000.0);
   EXPECT_NEAR(states[4].time, 1000.2, 1e-9);
@@ -157,18 +158,20 @@ TEST(DriveTest, FollowsThePathToItsEnd) {
 
 TEST(DriveTest, RefusesWaysThroughWalls) {
   try {
-    Drive(Read("wall 5 -5 5 5\npath 0 0 10 0\n"), DriveOptions(), 1);
+    Drive(ReadSimulated("wall 5 -5 5 5\npath 0 0 10 0\n"), DriveOptions(), 1);
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(),
                 HasSubstr("test.world: the robot runs into something near x = "
                           "4.8"));
   }
-  EXPECT_THROW(
-      Drive(Read("circle 5 0 0.5\npath 0 0 10 0\n"), DriveOptions(), 1), Error);
-  EXPECT_THROW(
-      Drive(Read("box 5 0 1 1 20\npath 0 0 10 0\n"), DriveOptions(), 1), Error);
-  EXPECT_THROW(Drive(Read("path 0 0\n"), DriveOptions(), 1), Error);
+  EXPECT_THROW(Drive(ReadSimulated("circle 5 0 0.5\npath 0 0 10 0\n"),
+                     DriveOptions(), 1),
+               Error);
+  EXPECT_THROW(Drive(ReadSimulated("box 5 0 1 1 20\npath 0 0 10 0\n"),
+                     DriveOptions(), 1),
+               Error);
+  EXPECT_THROW(Drive(ReadSimulated("path 0 0\n"), DriveOptions(), 1), Error);
 }
 
 TEST(DriveTest, EveryBuildingCanBeDrivenThrough) {
@@ -248,7 +251,7 @@ TEST(SimulateTest, NoiseHasTheGivenSize) {
 TEST(SimulateTest, OdometryDriftsAsItsOptionsSay) {
   SimulatorOptions options = Exact();
   options.odometry.scale = 0.1;
-  const World world = Read("path 0 0 20 0\n");
+  const World world = ReadSimulated("path 0 0 20 0\n");
   const SimulatedState scaled = Simulate(world, options, 1).states.back();
   EXPECT_NEAR(scaled.odometry[0], 1.1 * scaled.pose[0], 1e-9);
   options.odometry.scale = 0.0;
@@ -258,7 +261,7 @@ TEST(SimulateTest, OdometryDriftsAsItsOptionsSay) {
   options.odometry.heading_bias_deg = 0.0;
   options.odometry.turn_scale = 0.1;
   const SimulatedState turned =
-      Simulate(Read("path 0 0 5 0 5 5\n"), options, 1).states.back();
+      Simulate(ReadSimulated("path 0 0 5 0 5 5\n"), options, 1).states.back();
   EXPECT_NEAR(turned.odometry[2], 1.1 * turned.pose[2], 1e-9);
 }
 
@@ -352,7 +355,7 @@ TEST(WriteTruthTest, IsTheDocumentedJson) {
 
 TEST(WriteRelationsTest, AreExactDisplacementsOfTheTruth) {
   const Simulation simulation =
-      Simulate(Read("path 0 0 6 0 6 6\n"), Exact(), 1);
+      Simulate(ReadSimulated("path 0 0 6 0 6 6\n"), Exact(), 1);
   std::ostringstream output;
   WriteRelations(simulation, 1, output);
   std::istringstream lines(output.str());
@@ -419,10 +422,10 @@ TEST(BundledLogTest, IsWhatTheStatedCommandMakes) {
   EXPECT_TRUE(log.str() == ReadGzip(folder + "office.clf.gz"));
   std::ostringstream truth;
   WriteTruth(simulation, truth);
-  EXPECT_TRUE(truth.str() == ReadFile(folder + "office.truth.json"));
+  EXPECT_TRUE(truth.str() == Contents(folder + "office.truth.json"));
   std::ostringstream relations;
   WriteRelations(simulation, 20, relations);
-  EXPECT_TRUE(relations.str() == ReadFile(folder + "office.relations"));
+  EXPECT_TRUE(relations.str() == Contents(folder + "office.relations"));
 }
 
 TEST(BundledLogTest, ExampleWorldCanBeDriven) {

@@ -7,7 +7,7 @@
 namespace plumbline {
 namespace {
 
-World Read(const std::string& text) {
+World ReadRooms(const std::string& text) {
   std::istringstream input(text);
   return ReadWorld(input, "test.world");
 }
@@ -25,7 +25,7 @@ const char kTwoRooms[] =
     "path 1 1 2 1\n";
 
 TEST(WorldRoomsTest, DoorsCloseRooms) {
-  World world = Read(kTwoRooms);
+  World world = ReadRooms(kTwoRooms);
   for (const double degrees : {0.0, 30.0}) {
     RotateWorld(degrees, &world);
     const std::vector<Polygon> rooms = WorldRooms(world);
@@ -43,7 +43,8 @@ TEST(WorldRoomsTest, DoorsCloseRooms) {
 }
 
 TEST(WorldRoomsTest, AShutDoor) {
-  World world = Read(std::string(kTwoRooms) + "wall 4.1 0.55 4.1 1.45 0.04\n");
+  World world =
+      ReadRooms(std::string(kTwoRooms) + "wall 4.1 0.55 4.1 1.45 0.04\n");
   // The leaf is as near to the door's place as the wall, and cut as well.
   EXPECT_FALSE(WorldDoors(world)[0].is_shut);
   world.walls.push_back({{4.1, 0.55}, {4.1, 1.45}, 0.04});
@@ -57,8 +58,8 @@ TEST(WorldRoomsTest, OpeningsCutCorridorsOff) {
       "wall 0 -1 10 -1\nwall 0 1 10 1\nwall 0 -1 0 1\n"
       "wall 10 -5 10 -1\nwall 10 1 10 5\nwall 10 -5 18 -5\n"
       "wall 10 5 18 5\nwall 18 -5 18 5\npath 1 0 14 0\n";
-  ASSERT_EQ(WorldRooms(Read(walls)).size(), 1u);
-  const World world = Read(walls + "opening 10 -1 10 1\n");
+  ASSERT_EQ(WorldRooms(ReadRooms(walls)).size(), 1u);
+  const World world = ReadRooms(walls + "opening 10 -1 10 1\n");
   const std::vector<Polygon> rooms = WorldRooms(world);
   ASSERT_EQ(rooms.size(), 2u);
   EXPECT_NEAR(rooms[0].Area(), 80.0, 0.1);
@@ -67,7 +68,7 @@ TEST(WorldRoomsTest, OpeningsCutCorridorsOff) {
 }
 
 TEST(WorldRoomsTest, SpacesWithoutADoorAreNoRooms) {
-  World world = Read(kTwoRooms);
+  World world = ReadRooms(kTwoRooms);
   world.doors.clear();
   // The door has become a part of one space, which the path is in.
   ASSERT_EQ(WorldRooms(world).size(), 1u);
@@ -77,13 +78,14 @@ TEST(WorldRoomsTest, SpacesWithoutADoorAreNoRooms) {
 }
 
 TEST(WorldRoomsTest, CurvedWallsOpenFieldsAndNoThickness) {
-  const World rotunda = Read("arc 0 0 5 0 360\npath 0 0 1 0\n");
+  const World rotunda = ReadRooms("arc 0 0 5 0 360\npath 0 0 1 0\n");
   // A whole circle is a column.
   EXPECT_TRUE(WorldRooms(rotunda).empty());
-  const World half = Read("arc 0 0 5 0 180\nwall -5 0 5 0\npath 0 1 1 1\n");
+  const World half =
+      ReadRooms("arc 0 0 5 0 180\nwall -5 0 5 0\npath 0 1 1 1\n");
   ASSERT_EQ(WorldRooms(half).size(), 1u);
   EXPECT_NEAR(WorldRooms(half)[0].Area(), 0.5 * 3.14159 * 25.0, 0.2);
-  EXPECT_TRUE(WorldRooms(Read("wall 0 0 5 0\npath 0 1 1 1\n")).empty());
+  EXPECT_TRUE(WorldRooms(ReadRooms("wall 0 0 5 0\npath 0 1 1 1\n")).empty());
 }
 
 TEST(WorldRoomsTest, WrittenWorldsKeepTheirRooms) {

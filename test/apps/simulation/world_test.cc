@@ -14,14 +14,14 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-World Read(const std::string& text) {
+World ReadText(const std::string& text) {
   std::istringstream input(text);
   return ReadWorld(input, "test.world");
 }
 
 std::string ErrorOf(const std::string& text) {
   try {
-    Read(text);
+    ReadText(text);
   } catch (const Error& error) {
     return error.what();
   }
@@ -57,7 +57,7 @@ TEST(SimulationRandomTest, GaussianHasMeanZeroAndVarianceOne) {
 }
 
 TEST(WorldTest, ReadsEveryKind) {
-  const World world = Read(
+  const World world = ReadText(
       "# a comment\n"
       "wall 0 0 10 0\n"
       "wall 0 5 10 5 0.2   # thick\n"
@@ -106,7 +106,8 @@ TEST(WorldTest, ErrorsNameFileAndLine) {
 }
 
 TEST(WorldTest, DoorsCutGapsWhereverTheyStandInTheFile) {
-  const World world = Read("door 4 0.05 1\nwall 0 0 10 0 0.2\nwall 0 3 10 3\n");
+  const World world =
+      ReadText("door 4 0.05 1\nwall 0 0 10 0 0.2\nwall 0 3 10 3\n");
   ASSERT_EQ(world.walls.size(), 3u);
   EXPECT_NEAR(world.walls[0].end.x(), 3.5, 1e-12);
   EXPECT_NEAR(world.walls[1].begin.x(), 4.5, 1e-12);
@@ -115,7 +116,7 @@ TEST(WorldTest, DoorsCutGapsWhereverTheyStandInTheFile) {
 }
 
 TEST(WorldTest, DoorAtTheEndLeavesNoStump) {
-  World world = Read("wall 0 0 1 0\n");
+  World world = ReadText("wall 0 0 1 0\n");
   EXPECT_EQ(CutDoor({0.5, 0.0}, 2.0, &world), 1);
   EXPECT_TRUE(world.walls.empty());
   EXPECT_EQ(CutDoor({0.5, 0.0}, 2.0, &world), 0);
@@ -123,15 +124,15 @@ TEST(WorldTest, DoorAtTheEndLeavesNoStump) {
 
 TEST(WorldTest, WritesWhatItReads) {
   const std::string text =
-      Text(Read("wall 0 0 10 0.5 0.2\ncircle 1 2 0.3\narc 4 5 6 30 120\n"
-                "box 1 1 2 0.5 45\npath 1 2\npath 3 4\n"));
+      Text(ReadText("wall 0 0 10 0.5 0.2\ncircle 1 2 0.3\narc 4 5 6 30 120\n"
+                    "box 1 1 2 0.5 45\npath 1 2\npath 3 4\n"));
   EXPECT_THAT(text, HasSubstr("arc 4.000000 5.000000 6.000000 30.000000 "
                               "120.000000\n"));
-  EXPECT_EQ(Text(Read(text)), text);
+  EXPECT_EQ(Text(ReadText(text)), text);
 }
 
 TEST(WorldTest, SurfacesOfAThickWall) {
-  const WorldSurfaces surfaces = MakeSurfaces(Read("wall 0 0 10 0 0.2\n"));
+  const WorldSurfaces surfaces = MakeSurfaces(ReadText("wall 0 0 10 0 0.2\n"));
   ASSERT_EQ(surfaces.faces.size(), 4u);
   // Both sides first, then the ends, which have no orientation of their own.
   EXPECT_TRUE(surfaces.faces[0].begin.isApprox(Eigen::Vector2d(0, -0.1)));
@@ -147,7 +148,7 @@ TEST(WorldTest, SurfacesOfAThickWall) {
 
 TEST(WorldTest, OrientationsAreAxialAndClutterHasNone) {
   const WorldSurfaces surfaces = MakeSurfaces(
-      Read("wall 0 0 0 5\nwall 0 5 0 0\nwall 4 4 0 0\nbox 9 9 1 1 0\n"));
+      ReadText("wall 0 0 0 5\nwall 0 5 0 0\nwall 4 4 0 0\nbox 9 9 1 1 0\n"));
   ASSERT_EQ(surfaces.orientations_deg.size(), 2u);
   EXPECT_NEAR(surfaces.orientations_deg[0], 45.0, 1e-9);
   EXPECT_NEAR(surfaces.orientations_deg[1], 90.0, 1e-9);
@@ -161,7 +162,7 @@ TEST(WorldTest, OrientationsAreAxialAndClutterHasNone) {
 
 TEST(WorldTest, RotationTurnsEverything) {
   World world =
-      Read("wall 1 0 2 0\narc 0 3 1 10 20\nbox 1 0 2 1 5\npath 1 0 0 2\n");
+      ReadText("wall 1 0 2 0\narc 0 3 1 10 20\nbox 1 0 2 1 5\npath 1 0 0 2\n");
   RotateWorld(90.0, &world);
   EXPECT_NEAR((world.walls[0].end - Eigen::Vector2d(0, 2)).norm(), 0, 1e-12);
   EXPECT_NEAR((world.circles[0].center - Eigen::Vector2d(-3, 0)).norm(), 0,

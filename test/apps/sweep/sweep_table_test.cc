@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 // Runs x = 1, 2, 3 with two seeds each; figure y, and others on some.
-SweepResult MakeResult(const std::vector<double>& y) {
+SweepResult ResultOf(const std::vector<double>& y) {
   SweepResult result;
   result.definition.axes = {{"x", {"1", "2", "3"}}};
   result.definition.trials = 2;
@@ -32,7 +32,7 @@ SweepResult MakeResult(const std::vector<double>& y) {
 }
 
 TEST(SweepTableTest, ARowARunThatHasARecord) {
-  SweepResult result = MakeResult({1.0, 0.1});
+  SweepResult result = ResultOf({1.0, 0.1});
   result.records[0]->figures = {{"seed", 1.0},
                                 {"flags.x", 1.0},
                                 {"x", 9.0},
@@ -63,7 +63,7 @@ TEST(SweepTableTest, NumbersReadBack) {
 }
 
 TEST(SweepTableTest, SettingsGatherTheirRuns) {
-  const SweepResult result = MakeResult({1.0, 2.0, 3.0});
+  const SweepResult result = ResultOf({1.0, 2.0, 3.0});
   const std::vector<SweepSetting> settings = Settings(result);
   ASSERT_EQ(settings.size(), 3u);
   EXPECT_THAT(settings[1].values, ElementsAre("2"));
@@ -78,7 +78,7 @@ TEST(SweepTableTest, SettingsGatherTheirRuns) {
 
 TEST(SweepTableTest, TheBestIsPairedBySeed) {
   // Means 2, 1.5, 1; the differences from the third: 1 and 1; -1 and 2.
-  const SweepResult result = MakeResult({1.0, 3.0, -1.0, 4.0, 0.0, 2.0});
+  const SweepResult result = ResultOf({1.0, 3.0, -1.0, 4.0, 0.0, 2.0});
   const std::optional<BestSetting> least = FindBest(result, "y", true);
   ASSERT_TRUE(least);
   EXPECT_EQ(least->setting, 2u);
@@ -90,13 +90,13 @@ TEST(SweepTableTest, TheBestIsPairedBySeed) {
 }
 
 TEST(SweepTableTest, WhatIsNotWholeDoesNotWin) {
-  const SweepResult result = MakeResult({1.0, 3.0, 0.0});
+  const SweepResult result = ResultOf({1.0, 3.0, 0.0});
   const std::optional<BestSetting> best = FindBest(result, "y", true);
   ASSERT_TRUE(best);
   EXPECT_EQ(best->setting, 0u);
   EXPECT_THAT(best->equals, IsEmpty());
-  EXPECT_FALSE(FindBest(MakeResult({1.0}), "y", true));
-  EXPECT_FALSE(FindBest(MakeResult({}), "y", true));
+  EXPECT_FALSE(FindBest(ResultOf({1.0}), "y", true));
+  EXPECT_FALSE(FindBest(ResultOf({}), "y", true));
   try {
     FindBest(result, "z", true);
     FAIL();

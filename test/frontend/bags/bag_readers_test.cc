@@ -94,7 +94,7 @@ std::string WhatOf(const std::string& bytes, const LaserOptions& options = {}) {
   return "";
 }
 
-std::int64_t Skipped(const Log& log, const std::string& reason) {
+std::int64_t SkippedInBag(const Log& log, const std::string& reason) {
   std::int64_t count = 0;
   for (const SkipReport& report : log.skipped) {
     if (report.reason.find(reason) != std::string::npos) count += report.count;
@@ -264,7 +264,7 @@ TEST_F(FormatsTest, Ros2Folder) {
   ExpectSame(ReadPath(folder / "bag/bag_0.db3"));
   fs::remove(folder / "bag/metadata.yaml");
   const Log log = ReadPath(folder / "bag");
-  EXPECT_EQ(Skipped(log, "metadata.yaml"), 1);
+  EXPECT_EQ(SkippedInBag(log, "metadata.yaml"), 1);
   EXPECT_EQ(log.scans.size(), carmen_.scans.size());
 }
 
@@ -646,7 +646,7 @@ TEST(BadBagTest, IndexThatLiesAboutItsSizeIsSurvived) {
   bag[size] = static_cast<char>(bag[size] + 100);
   const Log log = ReadBytes(bag);
   EXPECT_EQ(log.scans.size(), 10u);
-  EXPECT_EQ(Skipped(log, "index that states another size"), 1);
+  EXPECT_EQ(SkippedInBag(log, "index that states another size"), 1);
 }
 
 TEST(BadBagTest, ChunkThatLiesAboutItsSizeIsSurvived) {
@@ -664,7 +664,7 @@ TEST(BadBagTest, ChunkThatLiesAboutItsSizeIsSurvived) {
       std::memcpy(&bag[place], &size, 4);
       const Log log = ReadBytes(bag);
       EXPECT_EQ(log.scans.size(), 10u);
-      EXPECT_GE(Skipped(log, "states another size"), 1);
+      EXPECT_GE(SkippedInBag(log, "states another size"), 1);
     }
   }
 }
@@ -727,10 +727,10 @@ TEST(BadBagTest, MessagesWithoutBytesAreCounted) {
                      std::string("\0\x07\0\0rest", 8)});
   const Log log = ReadBytes(MakeMcap(records));
   EXPECT_EQ(log.scans.size(), 10u);
-  EXPECT_EQ(Skipped(log, "LaserScan on /scan that has no bytes"), 1);
-  EXPECT_EQ(Skipped(log, "Odometry on /odom that has no bytes"), 1);
-  EXPECT_EQ(Skipped(log, "TFMessage on /tf_static that has no bytes"), 1);
-  EXPECT_EQ(Skipped(log, "no plain CDR"), 1);
+  EXPECT_EQ(SkippedInBag(log, "LaserScan on /scan that has no bytes"), 1);
+  EXPECT_EQ(SkippedInBag(log, "Odometry on /odom that has no bytes"), 1);
+  EXPECT_EQ(SkippedInBag(log, "TFMessage on /tf_static that has no bytes"), 1);
+  EXPECT_EQ(SkippedInBag(log, "no plain CDR"), 1);
 }
 
 TEST(BadBagTest, TopicsOfAnotherTypeAndDefinition) {
@@ -772,9 +772,9 @@ TEST(BadBagTest, AbsurdAnglesAndPosesAreCounted) {
       {"/odom", "nav_msgs/Odometry", kStart, EncodeOdometry(odometry, kRos1)});
   const Log log = ReadBytes(MakeRosbag1(records));
   EXPECT_EQ(log.scans.size(), 10u);
-  EXPECT_EQ(Skipped(log, "absurd angles"), 1);
-  EXPECT_EQ(Skipped(log, "no readings"), 1);
-  EXPECT_EQ(Skipped(log, "has no pose"), 1);
+  EXPECT_EQ(SkippedInBag(log, "absurd angles"), 1);
+  EXPECT_EQ(SkippedInBag(log, "no readings"), 1);
+  EXPECT_EQ(SkippedInBag(log, "has no pose"), 1);
 }
 
 TEST(BadBagTest, FolderWithoutItsFiles) {

@@ -1,14 +1,14 @@
 #include <plumbline/core/error.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/carmen_messages.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/foreign_format.h>
+#include <plumbline/frontend/laser_profile.h>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,216 +16,15 @@
 namespace plumbline {
 namespace {
 
-// The messages that can give scans, best first.
-enum ScanKind { kFlaser, kRobotLaser, kRawLaser, kRlaser, kNumScanKinds };
-constexpr std::array<const char*, kNumScanKinds> kScanNames = {
-    "FLASER", "ROBOTLASER1", "RAWLASER1", "RLASER"};
-
 constexpr double kDefaultMaximumRange = 80.0;
 // A reading is no return from this far below the nominal maximum range on, m:
 // logs round to centimetres and lasers report a little less than they claim.
 constexpr double kMaximumRangeMargin = 0.05;
-// No laser of these logs measures farther, m.
-constexpr double kAbsurdRange = 1000.0;
 // A stated maximum range above it is in another unit, m.
 constexpr double kAbsurdMaximumRange = 200.0;
-// Coordinates (m) and headings (rad) beyond it are garbage, not odometry.
-constexpr double kAbsurdCoordinate = 1e7;
-constexpr int kMaximumBeams = 100000;
 // Of more than these every second, third, ... is used: 360 degrees in steps of
 // 0.036 degrees, 3 mm apart at 5 m.
 constexpr int kMostBeamsUsed = 10000;
-
-constexpr char kBadReading[] =
-    "reading that is no distance: expected a number from 0 to 1000 m "
-    "(taken as no return)";
-
-// Splits a line at blanks.
-class Tokens {
- public:
-  explicit Tokens(std::string_view text) : text_(text) {}
-
-  // The next token; empty at the end.
-  std::string_view Next() {
-    SkipBlanks();
-    std::size_t length = 0;
-    while (length < text_.size() && !IsBlank(text_[length])) ++length;
-    const std::string_view token = text_.substr(0, length);
-    text_.remove_prefix(length);
-    return token;
-  }
-
-  bool AtEnd() {
-    SkipBlanks();
-    return text_.empty();
-  }
-
-  // How many tokens are left.
-  int Count() const {
-    Tokens rest(text_);
-    int count = 0;
-    while (!rest.Next().empty()) ++count;
-    return count;
-  }
-
-  bool NextDouble(double* value) { return Parse(Next(), value); }
-
-  bool NextInt(int* value) {
-    const std::string_view token = Next();
-    const char* const end = token.data() + token.size();
-    const auto result = std::from_chars(token.data(), end, *value);
-    return result.ec == std::errc() && result.ptr == end;
-  }
-
-  // A number that may stand in a log: a leading plus is accepted, hexadecimal
-  // is not, "nan" and "inf" are.
-  static bool Parse(std::string_view token, double* value) {
-    if (token.size() > 1 && token.front() == '+' && token[1] != '-')
-      token.remove_prefix(1);
-    const char* const end = token.data() + token.size();
-    const auto result = std::from_chars(token.data(), end, *value);
-    if (result.ptr != end) return false;
-    if (result.ec == std::errc::result_out_of_range) {
-      // Too small for a double or too large: the sign of the exponent tells.
-      const bool tiny = token.find("e-") != std::string_view::npos ||
-                        token.find("E-") != std::string_view::npos;
-      *value = tiny ? 0.0 : HUGE_VAL;
-      return true;
-    }
-    return result.ec == std::errc();
-  }
-
- private:
-  static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-  void SkipBlanks() {
-    std::size_t count = 0;
-    while (count < text_.size() && IsBlank(text_[count])) ++count;
-    text_.remove_prefix(count);
-  }
-
-  std::string_view text_;
-};
-
-// Keeps every k-th beam, from the first on, with the smallest k that leaves at
-// most `most`; returns k. The work of matching grows with the square of the
-// beams where they are far denser than walls ask for.
-int ThinScan(int most, Scan* scan) {
-  const int beams = static_cast<int>(scan->ranges.size());
-  const int stride = beams <= most ? 1 : (beams + most - 1) / most;
-  if (stride == 1) return 1;
-  int kept = 0;
-  for (int i = 0; i < beams; i += stride) {
-    scan->ranges[kept++] = scan->ranges[i];
-  }
-  scan->ranges.resize(kept);
-  scan->angle_step *= stride;
-  return stride;
-}
-
-// Beams of the old messages, which carry no angles.
-void OldFormatAngles(int beams, double resolution, double* start,
-                     double* step) {
-  const bool standard =
-      beams == 180 || beams == 181 || beams == 360 || beams == 361;
-  const int intervals = beams % 2 == 0 ? beams : beams - 1;
-  *step = intervals > 0 ? kPi / intervals : 0.0;
-  if (!standard && resolution > 0.0 && resolution * intervals <= 2.0 * kPi)
-    *step = resolution;
-  *start = -0.5 * *step * intervals;
-}
-
-// The laser's place is a difference of poses that have six digits after the
-// point at most: rounded to the last of them, and an angle to the round one
-// that it may stand for, it is what was written, so that a drive is the same in
-// all formats.
-double RoundPosition(double value) { return std::round(value * 1e6) / 1e6; }
-double RoundMountAngle(double angle) {
-  const double round = DegToRad(std::round(RadToDeg(angle) * 10.0) / 10.0);
-  return std::abs(round - angle) < 2e-6 ? round : std::round(angle * 1e6) / 1e6;
-}
-
-double Median(std::vector<double> values) {
-  const std::size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
-}
-
-// The value at which the readings below `limit` saturate: the smallest of a
-// sharp pile at the top of the log's readings with (almost) nothing right below
-// it, or 0 when there is none. A wall far away does not make such a pile: a
-// flat wall 8 m away fills less than a tenth of the beams to within 1.5 cm.
-double SaturatedRange(const std::vector<Scan>& scans, double limit) {
-  constexpr double kSmallest = 7.5;
-  constexpr int kMostBins = 20000;     // of 1 cm
-  constexpr int kHalfPile = 15;        // bins
-  constexpr int kBelow = 100;          // bins
-  constexpr int kTop = 2 * kHalfPile;  // bins
-  constexpr std::int64_t kMinimum = 20;
-  const auto bin_of = [](float range) {
-    return static_cast<int>(std::lround(range * 100.0));
-  };
-  std::vector<std::int64_t> histogram;
-  std::int64_t total = 0;
-  for (const Scan& scan : scans) {
-    for (const float range : scan.ranges) {
-      if (!(range > 0.0f && range < limit)) continue;
-      ++total;
-      const int bin = bin_of(range);
-      if (bin >= kMostBins) continue;
-      if (bin >= static_cast<int>(histogram.size())) {
-        histogram.resize(static_cast<std::size_t>(bin) + 1, 0);
-      }
-      ++histogram[bin];
-    }
-  }
-  const int bins = static_cast<int>(histogram.size());
-  const std::int64_t enough = std::max(kMinimum, total / 1000);
-  const auto sum = [&histogram, bins](int first, int last) {
-    std::int64_t result = 0;
-    for (int i = std::max(first, 0); i <= std::min(last, bins - 1); ++i)
-      result += histogram[i];
-    return result;
-  };
-  std::int64_t window = 0;
-  int top = bins - 1;
-  for (; top >= 0; --top) {
-    // Readings in [top, top + kTop).
-    window += histogram[top];
-    if (top + kTop < bins) window -= histogram[top + kTop];
-    if (window >= enough) break;
-  }
-  if (top < 0) return 0.0;
-  const auto first = histogram.begin() + std::max(0, top - kHalfPile);
-  const auto last = histogram.begin() + std::min(bins, top + kTop);
-  const int peak =
-      static_cast<int>(std::max_element(first, last) - histogram.begin());
-  if (peak < kSmallest * 100.0) return 0.0;
-  const std::int64_t pile = sum(peak - kHalfPile, peak + kHalfPile);
-  const std::int64_t core = sum(peak - 1, peak + 1);
-  const std::int64_t below =
-      sum(peak - kHalfPile - kBelow, peak - kHalfPile - 1);
-  if (pile < enough || 10 * pile > 9 * total || 2 * core < pile || below > pile)
-    return 0.0;
-
-  std::vector<char> beam_has_it;
-  for (const Scan& scan : scans) {
-    if (beam_has_it.size() < scan.ranges.size())
-      beam_has_it.resize(scan.ranges.size(), 0);
-    for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
-      const float range = scan.ranges[i];
-      if (range > 0.0f && range < limit && std::abs(bin_of(range) - peak) <= 1)
-        beam_has_it[i] = 1;
-    }
-  }
-  const auto beams = std::count(beam_has_it.begin(), beam_has_it.end(), 1);
-  if (10 * beams < static_cast<std::ptrdiff_t>(beam_has_it.size())) return 0.0;
-
-  int lowest = peak;
-  while (lowest > peak - kHalfPile &&
-         1000 * histogram[lowest - 1] > histogram[peak])
-    --lowest;
-  return (lowest - 0.5) / 100.0;
-}
 
 class CarmenReader {
  public:
@@ -261,15 +60,21 @@ class CarmenReader {
     std::string_view line;
     while (input_->ReadLine(&line)) {
       if (line.find('\0') != std::string_view::npos) {
-        Skip("line with zero bytes: expected text");
+        messages_.skips().Add("line with zero bytes: expected text",
+                              input_->line_number());
         continue;
       }
-      ReadMessage(line);
+      messages_.Read(line, input_->line_number());
     }
     if (!input_->damage().empty()) {
-      Skip(input_->damage() +
-           ": what was unpacked before it is used, the rest is lost");
+      messages_.skips().Add(
+          input_->damage() +
+              ": what was unpacked before it is used, the rest is lost",
+          input_->line_number());
     }
+    log_.parameters = messages_.parameters();
+    log_.messages = messages_.counts();
+    log_.skipped = messages_.skips().reports();
     ChooseScans();
     PlaceRawScans();
     PlaceLaser();
@@ -280,24 +85,7 @@ class CarmenReader {
   }
 
  private:
-  // A RAWLASER1 scan waits for the ODOM after it.
-  struct TimedPose {
-    double timestamp;
-    Pose2 pose;
-  };
-
-  void Skip(const std::string& reason, std::int64_t count = 1) {
-    const auto [entry, is_new] =
-        skip_index_.emplace(reason, log_.skipped.size());
-    if (is_new) {
-      log_.skipped.emplace_back();
-      log_.skipped.back().reason = reason;
-    }
-    SkipReport& report = log_.skipped[entry->second];
-    report.count += count;
-    if (report.first_lines.size() < 5)
-      report.first_lines.push_back(input_->line_number());
-  }
+  using Kind = CarmenMessages::Kind;
 
   void ThinScans() {
     SkipReport report;
@@ -313,283 +101,36 @@ class CarmenReader {
     if (report.count > 0) log_.skipped.push_back(std::move(report));
   }
 
-  void Garbled(const std::string& name, const std::string& expected) {
-    Skip("garbled or truncated " + name + ": expected " + expected);
-  }
-
-  void ReadMessage(std::string_view line) {
-    Tokens tokens(line);
-    const std::string_view name = tokens.Next();
-    if (name.empty() || name.front() == '#') return;
-    if (name == "FLASER") {
-      ReadOldLaser(kFlaser, tokens);
-    } else if (name == "ODOM") {
-      ReadOdom(tokens);
-    } else if (name == "ROBOTLASER1") {
-      ReadNewLaser(kRobotLaser, tokens);
-    } else if (name == "RAWLASER1") {
-      ReadNewLaser(kRawLaser, tokens);
-    } else if (name == "RLASER") {
-      ReadOldLaser(kRlaser, tokens);
-    } else if (name == "PARAM") {
-      ReadParameter(tokens);
-    } else if (name == "SYNC" || name == "TRUEPOS" || name == "COMMENT") {
-      ++log_.messages[std::string(name)];
-    } else {
-      UnknownMessage(name);
-    }
-  }
-
-  void UnknownMessage(std::string_view name) {
-    const bool is_name =
-        name.size() <= 32 && name.front() >= 'A' && name.front() <= 'Z' &&
-        std::all_of(name.begin(), name.end(), [](char c) {
-          return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-                 c == '-';
-        });
-    if (!is_name) {
-      Skip("line that starts with no message name");
-      return;
-    }
-    const std::string reason = "message that is not used: " + std::string(name);
-    constexpr int kMaximumKinds = 20;
-    if (skip_index_.count(reason) == 0 && ++unknown_names_ > kMaximumKinds) {
-      Skip("message that is not used: further names");
-    } else {
-      Skip(reason);
-    }
-  }
-
-  static bool IsPlausible(const Pose2& pose) {
-    return pose.allFinite() && pose.cwiseAbs().maxCoeff() < kAbsurdCoordinate;
-  }
-
-  static bool NextPose(Tokens* tokens, Pose2* pose) {
-    return tokens->NextDouble(&(*pose)[0]) && tokens->NextDouble(&(*pose)[1]) &&
-           tokens->NextDouble(&(*pose)[2]);
-  }
-
-  // ipc_timestamp ipc_host logger_timestamp, then the end.
-  static bool NextTrailer(Tokens* tokens, Scan* scan) {
-    const std::string_view text = tokens->Next();
-    double logger_timestamp = 0.0;
-    if (!Tokens::Parse(text, &scan->timestamp) ||
-        !std::isfinite(scan->timestamp) || tokens->Next().empty() ||
-        !tokens->NextDouble(&logger_timestamp) || !tokens->AtEnd())
-      return false;
-    scan->timestamp_text = std::string(text);
-    return true;
-  }
-
-  bool NextRanges(Tokens* tokens, int count, Scan* scan) {
-    scan->ranges.resize(count);
-    for (float& range : scan->ranges) {
-      double value = 0.0;
-      if (!tokens->NextDouble(&value)) return false;
-      if (value >= 0.0 && value <= kAbsurdRange) {
-        range = static_cast<float>(value);
-      } else {
-        range = 0.0f;
-        ++bad_readings_;
-      }
-    }
-    return true;
-  }
-
-  // Numbers of beams that can be: zero and absurd ones are counted.
-  bool NextBeamCount(const std::string& name, Tokens* tokens, int* count) {
-    if (!tokens->NextInt(count)) {
-      Garbled(name, "the number of readings");
-      return false;
-    }
-    if (*count == 0) {
-      Skip(name + " without readings");
-      return false;
-    }
-    if (*count < 0 || *count > kMaximumBeams) {
-      Garbled(name, "a number of readings from 1 to 100000");
-      return false;
-    }
-    return true;
-  }
-
-  void Keep(ScanKind kind, Scan scan, const Pose2& laser) {
-    if (bad_readings_ > 0) Skip(kBadReading, bad_readings_);
-    scan.line = input_->line_number();
-    ++log_.messages[kScanNames[kind]];
-    scans_[kind].push_back(std::move(scan));
-    lasers_[kind].push_back(laser);
-  }
-
-  void ReadOldLaser(ScanKind kind, Tokens tokens) {
-    const std::string name = kScanNames[kind];
-    bad_readings_ = 0;
-    int count = 0;
-    if (!NextBeamCount(name, &tokens, &count)) return;
-    Scan scan;
-    Pose2 laser;
-    if (!NextRanges(&tokens, count, &scan) || !NextPose(&tokens, &laser) ||
-        !NextPose(&tokens, &scan.odometry) || !NextTrailer(&tokens, &scan)) {
-      Garbled(name,
-              "n, n ranges, x y theta odom_x odom_y odom_theta, and "
-              "ipc_timestamp ipc_host logger_timestamp");
-      return;
-    }
-    if (!IsPlausible(laser) || !IsPlausible(scan.odometry)) {
-      Skip(name + " with a pose that is not finite or absurd");
-      return;
-    }
-    Keep(kind, std::move(scan), laser);
-  }
-
-  void ReadNewLaser(ScanKind kind, Tokens tokens) {
-    const std::string name = kScanNames[kind];
-    bad_readings_ = 0;
-    int laser_type = 0;
-    int remission_mode = 0;
-    double field_of_view = 0.0;
-    double accuracy = 0.0;
-    Scan scan;
-    if (!tokens.NextInt(&laser_type) || !tokens.NextDouble(&scan.start_angle) ||
-        !tokens.NextDouble(&field_of_view) ||
-        !tokens.NextDouble(&scan.angle_step) ||
-        !tokens.NextDouble(&scan.maximum_range) ||
-        !tokens.NextDouble(&accuracy) || !tokens.NextInt(&remission_mode)) {
-      Garbled(name,
-              "laser_type start_angle field_of_view angular_resolution "
-              "maximum_range accuracy remission_mode first");
-      return;
-    }
-    int count = 0;
-    if (!NextBeamCount(name, &tokens, &count)) return;
-    Pose2 laser = Pose2::Zero();
-    const bool read =
-        NextRanges(&tokens, count, &scan) && SkipRemissions(kind, &tokens) &&
-        (kind == kRawLaser || NextLaserPoses(&tokens, &laser, &scan)) &&
-        NextTrailer(&tokens, &scan);
-    if (!read) {
-      Garbled(name, kind == kRawLaser
-                        ? "n ranges, m remissions, and the time stamps"
-                        : "n ranges, m remissions, laser and robot pose, five "
-                          "numbers, and the time stamps");
-      return;
-    }
-    if (!(scan.angle_step > 0.0) && count > 1)
-      scan.angle_step = field_of_view / (count - 1);
-    if (!std::isfinite(scan.start_angle) || !std::isfinite(scan.angle_step) ||
-        std::abs(scan.start_angle) > 2.1 * kPi ||
-        std::abs(scan.angle_step) * (count - 1) > 2.1 * kPi) {
-      Skip(name + " with absurd angles: expected radians within a turn");
-      return;
-    }
-    if (!IsPlausible(laser) || !IsPlausible(scan.odometry)) {
-      Skip(name + " with a pose that is not finite or absurd");
-      return;
-    }
-    if (!(scan.maximum_range > 0.0) || scan.maximum_range > kAbsurdMaximumRange)
-      scan.maximum_range = 0.0;
-    if (kind == kRawLaser) {
-      raw_odometry_index_.push_back(static_cast<int>(odometry_.size()) - 1);
-    }
-    Keep(kind, std::move(scan), laser);
-  }
-
-  // "m r1..rm"; a page of the format's documentation leaves them out, so their
-  // absence is told by the number of fields to the end.
-  static bool SkipRemissions(ScanKind kind, Tokens* tokens) {
-    const int tail = kind == kRawLaser ? 3 : 14;
-    const int left = tokens->Count();
-    if (left == tail) return true;
-    int count = 0;
-    if (!tokens->NextInt(&count) || count < 0 || count != left - tail - 1)
-      return false;
-    for (int i = 0; i < count; ++i) tokens->Next();
-    return true;
-  }
-
-  static bool NextLaserPoses(Tokens* tokens, Pose2* laser, Scan* scan) {
-    if (!NextPose(tokens, laser) || !NextPose(tokens, &scan->odometry))
-      return false;
-    // Velocities, safety distances and turn axis.
-    for (int i = 0; i < 5; ++i) {
-      double unused = 0.0;
-      if (!tokens->NextDouble(&unused)) return false;
-    }
-    return true;
-  }
-
-  void ReadOdom(Tokens tokens) {
-    TimedPose odometry;
-    if (!NextPose(&tokens, &odometry.pose) || !IsPlausible(odometry.pose)) {
-      Garbled("ODOM", "x y theta tv rv accel and the time stamps");
-      return;
-    }
-    double number = 0.0;
-    Scan trailer;
-    for (int i = 0; i < 3; ++i) {
-      if (!tokens.NextDouble(&number)) {
-        Garbled("ODOM", "x y theta tv rv accel and the time stamps");
-        return;
-      }
-    }
-    if (!NextTrailer(&tokens, &trailer)) {
-      Garbled("ODOM", "x y theta tv rv accel and the time stamps");
-      return;
-    }
-    odometry.timestamp = trailer.timestamp;
-    odometry_.push_back(odometry);
-    ++log_.messages["ODOM"];
-  }
-
-  void ReadParameter(Tokens tokens) {
-    const std::string_view name = tokens.Next();
-    const int left = tokens.Count();
-    if (name.empty() || left == 0) {
-      Garbled("PARAM", "a name and a value");
-      return;
-    }
-    // A value of several words reaches to the time stamps.
-    std::string value(tokens.Next());
-    for (int i = 4; i < left; ++i) {
-      value += ' ';
-      value += tokens.Next();
-    }
-    log_.parameters[std::string(name)] = value;
-    ++log_.messages["PARAM"];
-  }
-
-  // The number of a PARAM, or `otherwise`.
-  double Parameter(const std::string& name, double otherwise) const {
-    const auto entry = log_.parameters.find(name);
-    double value = 0.0;
-    return entry != log_.parameters.end() &&
-                   Tokens::Parse(entry->second, &value) && std::isfinite(value)
-               ? value
-               : otherwise;
-  }
-
   void ChooseScans() {
     int chosen = 0;
-    while (chosen < kNumScanKinds && scans_[chosen].empty()) ++chosen;
-    if (chosen == kNumScanKinds) {
+    while (chosen < CarmenMessages::kNumKinds &&
+           messages_.scans(static_cast<Kind>(chosen)).scans.empty()) {
+      ++chosen;
+    }
+    if (chosen == CarmenMessages::kNumKinds) {
       throw Error(input_->name(), 0, "no laser scan found: " + Found(),
                   "a CARMEN log with FLASER, ROBOTLASER1, RAWLASER1 or RLASER "
                   "messages");
     }
-    kind_ = static_cast<ScanKind>(chosen);
-    log_.scan_message = kScanNames[kind_];
-    for (int other = chosen + 1; other < kNumScanKinds; ++other) {
-      if (scans_[other].empty()) continue;
+    kind_ = static_cast<Kind>(chosen);
+    log_.scan_message = CarmenMessages::kNames[kind_];
+    for (int other = chosen + 1; other < CarmenMessages::kNumKinds; ++other) {
+      const std::vector<Scan>& scans =
+          messages_.scans(static_cast<Kind>(other)).scans;
+      if (scans.empty()) continue;
       SkipReport report;
-      report.reason = std::string(kScanNames[other]) +
+      report.reason = std::string(CarmenMessages::kNames[other]) +
                       " passed over: the scans are taken from " +
-                      kScanNames[kind_];
-      report.count = static_cast<std::int64_t>(scans_[other].size());
-      for (std::size_t i = 0; i < scans_[other].size() && i < 5; ++i)
-        report.first_lines.push_back(scans_[other][i].line);
+                      log_.scan_message;
+      report.count = static_cast<std::int64_t>(scans.size());
+      for (std::size_t i = 0; i < scans.size() && i < 5; ++i) {
+        report.first_lines.push_back(scans[i].line);
+      }
       log_.skipped.push_back(report);
     }
-    log_.scans = std::move(scans_[kind_]);
+    CarmenMessages::Scans taken = messages_.TakeScans(kind_);
+    log_.scans = std::move(taken.scans);
+    lasers_ = std::move(taken.lasers);
   }
 
   // What the input holds in place of scans, for the refusal.
@@ -610,16 +151,19 @@ class CarmenReader {
     return found;
   }
 
+  // Interpolates the poses of ODOM messages.
   void PlaceRawScans() {
-    if (kind_ != kRawLaser || odometry_.empty()) return;
+    const std::vector<CarmenMessages::TimedPose>& odometry =
+        messages_.odometry();
+    if (kind_ != CarmenMessages::kRawLaser || odometry.empty()) return;
     for (std::size_t i = 0; i < log_.scans.size(); ++i) {
       Scan& scan = log_.scans[i];
-      const int before = raw_odometry_index_[i];
-      const TimedPose& last = odometry_[std::max(before, 0)];
+      const int before = messages_.odometry_before()[i];
+      const CarmenMessages::TimedPose& last = odometry[std::max(before, 0)];
       scan.odometry = last.pose;
       const std::size_t after = static_cast<std::size_t>(before + 1);
-      if (before < 0 || after >= odometry_.size()) continue;
-      const TimedPose& next = odometry_[after];
+      if (before < 0 || after >= odometry.size()) continue;
+      const CarmenMessages::TimedPose& next = odometry[after];
       const double span = next.timestamp - last.timestamp;
       const double part = (scan.timestamp - last.timestamp) / span;
       if (!(span > 0.0 && part >= 0.0 && part <= 1.0)) continue;
@@ -631,45 +175,24 @@ class CarmenReader {
   }
 
   void PlaceLaser() {
-    const bool rear = kind_ == kRlaser;
-    const Pose2 parameter(
-        Parameter(rear ? "robot_rearlaser_offset" : "robot_frontlaser_offset",
-                  0.0),
+    const bool rear = kind_ == CarmenMessages::kRlaser;
+    Pose2 offset(
+        messages_.Parameter(
+            rear ? "robot_rearlaser_offset" : "robot_frontlaser_offset", 0.0),
         0.0, rear ? kPi : 0.0);
-    Pose2 offset = parameter;
-    if (kind_ != kRawLaser) {
-      const std::vector<Pose2>& lasers = lasers_[kind_];
-      std::vector<Pose2> offsets(lasers.size());
-      std::array<std::vector<double>, 3> components;
-      for (std::size_t i = 0; i < lasers.size(); ++i) {
-        offsets[i] = Between(log_.scans[i].odometry, lasers[i]);
-        // Near the first, so that the median does not straddle the cut.
-        offsets[i][2] =
-            offsets[0][2] + NormalizeAngle(offsets[i][2] - offsets[0][2]);
-        for (int k = 0; k < 3; ++k) components[k].push_back(offsets[i][k]);
-      }
-      const Pose2 median(Median(components[0]), Median(components[1]),
-                         Median(components[2]));
-      std::vector<int> apart;
-      for (std::size_t i = 0; i < offsets.size(); ++i) {
-        const Pose2 difference = offsets[i] - median;
-        if (difference.head<2>().norm() > 0.3 ||
-            std::abs(NormalizeAngle(difference[2])) > DegToRad(10.0))
-          apart.push_back(static_cast<int>(i));
-      }
-      const bool fixed =
-          10 * apart.size() <= offsets.size() && median.head<2>().norm() < 5.0;
-      if (fixed) {
-        offset = Pose2(RoundPosition(median[0]), RoundPosition(median[1]),
-                       RoundMountAngle(NormalizeAngle(median[2])));
+    if (kind_ != CarmenMessages::kRawLaser) {
+      const LaserMount mount = FindLaserMount(log_.scans, lasers_);
+      if (mount.is_fixed) {
+        offset = mount.pose;
       } else {
         SkipReport report;
         report.reason =
             "laser pose that is not at a fixed place on the robot (a corrected "
             "log?): the robot pose alone is used";
-        report.count = static_cast<std::int64_t>(offsets.size());
-        for (std::size_t i = 0; i < apart.size() && i < 5; ++i)
-          report.first_lines.push_back(log_.scans[apart[i]].line);
+        report.count = static_cast<std::int64_t>(log_.scans.size());
+        for (std::size_t i = 0; i < mount.apart.size() && i < 5; ++i) {
+          report.first_lines.push_back(log_.scans[mount.apart[i]].line);
+        }
         log_.skipped.push_back(report);
       }
     }
@@ -678,20 +201,22 @@ class CarmenReader {
   }
 
   void FindReturns() {
-    const bool rear = kind_ == kRlaser;
-    const bool old_format = kind_ == kFlaser || rear;
-    double nominal =
-        Parameter(rear ? "robot_rear_laser_max" : "robot_front_laser_max", 0.0);
+    const bool rear = kind_ == CarmenMessages::kRlaser;
+    const bool old_format = kind_ == CarmenMessages::kFlaser || rear;
+    double nominal = messages_.Parameter(
+        rear ? "robot_rear_laser_max" : "robot_front_laser_max", 0.0);
     if (!(nominal > 0.0 && nominal <= kAbsurdMaximumRange))
       nominal = kDefaultMaximumRange;
-    const double resolution = DegToRad(Parameter(
+    const double resolution = DegToRad(messages_.Parameter(
         rear ? "laser_rear_laser_resolution" : "laser_front_laser_resolution",
         0.0));
     double largest = 0.0;
     for (Scan& scan : log_.scans) {
       if (old_format) {
-        OldFormatAngles(static_cast<int>(scan.ranges.size()), resolution,
-                        &scan.start_angle, &scan.angle_step);
+        const BeamFan fan =
+            FanOfBeams(static_cast<int>(scan.ranges.size()), resolution);
+        scan.start_angle = fan.start_angle;
+        scan.angle_step = fan.angle_step;
       }
       if (options_.laser_start_angle)
         scan.start_angle = *options_.laser_start_angle;
@@ -733,17 +258,11 @@ class CarmenReader {
 
   InputStream* input_;
   LaserOptions options_;
+  CarmenMessages messages_;
   Log log_;
-  ScanKind kind_ = kFlaser;
-  std::array<std::vector<Scan>, kNumScanKinds> scans_;
-  // Pose of the laser by odometry, one a scan.
-  std::array<std::vector<Pose2>, kNumScanKinds> lasers_;
-  std::vector<TimedPose> odometry_;
-  // Index of the ODOM before each RAWLASER1 scan, or -1.
-  std::vector<int> raw_odometry_index_;
-  std::map<std::string, std::size_t> skip_index_;
-  int unknown_names_ = 0;
-  std::int64_t bad_readings_ = 0;
+  Kind kind_ = CarmenMessages::kFlaser;
+  // Of log_.scans.
+  std::vector<Pose2> lasers_;
 };
 
 enum class TextFormat { kUnknown, kCarmen, kG2o };
@@ -755,7 +274,7 @@ TextFormat RecognizeFormat(std::string_view prefix) {
       "RAWLASER1", "RAWLASER2", "COMMENT",     "NMEA-GGA"};
   while (!prefix.empty()) {
     const std::size_t end = prefix.find('\n');
-    const std::string_view tag = Tokens(prefix.substr(0, end)).Next();
+    const std::string_view tag = CarmenTokens(prefix.substr(0, end)).Next();
     // VERTEX_SE2, and TORO's VERTEX2.
     if (tag.substr(0, 6) == "VERTEX" || tag.substr(0, 4) == "EDGE" ||
         tag.substr(0, 7) == "PARAMS_" || tag.substr(0, 10) == "PLUMBLINE_" ||

@@ -3,10 +3,10 @@
 
 #include <plumbline/frontend/bags/message_decoder.h>
 #include <plumbline/frontend/scan.h>
+#include <plumbline/frontend/skip_counter.h>
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,18 +33,6 @@ struct BagMessage {
   /// Packed fields, valid until the next call of Next(); empty for topics that
   /// are not wanted.
   std::string_view data;
-};
-
-/// Something in a bag that was passed over: counts by reason.
-class SkipCounter {
- public:
-  /// `position` is the number of the message at hand, from 1.
-  void Add(const std::string& reason, int position, std::int64_t count = 1);
-  const std::vector<SkipReport>& reports() const { return reports_; }
-
- private:
-  std::map<std::string, std::size_t> index_;
-  std::vector<SkipReport> reports_;
 };
 
 /// The messages of a bag in the order of the file, one at a time: no more than

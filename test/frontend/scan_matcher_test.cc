@@ -191,7 +191,7 @@ TEST(ScanMatcherTest, SearchFindsAWrongTurn) {
 
 // Wide windows leave out squares of poses together.
 TEST(ScanMatcherTest, AWideSearchFindsWhatALookAtEveryPoseFinds) {
-  const ScanMatcherOptions options = Options();
+  const ScanMatcherOptions options = MatcherOptions();
   ScanMatcher matcher(options);
   matcher.SetReference(Seen(RoomWithPillar(), Pose2(-0.5, 0.2, 0.1)));
   const Pose2 truth(-0.3, 0.3, 0.3);
@@ -603,7 +603,7 @@ TEST(ScanMatcherTest, PeaksFindThePoseFromAnywhere) {
 }
 
 TEST(ScanMatcherTest, NoPoseScoresMoreThanTheFirstPeak) {
-  ScanMatcher matcher(Options());
+  ScanMatcher matcher(MatcherOptions());
   const Pose2 from(-0.5, 0.2, 0.1);
   matcher.SetReference(Seen(RoomWithPillar(), from), {{from.head<2>(), 0}});
   const std::vector<Eigen::Vector2d> points = Positions(PointsOf(

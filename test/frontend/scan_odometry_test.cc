@@ -13,7 +13,7 @@ namespace {
 using testing::CastRay;
 using testing::Noise;
 using testing::PositionError;
-using testing::Wall;
+using testing::WallEnds;
 
 constexpr double kPeriod = 0.2;
 constexpr int kBeams = 360;
@@ -25,7 +25,7 @@ Pose2 PoseAt(double time) {
           1.2 * std::sin(0.8 * time)};
 }
 
-std::vector<Wall> Room() {
+std::vector<WallEnds> Room() {
   return {{{-4.0, -3.0}, {4.0, -3.0}}, {{4.0, -3.0}, {4.0, 2.5}},
           {{4.0, 2.5}, {1.0, 2.5}},    {{1.0, 2.5}, {1.0, 3.5}},
           {{1.0, 3.5}, {-4.0, 3.5}},   {{-4.0, 3.5}, {-4.0, -3.0}}};
@@ -34,7 +34,7 @@ std::vector<Wall> Room() {
 // What a laser sees that takes `sweep` s for its beams, in their order (1) or
 // against it (-1), from the time stamp on.
 Log Drive(double sweep, int direction, bool has_odometry) {
-  const std::vector<Wall> world = Room();
+  const std::vector<WallEnds> world = Room();
   Noise noise(3);
   Log log;
   for (int i = 0; i < 120; ++i) {
@@ -61,7 +61,7 @@ Log Drive(double sweep, int direction, bool has_odometry) {
 // By how much ranges are not what the room gives where the robot was at the
 // time stamp, m: the ninth decile, since corners count for more.
 double RangeError(const Log& log) {
-  const std::vector<Wall> world = Room();
+  const std::vector<WallEnds> world = Room();
   std::vector<double> errors;
   for (std::size_t i = 1; i + 1 < log.scans.size(); ++i) {
     const Scan& scan = log.scans[i];

@@ -22,12 +22,12 @@ struct Drive {
   std::vector<Pose2> poses;
 };
 
-void Go(const std::vector<testing::Wall>& across, double from, double to,
+void Go(const std::vector<testing::WallEnds>& across, double from, double to,
         Drive* drive) {
-  std::vector<testing::Wall> walls = {{{0.0, -1.0}, {30.0, -1.0}},
-                                      {{30.0, -1.0}, {30.0, 1.0}},
-                                      {{30.0, 1.0}, {0.0, 1.0}},
-                                      {{0.0, 1.0}, {0.0, -1.0}}};
+  std::vector<testing::WallEnds> walls = {{{0.0, -1.0}, {30.0, -1.0}},
+                                          {{30.0, -1.0}, {30.0, 1.0}},
+                                          {{30.0, 1.0}, {0.0, 1.0}},
+                                          {{0.0, 1.0}, {0.0, -1.0}}};
   walls.insert(walls.end(), across.begin(), across.end());
   Laser laser;
   laser.sigma = 0.01;
@@ -42,8 +42,8 @@ void Go(const std::vector<testing::Wall>& across, double from, double to,
 }
 
 // Up to what stands there, back, and through where it was.
-Drive Through(const std::vector<testing::Wall>& first,
-              const std::vector<testing::Wall>& then) {
+Drive Through(const std::vector<testing::WallEnds>& first,
+              const std::vector<testing::WallEnds>& then) {
   Drive drive;
   Go(first, 5.0, 12.0, &drive);
   Go(first, 12.0, 5.0, &drive);
@@ -88,8 +88,8 @@ TEST(FindBlockedWaysTest, TurnedAndMoved) {
 }
 
 TEST(FindBlockedWaysTest, ADoorThatWasClosed) {
-  const std::vector<testing::Wall> frame = {{{15.0, -1.0}, {15.0, -0.45}},
-                                            {{15.0, 0.45}, {15.0, 1.0}}};
+  const std::vector<testing::WallEnds> frame = {{{15.0, -1.0}, {15.0, -0.45}},
+                                                {{15.0, 0.45}, {15.0, 1.0}}};
   const Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, frame);
   EXPECT_TRUE(
       FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {})
@@ -97,8 +97,8 @@ TEST(FindBlockedWaysTest, ADoorThatWasClosed) {
 }
 
 TEST(FindBlockedWaysTest, AWallThatIsDrawnAcrossADoorway) {
-  const std::vector<testing::Wall> frame = {{{15.0, -1.0}, {15.0, -0.7}},
-                                            {{15.0, 0.7}, {15.0, 1.0}}};
+  const std::vector<testing::WallEnds> frame = {{{15.0, -1.0}, {15.0, -0.7}},
+                                                {{15.0, 0.7}, {15.0, 1.0}}};
   const Drive drive = Through(frame, frame);
   EXPECT_TRUE(
       FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {})

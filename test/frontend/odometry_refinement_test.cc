@@ -730,7 +730,7 @@ TEST(OdometryRefinerTest, CarriedIntoTheUnknown) {
 // of where odometry has it, but a cupboard does not. It does not go on from
 // there.
 TEST(OdometryRefinerTest, CarriedAlongACorridorOfEqualDoors) {
-  std::vector<Wall> walls;
+  std::vector<WallEnds> walls;
   const auto add = [&walls](double x1, double y1, double x2, double y2) {
     walls.push_back({{x1, y1}, {x2, y2}});
   };
@@ -752,7 +752,7 @@ TEST(OdometryRefinerTest, CarriedAlongACorridorOfEqualDoors) {
   laser.maximum_range = 8.0;
   laser.sigma = 0.01;
   Noise noise(8);
-  OdometryRefiner refiner(Options());
+  OdometryRefiner refiner(RefinerOptions());
   constexpr int kCarried = 20;
   Pose2 odometry(0.0, 0.0, 0.0);
   Pose2 last = odometry;

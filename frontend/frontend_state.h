@@ -64,8 +64,8 @@ void Exchange(Archive& archive, LooseTrack& track) {
 
 template <typename Archive>
 void Exchange(Archive& archive, ScanPoint& point) {
-  auto& [position, normal, range, beam] = point;
-  ExchangeAll(archive, position, normal, range, beam);
+  auto& [position, normal, range, beam, is_between] = point;
+  ExchangeAll(archive, position, normal, range, beam, is_between);
 }
 
 template <typename Archive>

@@ -64,6 +64,12 @@ std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
         const Pose2 pose =
             i == begin ? key : Compose(key, refined[i].since_key.mean);
         if (i == begin) AddReturns(points, pose, &place.reference);
+        // Votes are counted.
+        points.erase(std::remove_if(points.begin(), points.end(),
+                                    [](const ScanPoint& point) {
+                                      return point.is_between;
+                                    }),
+                     points.end());
         AddReturns(points, pose, &place.returns);
         ++place.num_scans;
       }

@@ -761,6 +761,18 @@ class LatticeSearch {
   LatticePose best_;
 };
 
+// Share of the points with a normal that are returns, which alone inform.
+double OwnShare(const std::vector<ScanPoint>& scan) {
+  int points = 0;
+  int returns = 0;
+  for (const ScanPoint& point : scan) {
+    if (point.normal.squaredNorm() == 0.0) continue;
+    ++points;
+    if (!point.is_between) ++returns;
+  }
+  return points > 0 ? static_cast<double>(returns) / points : 1.0;
+}
+
 }  // namespace
 
 ScanMatcher::ScanMatcher(const ScanMatcherOptions& options)
@@ -1011,6 +1023,8 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
   const double inverse_variance =
       1.0 / (options_.point_sigma * options_.point_sigma);
   Eigen::Matrix3d information;
+  // Far apart they share less; points between them add nothing of their own.
+  const double independence = std::min(options_.independence, OwnShare(scan));
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     // The gate shrinks over the first iterations: wide to be pulled in, narrow
     // to be exact.
@@ -1062,8 +1076,8 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
           (weight * inverse_variance) * jacobian * jacobian.transpose();
       gradient.noalias() += (weight * inverse_variance * error) * jacobian;
     }
-    information *= options_.independence;
-    gradient *= options_.independence;
+    information *= independence;
+    gradient *= independence;
     result.inliers = inliers;
     result.inlier_ratio = tried > 0 ? static_cast<double>(inliers) / tried : 0;
     result.cost = tried > 0 ? cost / tried : 4.0;

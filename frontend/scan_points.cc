@@ -1,7 +1,9 @@
 #include <plumbline/frontend/scan_points.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -18,6 +20,59 @@ bool SameSurface(const ScanPoint& a, const ScanPoint& b, double angle_step,
                         std::abs(angle_step) * beams;
   const double limit = std::max(options.gap, options.gap_factor * spread);
   return (b.position - a.position).squaredNorm() <= limit * limit;
+}
+
+// Points on the line between two returns of neighbouring beams, in `parts`
+// equal parts of the angle between these. `laser`: where both were seen from.
+void AddBetween(const ScanPoint& first, const ScanPoint& second,
+                const Eigen::Vector2d& laser, int parts,
+                std::vector<ScanPoint>* points) {
+  const Eigen::Vector2d from = first.position - laser;
+  const Eigen::Vector2d line = second.position - first.position;
+  const Eigen::Vector2d to = second.position - laser;
+  const double turn =
+      std::atan2(from.x() * to.y() - from.y() * to.x(), from.dot(to));
+  for (int part = 1; part < parts; ++part) {
+    const Eigen::Vector2d beam =
+        Eigen::Rotation2Dd(turn * part / parts) * from / first.range;
+    const double across = beam.x() * line.y() - beam.y() * line.x();
+    const double range = (from.x() * line.y() - from.y() * line.x()) / across;
+    // Along the beams there is nothing to be said.
+    if (!(range > 0.0 && std::isfinite(range))) continue;
+    ScanPoint point = first;
+    point.position = laser + range * beam;
+    point.range = range;
+    point.is_between = true;
+    points->push_back(point);
+  }
+}
+
+// Puts points between returns of neighbouring beams that lie on one surface.
+// `goes_on`: whether a return lies on the surface of the one before it.
+void FillBetween(const Eigen::Vector2d& laser, int parts,
+                 std::vector<ScanPoint>* points, std::vector<char>* goes_on) {
+  std::vector<ScanPoint> filled;
+  std::vector<char> filled_goes_on;
+  filled.reserve(points->size() * static_cast<std::size_t>(parts));
+  for (std::size_t i = 0; i < points->size(); ++i) {
+    const ScanPoint& point = (*points)[i];
+    if ((*goes_on)[i] != 0 && point.beam == (*points)[i - 1].beam + 1) {
+      AddBetween((*points)[i - 1], point, laser, parts, &filled);
+      filled_goes_on.resize(filled.size(), 1);
+    }
+    filled.push_back(point);
+    filled_goes_on.push_back((*goes_on)[i]);
+  }
+  *points = std::move(filled);
+  *goes_on = std::move(filled_goes_on);
+}
+
+// Parts into which the angle between neighbouring beams is cut.
+int BeamParts(const Scan& scan, const ScanPointsOptions& options) {
+  constexpr int kMostParts = 20;
+  const double parts =
+      std::ceil(std::abs(scan.angle_step) / options.max_beam_step);
+  return static_cast<int>(std::clamp(parts, 1.0, 1.0 * kMostParts));
 }
 
 }  // namespace
@@ -42,23 +97,25 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
     points->push_back(point);
   }
 
-  const int n = static_cast<int>(points->size());
   const Eigen::Vector2d laser = scan.laser_offset.head<2>();
   // Whether a return lies on the surface of the one before it.
-  std::vector<char> goes_on(static_cast<std::size_t>(n), 0);
-  for (int i = 1; i < n; ++i) {
+  std::vector<char> goes_on(points->size(), 0);
+  for (std::size_t i = 1; i < points->size(); ++i) {
     goes_on[i] =
         SameSurface((*points)[i - 1], (*points)[i], scan.angle_step, options);
   }
+  const int parts = BeamParts(scan, options);
+  if (parts > 1) FillBetween(laser, parts, points, &goes_on);
+  const double angle_step = std::abs(scan.angle_step) / parts;
+  const int n = static_cast<int>(points->size());
   int surface_begin = 0;
   for (int i = 0; i < n; ++i) {
     if (!goes_on[i]) surface_begin = i;
     ScanPoint& point = (*points)[i];
     // Far away neighbours are far apart: widen the fit to hold two on each
     // side where the surface allows.
-    const double radius =
-        std::max(options.normal_radius, 2.5 * std::sqrt(2.0) * point.range *
-                                            std::abs(scan.angle_step));
+    const double radius = std::max(
+        options.normal_radius, 2.5 * std::sqrt(2.0) * point.range * angle_step);
     int begin = i;
     while (begin > surface_begin &&
            ((*points)[begin - 1].position - point.position).squaredNorm() <=

@@ -20,6 +20,10 @@ struct ScanPointsOptions {
   /// wall seen at 45 degrees, do not lie on one surface, m.
   double gap = 0.15;
   double gap_factor = 3.0;
+  /// Neighbouring beams that lie farther apart than this, rad, have points put
+  /// between their returns where these lie on one surface: what is matched with
+  /// a laser of few beams would find gaps wider than its gates.
+  double max_beam_step = DegToRad(1.1);
   /// Half the length along the surface over which a normal is fitted, m.
   double normal_radius = 0.25;
   /// Standard deviation of a fitted surface's points, m, above which the
@@ -39,8 +43,11 @@ struct ScanPoint {
   Eigen::Vector2d normal;
   /// Distance from the laser, m.
   double range;
-  /// Index of the beam.
+  /// Index of the beam, or of the one before it where no beam went.
   int beam;
+  /// Put between two returns: it says where the surface is, but nothing that
+  /// they do not say.
+  bool is_between = false;
 };
 
 /// A return with its position and normal taken from the frame of a pose to the
@@ -52,7 +59,8 @@ inline ScanPoint Moved(const ScanPoint& point, const PoseTransform& transform) {
   return moved;
 }
 
-/// The returns of a scan in the order of beams, with the normals of the
+/// The returns of a scan in the order of beams, those of few beams with points
+/// between them (ScanPointsOptions::max_beam_step), with the normals of the
 /// surfaces that they lie on (total least squares over neighbouring returns).
 /// `points` is overwritten; its capacity is kept, so reuse it in loops.
 void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,

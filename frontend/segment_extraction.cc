@@ -210,19 +210,24 @@ class Extractor {
     segment.pose = Pose2(middle.x(), middle.y(),
                          std::atan2(fit.direction.y(), fit.direction.x()));
     segment.length = length;
-    segment.points = count;
+    // Points between returns show where the surface is, and inform of nothing.
+    segment.points = static_cast<int>(std::count_if(
+        points_.begin() + begin, points_.begin() + end,
+        [](const ScanPoint& point) { return !point.is_between; }));
+    const double own = static_cast<double>(segment.points) / count;
+    if (own < 1.0 && segment.points < 3) return;
     const double variance =
         std::max(options_.point_sigma * options_.point_sigma,
                  fit.across * count / std::max(1, count - 2));
-    if (variance / fit.along_sum * length * length >
+    if (variance / (own * fit.along_sum) * length * length >
         options_.max_end_sigma * options_.max_end_sigma) {
       return;
     }
     const double bend = options_.bias_sigma / length;
     segment.covariance(0, 0) =
-        variance / count + options_.bias_sigma * options_.bias_sigma;
+        variance / segment.points + options_.bias_sigma * options_.bias_sigma;
     segment.covariance(1, 1) =
-        variance / fit.along_sum + 4.0 * bend * bend +
+        variance / (own * fit.along_sum) + 4.0 * bend * bend +
         options_.angle_bias_sigma * options_.angle_bias_sigma;
     segments_.push_back(segment);
   }

@@ -34,6 +34,8 @@ ScanPointsOptions PointOptions() {
   options.gap_factor = 3.0;
   options.normal_radius = 0.25;
   options.normal_tolerance = 0.03;
+  // Returns alone.
+  options.max_beam_step = 1.0;
   return options;
 }
 
@@ -234,6 +236,90 @@ TEST(ClutterTest, NeitherWideNorFar) {
   EXPECT_TRUE(Clutter({9, 9, 3, 3, 3, 3, 3, 3, 3, 9, 9}).empty());
   EXPECT_TRUE(Clutter({9, 9, 5, 5, 9, 9}).empty());
   EXPECT_TRUE(Clutter({}).empty());
+}
+
+// A laser of so many degrees a beam, all around.
+Laser Coarse(int degrees) {
+  Laser laser = FullCircle();
+  laser.angle_step = DegToRad(degrees);
+  laser.beams = 360 / degrees;
+  return laser;
+}
+
+TEST(ScanPointsTest, FewBeamsHavePointsBetweenThem) {
+  const Pose2 robot(0.3, -0.2, 0.4);
+  for (const int degrees : {2, 3, 4}) {
+    Laser laser = Coarse(degrees);
+    laser.offset = Pose2(0.2, 0.1, 0.3);
+    const Scan scan = MakeScan(Room(6.0, 4.0), robot, laser);
+    const std::vector<ScanPoint> points = PointsOf(scan, {});
+    std::vector<ScanPoint> returns;
+    int between = 0;
+    for (const ScanPoint& point : points) {
+      if (!point.is_between) {
+        returns.push_back(point);
+        continue;
+      }
+      ++between;
+      const Eigen::Vector2d p = TransformPoint(robot, point.position);
+      // On a wall, or cutting a corner by less than two beams have between
+      // them.
+      EXPECT_LT(std::min(3.0 - std::abs(p.x()), 2.0 - std::abs(p.y())),
+                0.5 * DegToRad(degrees) * point.range);
+      EXPECT_NEAR((point.position - Eigen::Vector2d(0.2, 0.1)).norm(),
+                  point.range, 1e-9);
+    }
+    // The returns are what they are without, but for normals.
+    const std::vector<ScanPoint> alone = PointsOf(scan, PointOptions());
+    ASSERT_EQ(returns.size(), alone.size());
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      EXPECT_EQ(returns[i].position, alone[i].position);
+      EXPECT_EQ(returns[i].beam, alone[i].beam);
+      if (i > 0) {
+        EXPECT_EQ(returns[i].beam, returns[i - 1].beam + 1);
+      }
+    }
+    // As many between each two as a laser of a degree would have.
+    EXPECT_EQ(between, (laser.beams - 1) * (degrees - 1)) << degrees;
+  }
+}
+
+TEST(ScanPointsTest, FineBeamsHaveNone) {
+  Laser laser = FullCircle();
+  laser.angle_step = DegToRad(1.0);
+  laser.beams = 360;
+  for (const ScanPoint& point :
+       PointsOf(MakeScan(Room(6.0, 4.0), Pose2(0.0, 0.0, 0.0), laser), {})) {
+    EXPECT_FALSE(point.is_between);
+  }
+}
+
+TEST(ScanPointsTest, NothingBetweenSurfacesOrWhereABeamHasNoReturn) {
+  // Two surfaces of three beams each, the second with a hole.
+  Scan scan = Beams({2.0f, 2.0f, 2.0f, 5.0f, 5.0f, 0.0f, 5.0f});
+  scan.angle_step = DegToRad(2.0);
+  const std::vector<ScanPoint> points = PointsOf(scan, {});
+  std::vector<int> before;
+  for (const ScanPoint& point : points) {
+    if (point.is_between) before.push_back(point.beam);
+  }
+  EXPECT_EQ(before, std::vector<int>({0, 1, 3}));
+}
+
+TEST(ScanPointsTest, WhatIsBetweenInBeamsThatGoClockwise) {
+  Laser laser = Coarse(2);
+  laser.start_angle = kPi;
+  laser.angle_step = -laser.angle_step;
+  const std::vector<ScanPoint> points =
+      PointsOf(MakeScan(Room(6.0, 4.0), Pose2(0.5, 0.5, 0.1), laser), {});
+  EXPECT_EQ(points.size(), 359u);
+  for (std::size_t i = 1; i + 1 < points.size(); ++i) {
+    if (!points[i].is_between) continue;
+    // Between its neighbours.
+    EXPECT_LT((points[i - 1].position - points[i].position)
+                  .dot(points[i + 1].position - points[i].position),
+              0.0);
+  }
 }
 
 }  // namespace

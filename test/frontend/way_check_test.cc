@@ -16,14 +16,14 @@ using testing::Noise;
 
 // A corridor of 2 m x 30 m along x that a robot goes along and comes back, and
 // what it finds at x = 15 the first time and from then on.
-struct Drive {
+struct WayDrive {
   std::vector<Scan> scans;
   std::vector<int> keys;
   std::vector<Pose2> poses;
 };
 
 void Go(const std::vector<testing::WallEnds>& across, double from, double to,
-        Drive* drive) {
+        WayDrive* drive) {
   std::vector<testing::WallEnds> walls = {{{0.0, -1.0}, {30.0, -1.0}},
                                           {{30.0, -1.0}, {30.0, 1.0}},
                                           {{30.0, 1.0}, {0.0, 1.0}},
@@ -42,9 +42,9 @@ void Go(const std::vector<testing::WallEnds>& across, double from, double to,
 }
 
 // Up to what stands there, back, and through where it was.
-Drive Through(const std::vector<testing::WallEnds>& first,
-              const std::vector<testing::WallEnds>& then) {
-  Drive drive;
+WayDrive Through(const std::vector<testing::WallEnds>& first,
+                 const std::vector<testing::WallEnds>& then) {
+  WayDrive drive;
   Go(first, 5.0, 12.0, &drive);
   Go(first, 12.0, 5.0, &drive);
   Go(then, 5.0, 25.0, &drive);
@@ -57,7 +57,7 @@ std::vector<Wall> WallAcross() {
 }
 
 TEST(FindBlockedWaysTest, ThroughAnEndOfACorridor) {
-  const Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  const WayDrive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
   const std::vector<BlockedWay> found =
       FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {});
   ASSERT_EQ(found.size(), 1U);
@@ -77,7 +77,7 @@ TEST(FindBlockedWaysTest, ThroughAnEndOfACorridor) {
 }
 
 TEST(FindBlockedWaysTest, TurnedAndMoved) {
-  Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  WayDrive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
   const Pose2 world(-300.0, 1e4, 2.5);
   for (Pose2& pose : drive.poses) pose = Compose(world, pose);
   const std::vector<Wall> walls = {
@@ -90,7 +90,7 @@ TEST(FindBlockedWaysTest, TurnedAndMoved) {
 TEST(FindBlockedWaysTest, ADoorThatWasClosed) {
   const std::vector<testing::WallEnds> frame = {{{15.0, -1.0}, {15.0, -0.45}},
                                                 {{15.0, 0.45}, {15.0, 1.0}}};
-  const Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, frame);
+  const WayDrive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, frame);
   EXPECT_TRUE(
       FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {})
           .empty());
@@ -99,21 +99,21 @@ TEST(FindBlockedWaysTest, ADoorThatWasClosed) {
 TEST(FindBlockedWaysTest, AWallThatIsDrawnAcrossADoorway) {
   const std::vector<testing::WallEnds> frame = {{{15.0, -1.0}, {15.0, -0.7}},
                                                 {{15.0, 0.7}, {15.0, 1.0}}};
-  const Drive drive = Through(frame, frame);
+  const WayDrive drive = Through(frame, frame);
   EXPECT_TRUE(
       FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {})
           .empty());
 }
 
 TEST(FindBlockedWaysTest, WallsBesideTheWayAndJumps) {
-  Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  WayDrive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
   const std::vector<Wall> sides = {MakeWall({15.0, -1.0}, 0.0, -15.0, 15.0),
                                    MakeWall({15.0, 1.0}, kPi, -15.0, 15.0),
                                    MakeWall({15.0, 0.0}, 0.5 * kPi, 0.0, 0.0)};
   EXPECT_TRUE(
       FindBlockedWays(drive.scans, drive.keys, drive.poses, sides, {}).empty());
   // Nobody went from one side to the other where 2 m are missing.
-  Drive jump = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  WayDrive jump = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
   for (std::size_t k = jump.poses.size(); k-- > 0;) {
     if (std::abs(jump.poses[k].x() - 15.0) < 1.0) {
       jump.poses.erase(jump.poses.begin() + static_cast<std::ptrdiff_t>(k));
@@ -126,7 +126,7 @@ TEST(FindBlockedWaysTest, WallsBesideTheWayAndJumps) {
 }
 
 TEST(FindBlockedWaysTest, EndsWhenItIsToldAndRefusesPosesThatDoNotFit) {
-  const Drive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
+  const WayDrive drive = Through({{{15.0, -1.0}, {15.0, 1.0}}}, {});
   EXPECT_TRUE(FindBlockedWays(drive.scans, drive.keys, drive.poses,
                               WallAcross(), {}, [] { return true; })
                   .empty());

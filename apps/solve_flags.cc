@@ -49,6 +49,10 @@ DEFINE_string(
     plan_layers, "",
     "Layers of --plan, separated by commas; WALL* stands for all that "
     "begin so. Empty: WALL* and A-WALL*");
+DEFINE_string(plan_pose, "",
+              "Where the origin of --plan lies in the map and how the plan is "
+              "turned there, roughly, as x,y,degrees; empty: found by what "
+              "walls and plan have in common");
 DEFINE_double(plan_sigma, 0.03,
               "Tolerance of a wall against its line of --plan, m");
 PLUMBLINE_FLAG_RANGE(plan_sigma, 0.001, 1);
@@ -382,7 +386,7 @@ std::vector<FlagGroup> SolveFlagGroups() {
        {"input", "output_dir", "live_dir", "live_every", "log_reader", "map",
         "localize", "start_pose", "outputs", "align", "grid_resolution"}},
       {"Known beforehand",
-       {"plan", "plan_layers", "plan_sigma", "constraints"}},
+       {"plan", "plan_layers", "plan_pose", "plan_sigma", "constraints"}},
       {"Graphs", GraphFlags()},
       {"Uncertainty", {"marginals", "marginals_hold_gauge", "ellipse_sigmas"}},
       {"Structure",
@@ -416,6 +420,7 @@ std::vector<std::string> LogFlags() {
   return {"align",
           "plan",
           "plan_layers",
+          "plan_pose",
           "plan_sigma",
           "constraints",
           "map",
@@ -466,6 +471,15 @@ void TakeKnownStructureFlags(LogSolverOptions* options) {
     }
     known.plan = ReadPlanDxf(ReadTextInput(FLAGS_plan, kLargestPlan),
                              FLAGS_plan, layers, &known.notes);
+    if (!FLAGS_plan_pose.empty()) {
+      const std::vector<double> pose = ParseList("plan_pose", FLAGS_plan_pose);
+      if (pose.size() != 3) {
+        throw Error("--plan_pose", 0, "'" + FLAGS_plan_pose + "'",
+                    "x,y,degrees: 3.5,-1,90");
+      }
+      known.plan_pose =
+          Pose2(pose[0], pose[1], NormalizeAngle(DegToRad(pose[2])));
+    }
   }
   if (!FLAGS_constraints.empty()) {
     known.statements = ReadWallStatements(

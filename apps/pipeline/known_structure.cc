@@ -242,11 +242,39 @@ bool KnownStructureBinder::AddPlan(const std::function<bool()>& stop) {
   return true;
 }
 
+// How a wall lies beside a line of the plan. m and rad.
+struct KnownStructureBinder::SideBySide {
+  // Of what both have; negative for the gap between them.
+  double length = 0.0;
+  // The middle of that, along the wall from its position.
+  double along_wall = 0.0;
+  // How far off the wall lies there, to either side, and how far it is turned.
+  double offset = 0.0;
+  double turn = 0.0;
+};
+
+KnownStructureBinder::SideBySide KnownStructureBinder::Compare(
+    const Wall& line, const Wall& wall, const Pose2& in_plan) {
+  const Pose2 in_line = Between(line.pose(), in_plan);
+  // Walls have a direction: it may run against the line.
+  const double sense = std::cos(in_line[2]) < 0.0 ? -1.0 : 1.0;
+  double begin = in_line[0] + sense * wall.begin;
+  double end = in_line[0] + sense * wall.end;
+  if (begin > end) std::swap(begin, end);
+  begin = std::max(begin, line.begin);
+  end = std::min(end, line.end);
+  SideBySide both;
+  both.length = end - begin;
+  both.along_wall = sense * (0.5 * (begin + end) - in_line[0]);
+  both.offset = std::abs(in_line[1] + both.along_wall * std::sin(in_line[2]));
+  both.turn = std::abs(NormalizeAxial(in_line[2]));
+  return both;
+}
+
 // A line of the plan beside a wall.
 struct KnownStructureBinder::LineBeside {
   std::size_t line;
-  // Middle of what both have, along the wall, m.
-  double at;
+  SideBySide both;
 };
 
 std::optional<KnownStructureBinder::LineBeside>
@@ -255,23 +283,18 @@ KnownStructureBinder::NearestLine(const MapWall& wall,
   std::optional<LineBeside> nearest;
   double least = known_.max_offset;
   for (std::size_t i = 0; i < known_.plan.size(); ++i) {
-    if (ties_.count({wall.id, i}) > 0) continue;
     const Wall line = MakePlanWall(known_.plan[i]);
-    const Pose2 in_line = Between(line.pose(), in_plan);
-    if (std::abs(NormalizeAxial(in_line[2])) > known_.max_angle) continue;
-    // The part that both have.
-    const double sense = std::cos(in_line[2]) < 0.0 ? -1.0 : 1.0;
-    double begin = in_line[0] + sense * wall.begin;
-    double end = in_line[0] + sense * wall.end;
-    if (begin > end) std::swap(begin, end);
-    begin = std::max(begin, line.begin);
-    end = std::min(end, line.end);
-    if (end - begin < 0.5 * std::min(wall.length(), line.length())) continue;
-    const double along = sense * (0.5 * (begin + end) - in_line[0]);
-    const double offset = std::abs(in_line[1] + along * std::sin(in_line[2]));
-    if (offset >= least) continue;
-    least = offset;
-    nearest = LineBeside{i, along};
+    const SideBySide both = Compare(line, wall, in_plan);
+    if (both.turn > known_.max_angle || both.offset >= least ||
+        both.length < 0.5 * std::min(wall.length(), line.length())) {
+      continue;
+    }
+    // Let go while a wrong tie pulled at the plan, it may agree by now.
+    const bool agrees = both.offset < known_.plan_sigma_offset &&
+                        both.turn < known_.plan_sigma_angle;
+    if (!agrees && ties_.count({wall.id, i}) > 0) continue;
+    least = both.offset;
+    nearest = LineBeside{i, both};
   }
   return nearest;
 }
@@ -285,13 +308,18 @@ Constraint KnownStructureBinder::MakeTie(const MapWall& wall,
   }
   // The plan's origin as the line sees it.
   const Pose2 origin = Inverse(line);
-  // The offset is tested where wall and line lie side by side, which is `at`
-  // along the wall and so far from the origin along it.
-  const double lever = beside.at - Between(in_plan, Pose2(Pose2::Zero()))[0];
+  // The offset is tested where wall and line lie side by side, and so far from
+  // the origin along the wall.
+  const double lever =
+      beside.both.along_wall - Between(in_plan, Pose2(Pose2::Zero()))[0];
   Eigen::Matrix2d rows;
   rows << 1.0, lever, 0.0, 1.0;
+  // Ends of a line that are off by the tolerance turn it, a short one more.
+  const double sigma_angle = std::hypot(
+      known_.plan_sigma_angle,
+      std::sqrt(2.0) * known_.plan_sigma_offset / beside.both.length);
   const Eigen::Vector2d weights(std::pow(known_.plan_sigma_offset, -2),
-                                std::pow(known_.plan_sigma_angle, -2));
+                                std::pow(sigma_angle, -2));
   Constraint tie = MakeStructure(
       registry_.GetRelation("pose_segment_collinearity"), {plan_pose_, wall.id},
       Eigen::Vector2d(origin[1], origin[2]),
@@ -330,9 +358,88 @@ int KnownStructureBinder::TieToPlan(const std::function<bool()>& stop) {
   const std::vector<ConstraintId> added =
       graph_->Apply(std::move(transaction)).constraints;
   for (std::size_t i = 0; i < added.size(); ++i) {
-    ties_.emplace(pairs[i], added[i]);
+    ties_[pairs[i]] = added[i];
   }
   return static_cast<int>(added.size());
+}
+
+// A line of the plan that no wall is tied to, and what was let go from it.
+struct KnownStructureBinder::LetGo {
+  // Its length that walls lie beside, m.
+  double beside = 0.0;
+  // The longest of these parts.
+  SideBySide longest;
+};
+
+std::map<std::size_t, KnownStructureBinder::LetGo>
+KnownStructureBinder::LinesLetGo(const std::set<std::size_t>& kept,
+                                 const std::set<FeatureId>& tied) const {
+  std::map<std::size_t, LetGo> let_go;
+  if (plan_pose_ == kNoId) return let_go;
+  const Feature& plan = std::as_const(*graph_).GetFeature(plan_pose_);
+  const Pose2 plan_pose(plan.parameters[0], plan.parameters[1],
+                        plan.parameters[2]);
+  for (const MapWall& wall : Walls()) {
+    if (tied.count(wall.id) > 0) continue;
+    const Pose2 in_plan = Between(plan_pose, wall.pose());
+    for (std::size_t i = 0; i < known_.plan.size(); ++i) {
+      if (kept.count(i) > 0 || ties_.count({wall.id, i}) == 0) continue;
+      SideBySide both = Compare(MakePlanWall(known_.plan[i]), wall, in_plan);
+      both.length = std::max(0.0, both.length);
+      LetGo& line = let_go[i];
+      line.beside += both.length;
+      if (both.length >= line.longest.length) line.longest = both;
+    }
+  }
+  return let_go;
+}
+
+void KnownStructureBinder::NoteLinesLetGo(
+    const std::map<std::size_t, LetGo>& let_go,
+    std::vector<std::string>* notes) const {
+  const auto length = [this](std::size_t i) {
+    return (known_.plan[i].end - known_.plan[i].begin).norm();
+  };
+  // Those that walls cover enough of, and those that something else may hide.
+  std::vector<std::size_t> wrong;
+  std::vector<std::size_t> hidden;
+  for (const auto& [i, line] : let_go) {
+    const bool is_covered =
+        line.beside >= std::min(known_.min_contradicting_length,
+                                known_.min_contradicting_share * length(i));
+    (is_covered ? wrong : hidden).push_back(i);
+  }
+  for (std::vector<std::size_t>* lines : {&wrong, &hidden}) {
+    std::sort(lines->begin(), lines->end(), [&](std::size_t a, std::size_t b) {
+      return length(a) != length(b) ? length(a) > length(b) : a < b;
+    });
+    const bool is_wrong = lines == &wrong;
+    for (std::size_t k = 0; k < lines->size(); ++k) {
+      if (k == kShownLines) {
+        notes->push_back((is_wrong ? "measurements contradict "
+                                   : "only walls off them were seen beside ") +
+                         std::to_string(lines->size() - k) +
+                         " more lines of the plan");
+        break;
+      }
+      const PlanLine& line = known_.plan[(*lines)[k]];
+      const LetGo& off = let_go.at((*lines)[k]);
+      std::string name = "the plan's line from " + Fixed(line.begin.x(), 2) +
+                         "," + Fixed(line.begin.y(), 2) + " to " +
+                         Fixed(line.end.x(), 2) + "," + Fixed(line.end.y(), 2);
+      if (!line.layer.empty()) name += " (" + line.layer + ")";
+      const std::string offset = Fixed(off.longest.offset, 2);
+      notes->push_back(
+          is_wrong
+              ? "measurements contradict " + name + ": the wall there lies " +
+                    offset + " m beside it, turned by " +
+                    Fixed(RadToDeg(off.longest.turn), 1) + " degrees"
+              : "beside " + name + " only " + Fixed(off.beside, 1) +
+                    " m of wall were seen, " + offset +
+                    " m off it: furniture, another face, or the line is "
+                    "wrong");
+    }
+  }
 }
 
 std::vector<std::string> KnownStructureBinder::Notes() const {
@@ -354,35 +461,7 @@ std::vector<std::string> KnownStructureBinder::Notes() const {
                     Fixed(plan.parameters[1], 3) + ", turned by " +
                     Fixed(RadToDeg(plan.parameters[2]), 3) + " degrees");
   }
-  // Lines that no wall has, but one that has no other line lies near.
-  std::vector<std::size_t> wrong;
-  for (const auto& [pair, id] : ties_) {
-    if (kept.count(pair.second) == 0 && tied.count(pair.first) == 0 &&
-        std::count(wrong.begin(), wrong.end(), pair.second) == 0) {
-      wrong.push_back(pair.second);
-    }
-  }
-  const auto length = [this](std::size_t i) {
-    return (known_.plan[i].end - known_.plan[i].begin).norm();
-  };
-  std::sort(wrong.begin(), wrong.end(), [&](std::size_t a, std::size_t b) {
-    return length(a) != length(b) ? length(a) > length(b) : a < b;
-  });
-  for (std::size_t k = 0; k < wrong.size(); ++k) {
-    if (k == kShownLines) {
-      notes.push_back("measurements contradict " +
-                      std::to_string(wrong.size() - k) +
-                      " more lines of the plan");
-      break;
-    }
-    const PlanLine& line = known_.plan[wrong[k]];
-    std::string note = "measurements contradict the plan's line from " +
-                       Fixed(line.begin.x(), 2) + "," +
-                       Fixed(line.begin.y(), 2) + " to " +
-                       Fixed(line.end.x(), 2) + "," + Fixed(line.end.y(), 2);
-    if (!line.layer.empty()) note += " (" + line.layer + ")";
-    notes.push_back(note);
-  }
+  NoteLinesLetGo(LinesLetGo(kept, tied), &notes);
   for (std::size_t i = 0; i < statements_.size(); ++i) {
     if (statements_[i] == kNoId) continue;
     const Constraint* constraint =

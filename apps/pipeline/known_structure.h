@@ -5,12 +5,14 @@
 #include <plumbline/core/feature.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/factors/pose2.h>
 
 #include <Eigen/Core>
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -59,7 +61,8 @@ struct KnownStructure {
   std::vector<WallStatement> statements;
   /// What was taken for granted in reading them, for people.
   std::vector<std::string> notes;
-  /// Tolerances of a wall against its line of the plan, m and rad.
+  /// Tolerances of a wall against its line of the plan, m and rad; of the
+  /// direction of short lines, whose ends are no better, more.
   double plan_sigma_offset = 0.03;
   double plan_sigma_angle = DegToRad(0.3);
   /// p-value below which a wall is let go from its line, or a statement is
@@ -75,6 +78,17 @@ struct KnownStructure {
   double min_agreeing_length = 8.0;
   double min_agreeing_share = 0.4;
   double rival_share = 0.85;
+  /// Where the plan's frame lies in the map's, roughly: its middle is not
+  /// looked for farther away than `max_pose_offset`, m, nor turned by more than
+  /// `max_pose_turn`, rad. Of places that look alike this one is meant.
+  std::optional<Pose2> plan_pose;
+  double max_pose_offset = 3.0;
+  double max_pose_turn = DegToRad(45.0);
+  /// A line of the plan is called wrong when walls that were let go lie beside
+  /// such a share of it, or such a length, m; less may be furniture in front of
+  /// it.
+  double min_contradicting_share = 0.5;
+  double min_contradicting_length = 3.0;
 };
 
 /// Reads statements: a line each, # begins a comment. Points are x,y in the map
@@ -96,9 +110,7 @@ std::vector<WallStatement> ReadWallStatements(const std::string& text,
 /// The plan is a rigid body with a pose of its own: each wall of the map that
 /// lies near a line of it is bound to that pose (pose_segment_collinearity), so
 /// that the plan bends the map and is not bent by it. Where the plan lies is
-/// found without a guess: walls of a part of the map after the other are looked
-/// for in it over the full circle, and the place that most walls agree with
-/// counts.
+/// found by PlacePlan.
 class KnownStructureBinder {
  public:
   /// `first_pose`: the feature that fixes the map frame. All must outlive this.
@@ -109,7 +121,8 @@ class KnownStructureBinder {
   void AddStatements();
 
   /// Binds walls that lie near lines of the plan, which it places first, to
-  /// them, but for pairs that were bound before. Returns how many.
+  /// them. Pairs that were let go are bound again only when they agree by then.
+  /// Returns how many.
   int TieToPlan(const std::function<bool()>& stop = nullptr);
 
   /// What became of it, for people: sentences without a full stop.
@@ -117,18 +130,31 @@ class KnownStructureBinder {
 
  private:
   struct MapWall;
+  struct SideBySide;
   struct LineBeside;
+  struct LetGo;
   std::vector<MapWall> Walls() const;
   const MapWall* WallAt(const std::vector<MapWall>& walls,
                         const Eigen::Vector2d& point) const;
   // Places the plan and adds its pose; false, with a note, where there is no
   // place for it.
   bool AddPlan(const std::function<bool()>& stop);
+  // How a wall, which has this pose in the plan, lies beside a line of it.
+  static SideBySide Compare(const Wall& line, const Wall& wall,
+                            const Pose2& in_plan);
   // The line to tie a wall to, which has this pose in the plan.
   std::optional<LineBeside> NearestLine(const MapWall& wall,
                                         const Pose2& in_plan) const;
   Constraint MakeTie(const MapWall& wall, const Pose2& in_plan,
                      const LineBeside& beside) const;
+  // Lines of the plan that no wall is tied to any more, by what walls that have
+  // no other line show of them. `kept` and `tied`: lines and walls with ties
+  // that hold.
+  std::map<std::size_t, LetGo> LinesLetGo(
+      const std::set<std::size_t>& kept, const std::set<FeatureId>& tied) const;
+  // Adds what is to be said of them.
+  void NoteLinesLetGo(const std::map<std::size_t, LetGo>& let_go,
+                      std::vector<std::string>* notes) const;
 
   const KnownStructure& known_;
   const Registry& registry_;

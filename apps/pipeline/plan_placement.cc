@@ -311,6 +311,9 @@ class PartSearch {
     matcher_.SetReference(std::move(samples));
   }
 
+  // Middle of the plan.
+  const Eigen::Vector2d& center() const { return center_; }
+
   // Poses of a part in the plan.
   std::vector<Pose2> Find(const std::vector<Eigen::Vector2d>& part) const {
     std::vector<Pose2> poses;
@@ -329,20 +332,42 @@ class PartSearch {
   ScanMatcher matcher_;
   std::vector<double> turns_;
   std::function<bool()> stop_;
-  // Of the plan, and how far the search goes from there.
+  // Middle of the plan, and how far the search goes from there.
   Eigen::Vector2d center_;
   double window_;
 };
 
-// Places of the map where one of its parts fits the plan, the one with the
-// highest score first; none once `stop` has returned true.
-std::vector<Place> FindPlaces(const std::vector<Wall>& walls,
+// Drops places that are not near the pose of the plan that is known. They are
+// told apart by where the middle of the plan lies in the map.
+void KeepNearPose(const KnownStructure& known, const Eigen::Vector2d& center,
+                  std::vector<Place>* places) {
+  const Pose2& guess = *known.plan_pose;
+  const Eigen::Vector2d expected = PoseTransform(guess).Point(center);
+  const auto is_far = [&](const Place& place) {
+    const Pose2 pose = Inverse(place.pose);
+    const Eigen::Vector2d moved = PoseTransform(pose).Point(center) - expected;
+    return moved.norm() > known.max_pose_offset ||
+           std::abs(NormalizeAngle(pose[2] - guess[2])) > known.max_pose_turn;
+  };
+  places->erase(std::remove_if(places->begin(), places->end(), is_far),
+                places->end());
+}
+
+// Places of the map where one of its parts fits the plan, near the plan's pose
+// where that is known, the one with the highest score first; none once `stop`
+// has returned true.
+std::vector<Place> FindPlaces(const KnownStructure& known,
+                              const std::vector<Wall>& walls,
                               const std::vector<WallPoint>& points,
                               const std::vector<Eigen::Vector2d>& middles,
                               const std::vector<Wall>& lines,
                               const std::function<bool()>& stop) {
   const PartSearch search(lines, points, stop);
   std::vector<Place> places;
+  const auto keep = [&](const Pose2& pose) {
+    places.push_back(Judged(points, lines, Refined(points, lines, pose)));
+  };
+  if (known.plan_pose) keep(Inverse(*known.plan_pose));
   for (const Eigen::Vector2d& middle : middles) {
     if (stop && stop()) return {};
     const std::vector<Eigen::Vector2d> part = PartAround(middle, walls);
@@ -350,12 +375,10 @@ std::vector<Place> FindPlaces(const std::vector<Wall>& walls,
     for (const Pose2& peak : search.Find(part)) {
       if (stop && stop()) return {};
       if (IsKnown(places, middle, peak)) continue;
-      places.push_back(
-          Judged(points, lines,
-                 Refined(points, lines,
-                         Compose(peak, Pose2(-middle.x(), -middle.y(), 0.0)))));
+      keep(Compose(peak, Pose2(-middle.x(), -middle.y(), 0.0)));
     }
   }
+  if (known.plan_pose) KeepNearPose(known, search.center(), &places);
   std::stable_sort(
       places.begin(), places.end(),
       [](const Place& a, const Place& b) { return a.score > b.score; });
@@ -374,7 +397,8 @@ std::string WhyRefused(const KnownStructure& known,
            Fixed(places.empty() ? 0.0 : places.front().agreeing, 1) + " m of " +
            Fixed(length, 1) +
            " m of walls agree with it at the best place, too little or all of "
-           "one direction";
+           "one direction" +
+           (known.plan_pose ? " (near the pose that was given)" : "");
   }
   const Place& best = places.front();
   for (const Place& rival : places) {
@@ -384,10 +408,14 @@ std::string WhyRefused(const KnownStructure& known,
     const double turn = std::abs(NormalizeAngle(rival.pose[2] - best.pose[2]));
     if (moved.norm() < kSamePlace && turn < kSameTurn) continue;
     if (rival.score < known.rival_share * best.score) continue;
+    const Pose2 pose = Inverse(best.pose);
     return "the plan is not used: it fits in two places, " +
            Fixed(moved.norm(), 2) + " m and " + Fixed(RadToDeg(turn), 1) +
            " degrees apart, with " + Fixed(best.agreeing, 1) + " m and " +
-           Fixed(rival.agreeing, 1) + " m of walls";
+           Fixed(rival.agreeing, 1) +
+           " m of walls (--plan_pose=" + Fixed(pose[0], 2) + "," +
+           Fixed(pose[1], 2) + "," + Fixed(RadToDeg(pose[2]), 1) +
+           " names the first)";
   }
   return {};
 }
@@ -414,7 +442,7 @@ PlanPlacement PlacePlan(const KnownStructure& known,
   for (const Wall& wall : walls) length += wall.length();
   const std::vector<Eigen::Vector2d> middles = PartMiddles(walls);
   const std::vector<Place> places =
-      FindPlaces(walls, PointsOn(walls), middles, lines, stop);
+      FindPlaces(known, walls, PointsOn(walls), middles, lines, stop);
   if (stop && stop()) return {};
   const std::string why = WhyRefused(known, places, length, middles.front());
   if (!why.empty()) return {std::nullopt, why};

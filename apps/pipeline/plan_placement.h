@@ -26,12 +26,13 @@ struct PlanPlacement {
   std::string note;
 };
 
-/// Finds without a guess where a map lies in the plan of `known`, by the walls
-/// of the map that are visible, map frame. Walls around a few long ones are
-/// looked for in the plan at every turn that gives them directions of it; the
-/// place that most walls of the whole map agree with counts, when
-/// KnownStructure's bounds let it and no second place comes near. Asks `stop`
-/// between the steps, and ends when it returns true.
+/// Finds where a map lies in the plan of `known`, by the walls of the map that
+/// are visible, map frame. Walls around a few long ones are looked for in the
+/// plan at every turn that gives them directions of it; the place that most
+/// walls of the whole map agree with counts, when KnownStructure's bounds let
+/// it and no second place comes near. Where `plan_pose` is given it is tried as
+/// well, and only places near it count. Asks `stop` between the steps, and ends
+/// when it returns true.
 PlanPlacement PlacePlan(const KnownStructure& known,
                         const std::vector<Wall>& walls,
                         const std::function<bool()>& stop = nullptr);

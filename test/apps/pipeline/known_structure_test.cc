@@ -13,6 +13,7 @@
 #include <plumbline/pipeline/plan_placement.h>
 
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <sstream>
 #include <string>
@@ -70,7 +71,16 @@ class StatementTest : public ::testing::Test {
  protected:
   StatementTest() { RegisterBuiltins(&registry_); }
 
+  // In place of those that there were.
   void MakeWalls(const std::vector<Pose2>& walls, double sigma) {
+    Transaction clear;
+    for (const Constraint* constraint : std::as_const(graph_).Constraints()) {
+      clear.RemoveConstraint(constraint->id);
+    }
+    for (const Feature* feature : std::as_const(graph_).Features()) {
+      clear.RemoveFeature(feature->id);
+    }
+    graph_.Apply(std::move(clear));
     Transaction transaction;
     Feature pose;
     pose.type = &registry_.GetFeature("pose");
@@ -177,6 +187,90 @@ TEST_F(StatementTest, WhatIsFarAwayInThePlanDoesNotCount) {
   EXPECT_EQ(binder.TieToPlan(), static_cast<int>(walls_.size()));
   EXPECT_THAT(binder.Notes(),
               Contains(HasSubstr("agrees with 20.0 m of 20.0 m")));
+}
+
+// A plan that is the same turned by 180 degrees lies where it is said to.
+TEST_F(StatementTest, APlanThatFitsInTwoPlacesNeedsItsPose) {
+  const std::vector<Pose2> half = {
+      Pose2(0.0, -4.0, 0.0), Pose2(6.0, -2.0, 0.5 * kPi), Pose2(2.0, 1.0, 0.3)};
+  std::vector<Pose2> walls = half;
+  for (const Pose2& wall : half) {
+    walls.push_back(Compose(Pose2(0.0, 0.0, kPi), wall));
+  }
+  MakeWalls(walls, 0.02);
+  KnownStructure known;
+  const Pose2 origin(10.0, -5.0, 0.65);  // of the plan, map frame
+  const PoseTransform to_plan(Inverse(origin));
+  for (const Pose2& pose : walls) {
+    const PoseTransform wall(pose);
+    PlanLine line;
+    line.begin = to_plan.Point(wall.Point(Eigen::Vector2d(-2.0, 0.0)));
+    line.end = to_plan.Point(wall.Point(Eigen::Vector2d(2.0, 0.0)));
+    known.plan.push_back(line);
+  }
+  {
+    KnownStructureBinder binder(known, registry_, pose_, &graph_);
+    EXPECT_EQ(binder.TieToPlan(), 0);
+    EXPECT_THAT(binder.Notes(), Contains(HasSubstr("--plan_pose=")));
+  }
+  // Roughly, either way round.
+  for (const Pose2& at : {origin, Compose(Pose2(0.0, 0.0, kPi), origin)}) {
+    MakeWalls(walls, 0.02);
+    known.plan_pose = at + Pose2(0.6, -0.5, DegToRad(4.0));
+    KnownStructureBinder binder(known, registry_, pose_, &graph_);
+    EXPECT_EQ(binder.TieToPlan(), static_cast<int>(walls.size()));
+    char expected[80];
+    std::snprintf(expected, sizeof expected, "origin is at %.3f,%.3f", at[0],
+                  at[1]);
+    EXPECT_THAT(binder.Notes(), Contains(HasSubstr(expected)));
+  }
+  // Where it does not lie it is not taken.
+  MakeWalls(walls, 0.02);
+  known.plan_pose = Compose(Pose2(0.0, 0.0, 0.5 * kPi), origin);
+  KnownStructureBinder binder(known, registry_, pose_, &graph_);
+  EXPECT_EQ(binder.TieToPlan(), 0);
+  EXPECT_THAT(binder.Notes(),
+              Contains(HasSubstr("near the pose that was given")));
+}
+
+// A cupboard in front of a long wall does not contradict the plan, a wall that
+// stands elsewhere does; and the run says where.
+TEST_F(StatementTest, WhatStandsBesideALineIsTold) {
+  for (const bool is_long : {false, true}) {
+    MakeWalls(
+        {Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi), Pose2(1.0, 5.0, 0.3),
+         Pose2(-3.0, 3.0, 0.5 * kPi), Pose2(5.0, -1.5, 0.0)},
+        0.005);
+    KnownStructure known;
+    for (std::size_t i = 0; i < walls_.size(); ++i) {
+      const PoseTransform wall(Wall(i));
+      PlanLine line;
+      line.begin = wall.Point(Eigen::Vector2d(-2.0, 0.0));
+      line.end = wall.Point(Eigen::Vector2d(2.0, 0.0));
+      known.plan.push_back(line);
+    }
+    // The last one lies 0.3 m beside its line.
+    known.plan.back().begin += Eigen::Vector2d(0.0, 0.3);
+    known.plan.back().end += Eigen::Vector2d(is_long ? 20.0 : 0.0, 0.3);
+    known.min_contradicting_length = 5.0;
+    KnownStructureBinder binder(known, registry_, pose_, &graph_);
+    EXPECT_EQ(binder.TieToPlan(), static_cast<int>(walls_.size()));
+    SolverSession session(&graph_, registry_, {});
+    EmOrchestrator em(&graph_, &session, registry_, Hierarchy(), {});
+    for (int round = 0; round < 6; ++round) {
+      em.Run();
+      if (binder.TieToPlan() == 0) break;
+    }
+    const std::vector<std::string> notes = binder.Notes();
+    EXPECT_THAT(notes, Contains(HasSubstr("4 walls are tied to 4 lines")));
+    if (is_long) {
+      EXPECT_THAT(
+          notes,
+          Contains(HasSubstr("only 4.0 m of wall were seen, 0.30 m off it")));
+    } else {
+      EXPECT_THAT(notes, Contains(HasSubstr("lies 0.30 m beside it")));
+    }
+  }
 }
 
 // The first half of a drive, which closes no loop.

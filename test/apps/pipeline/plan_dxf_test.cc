@@ -51,6 +51,10 @@ TEST(PlanDxfTest, ReadsLinesInMetres) {
   EXPECT_THAT(notes, IsEmpty());
   lines = ReadLines(Drawing(Line("walls", "0", "0", "10", "0"), "2"));
   EXPECT_NEAR(lines[0].end.x(), 3.048, 1e-9);
+  lines = ReadLines(Drawing(Line("walls", "0", "0", "100", "0"), "1"));
+  EXPECT_NEAR(lines[0].end.x(), 2.54, 1e-9);
+  lines = ReadLines(Drawing(Line("walls", "0", "0", "250", "0"), "5"));
+  EXPECT_NEAR(lines[0].end.x(), 2.5, 1e-9);
   lines =
       ReadLines(Drawing(Line("walls", "0", "0", "10", "0"), "0"), {}, &notes);
   EXPECT_EQ(lines[0].end.x(), 10.0);

@@ -385,7 +385,7 @@ TEST_F(PlanTest, ThePlanOfAnotherBuildingIsNotUsed) {
   EXPECT_EQ(with.trajectory, without.trajectory);
 }
 
-// A room of 10 m by 6 m with a wall that goes 4 m into it, 3 m from its left.
+// A room of 10 m by 6 m with an L of two walls of 4 m in it, on the left.
 std::vector<PlanLine> UnevenRoom() {
   const auto line = [](double x1, double y1, double x2, double y2) {
     PlanLine result;
@@ -394,7 +394,7 @@ std::vector<PlanLine> UnevenRoom() {
     return result;
   };
   return {line(0, 0, 10, 0), line(10, 0, 10, 6), line(10, 6, 0, 6),
-          line(0, 6, 0, 0), line(3, 0, 3, 4)};
+          line(0, 6, 0, 0),  line(3, 0, 3, 4),   line(3, 4, 7, 4)};
 }
 
 // The walls that lines of a plan are in a map whose pose in it this is.
@@ -435,7 +435,7 @@ TEST(PlanPlacementTest, IsFoundFromAnyPose) {
 TEST(PlanPlacementTest, ARoomThatFitsTwiceIsNotPlaced) {
   KnownStructure known;
   known.plan = UnevenRoom();
-  known.plan.pop_back();
+  known.plan.resize(4);
   const PlanPlacement placement =
       PlacePlan(known, WallsOf(known.plan, Pose2(1.0, 2.0, 0.3)));
   EXPECT_FALSE(placement.map_in_plan);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace plumbline {
@@ -210,24 +211,19 @@ class Extractor {
     segment.pose = Pose2(middle.x(), middle.y(),
                          std::atan2(fit.direction.y(), fit.direction.x()));
     segment.length = length;
-    // Points between returns show where the surface is, and inform of nothing.
-    segment.points = static_cast<int>(std::count_if(
-        points_.begin() + begin, points_.begin() + end,
-        [](const ScanPoint& point) { return !point.is_between; }));
-    const double own = static_cast<double>(segment.points) / count;
-    if (own < 1.0 && segment.points < 3) return;
+    segment.points = count;
     const double variance =
         std::max(options_.point_sigma * options_.point_sigma,
                  fit.across * count / std::max(1, count - 2));
-    if (variance / (own * fit.along_sum) * length * length >
+    if (variance / fit.along_sum * length * length >
         options_.max_end_sigma * options_.max_end_sigma) {
       return;
     }
     const double bend = options_.bias_sigma / length;
     segment.covariance(0, 0) =
-        variance / segment.points + options_.bias_sigma * options_.bias_sigma;
+        variance / count + options_.bias_sigma * options_.bias_sigma;
     segment.covariance(1, 1) =
-        variance / (own * fit.along_sum) + 4.0 * bend * bend +
+        variance / fit.along_sum + 4.0 * bend * bend +
         options_.angle_bias_sigma * options_.angle_bias_sigma;
     segments_.push_back(segment);
   }
@@ -247,7 +243,16 @@ class Extractor {
 std::vector<SegmentObservation> ExtractSegments(
     const std::vector<ScanPoint>& points, const Eigen::Vector2d& laser,
     double angle_step, const SegmentExtractionOptions& options) {
-  return Extractor(points, laser, angle_step, options).Run();
+  const auto is_between = [](const ScanPoint& point) {
+    return point.is_between;
+  };
+  if (std::none_of(points.begin(), points.end(), is_between)) {
+    return Extractor(points, laser, angle_step, options).Run();
+  }
+  std::vector<ScanPoint> returns;
+  std::remove_copy_if(points.begin(), points.end(), std::back_inserter(returns),
+                      is_between);
+  return Extractor(returns, laser, angle_step, options).Run();
 }
 
 }  // namespace plumbline

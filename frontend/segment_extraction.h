@@ -11,8 +11,7 @@ namespace plumbline {
 
 /// Options of the extraction of straight pieces of wall.
 struct SegmentExtractionOptions {
-  /// Fewest returns of a segment, with points between them (and at least three
-  /// that are none), and its least length, m.
+  /// Fewest returns of a segment, and its least length, m.
   int min_points = 6;
   double min_length = 0.4;
   /// Farthest that one return may lie off its segment, m: noise of the laser.
@@ -66,8 +65,9 @@ struct SegmentObservation {
 
 /// Cuts a scan into straight pieces: split at the farthest return, fit by total
 /// least squares, merge what fits one line. `points` are in the order of beams
-/// (ExtractScanPoints); points between returns show where the surface is, and
-/// inform of nothing. `laser` is the laser's position in their frame.
+/// (ExtractScanPoints); those between returns are left out: two returns and
+/// what is put between them are always straight. `laser` is the laser's
+/// position in their frame.
 std::vector<SegmentObservation> ExtractSegments(
     const std::vector<ScanPoint>& points, const Eigen::Vector2d& laser,
     double angle_step, const SegmentExtractionOptions& options);

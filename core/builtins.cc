@@ -2,6 +2,7 @@
 #include <plumbline/core/builtins.h>
 #include <plumbline/factors/blocks.h>
 #include <plumbline/factors/chi_square.h>
+#include <plumbline/factors/corridor.h>
 #include <plumbline/factors/dcs_loss.h>
 #include <plumbline/factors/delta_loss.h>
 #include <plumbline/factors/geman_mcclure_loss.h>
@@ -23,9 +24,12 @@
 #include <plumbline/factors/pose_segment_points.h>
 #include <plumbline/factors/position_prior.h>
 #include <plumbline/factors/rectangle_orientation.h>
+#include <plumbline/factors/segment_corridor.h>
 #include <plumbline/factors/segment_orientation.h>
 #include <plumbline/factors/segment_rectangle.h>
 #include <plumbline/factors/segment_segment_collinearity.h>
+#include <plumbline/factors/segment_segment_thickness.h>
+#include <plumbline/factors/thickness.h>
 
 #include <algorithm>
 #include <cmath>
@@ -175,6 +179,8 @@ void RegisterFeatures(Registry* registry) {
   AddFeatureOnce<CircleBlock>(registry);
   AddFeatureOnce<RectangleBlock>(registry);
   AddFeatureOnce<OrientationBlock>(registry);
+  AddFeatureOnce<CorridorBlock>(registry);
+  AddFeatureOnce<ThicknessBlock>(registry);
 }
 
 void RegisterRelations(Registry* registry) {
@@ -201,6 +207,8 @@ void RegisterRelations(Registry* registry) {
   AddRelationOnce<LineRectangle>(registry);
   AddRelationOnce<RectangleOrientation>(registry);
   AddRelationOnce<OrientationOrientation>(registry);
+  AddRelationOnce<SegmentCorridor>(registry);
+  AddRelationOnce<SegmentSegmentThickness>(registry);
 }
 
 void RegisterLosses(Registry* registry) {

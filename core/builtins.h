@@ -7,9 +7,10 @@ namespace plumbline {
 
 /// Registers the feature types, relations and losses of plumbline::factors:
 /// those of factors/blocks.h (point, pose, segment, line, end_points, circle,
-/// rectangle, orientation), those of the table in factors/relations.md, and the
-/// names of --delta_mode. Does nothing for what is there already. Explicit,
-/// because static initializers are lost in static libraries.
+/// rectangle, orientation), corridor and thickness, those of the table in
+/// factors/relations.md, and the names of --delta_mode. Does nothing for what
+/// is there already. Explicit, because static initializers are lost in static
+/// libraries.
 ///
 /// builtins.cc is the only file of core that knows a relation: a new one is a
 /// header in factors/, a line there and a test.

@@ -234,9 +234,10 @@ TEST(RegistryTest, EverythingComesInTheOrderOfNames) {
   for (const FeatureType* type : registry.features()) {
     names.push_back(type->name);
   }
-  EXPECT_THAT(names, ::testing::ElementsAre("circle", "end_points", "line",
-                                            "orientation", "point", "pose",
-                                            "rectangle", "segment"));
+  EXPECT_THAT(
+      names, ::testing::ElementsAre("circle", "corridor", "end_points", "line",
+                                    "orientation", "point", "pose", "rectangle",
+                                    "segment", "thickness"));
 }
 
 // A kind that core has never heard of.
@@ -495,6 +496,24 @@ TEST_F(BuiltinsTest, SidesOfARectangle) {
   EXPECT_NEAR(Residual("rectangle_orientation", Numbers({kPi / 2}),
                        {rectangle, Make("orientation", {0.2 - kPi / 2})})[0],
               0.2, 1e-12);
+}
+
+TEST_F(BuiltinsTest, CorridorsAndThicknesses) {
+  // The axis y = 6, half width 1.25: the left side is y = 7.25.
+  Feature corridor = Make("corridor", {1.0, 0.0, 1.25});
+  corridor.anchor = {100.0, 5.0};
+  const Eigen::VectorXd side =
+      Residual("segment_corridor", Numbers({0.0, kPi}),
+               {Make("segment", {97.0, 7.75, -kPi + 0.1}), corridor});
+  EXPECT_NEAR(side[0], 0.5, 1e-12);
+  EXPECT_NEAR(side[1], 0.1, 1e-12);
+  EXPECT_EQ(corridor.type->frame(corridor), Eigen::Vector3d(100.0, 6.0, 0.0));
+  const Eigen::VectorXd thickness = Residual(
+      "segment_segment_thickness", Numbers({0.0, kPi}),
+      {Make("segment", {1.0, 2.0, 0.0}),
+       Make("segment", {4.0, 1.8, -kPi + 0.1}), Make("thickness", {0.15})});
+  EXPECT_NEAR(thickness[0], 0.05, 1e-12);
+  EXPECT_NEAR(thickness[1], 0.1, 1e-12);
 }
 
 // Frames that say the same of a wall given in two ways.

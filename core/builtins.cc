@@ -30,6 +30,7 @@
 #include <plumbline/factors/segment_segment_collinearity.h>
 #include <plumbline/factors/segment_segment_thickness.h>
 #include <plumbline/factors/thickness.h>
+#include <plumbline/factors/wall_visibility.h>
 
 #include <algorithm>
 #include <cmath>
@@ -209,6 +210,7 @@ void RegisterRelations(Registry* registry) {
   AddRelationOnce<OrientationOrientation>(registry);
   AddRelationOnce<SegmentCorridor>(registry);
   AddRelationOnce<SegmentSegmentThickness>(registry);
+  AddRelationOnce<WallVisibility>(registry);
 }
 
 void RegisterLosses(Registry* registry) {

@@ -483,8 +483,9 @@ void MatchScansAlone(const std::string& name,
 // What a turning laser saw while the robot moved, where the log does not say
 // how long its sweeps take.
 void UndoSweeps(const std::string& name, const LogSolverOptions& solver_options,
-                Log* log, Summary* summary) {
+                RunClock* clock, Log* log, Summary* summary) {
   if (!solver_options.odometry.match_scans) return;
+  clock->Begin("sweeps of the laser");
   if (UndoSweepsByOdometry(MatchingOptions(solver_options), log) != 0) {
     TellSweeps(name, summary);
   }
@@ -914,7 +915,7 @@ int SolveLog(const LogInput& input, const Registry& registry, RunClock* clock,
     PlanMatching({1.0}, options, clock);
     MatchScansAlone(input.name, options, clock, &log, &summary);
   } else {
-    UndoSweeps(input.name, options, &log, &summary);
+    UndoSweeps(input.name, options, clock, &log, &summary);
   }
 
   CheckpointFile checkpoint(
@@ -1026,14 +1027,16 @@ std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
   for (const std::unique_ptr<OpenInput>& input : inputs) {
     const std::string& name = input->log.name;
     clock->Begin("reading");
+    const Stopwatch reading;
     Log log = ReadInput(input->log, clock);
+    summary->parse_seconds += reading.Seconds();
     Summary of_log;
     TellOfLog(name, log, &of_log);
     if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
     if (!log.has_odometry) {
       MatchScansAlone(name, options, clock, &log, &of_log);
     } else {
-      UndoSweeps(name, options, &log, &of_log);
+      UndoSweeps(name, options, clock, &log, &of_log);
     }
     AddNotes(TitleOf(name), of_log, summary);
     logs.push_back(std::move(log));
@@ -1161,9 +1164,7 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
                 "segments and full refinement");
   }
   Summary common = BeginSummary();
-  const Stopwatch reading;
   std::vector<Log> logs = ReadLogs(inputs, options.solver, clock, &common);
-  common.parse_seconds = reading.Seconds();
 
   const SeveralLogsResult solved =
       RunSeveralLogs(registry, std::move(logs), options, clock, live);

@@ -1,9 +1,9 @@
 #include <archive.h>
 #include <archive_entry.h>
-#include <bzlib.h>
 #include <fcntl.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/utf8.h>
+#include <plumbline/frontend/bzip2_decoder.h>
 #include <plumbline/frontend/input_stream.h>
 #include <poll.h>
 #include <sys/stat.h>
@@ -221,34 +221,25 @@ class InputStream::Unpacker::Gzip : public Unpacker {
 class InputStream::Unpacker::Bzip2 : public Unpacker {
  public:
   explicit Bzip2(std::unique_ptr<StoredBytes> bytes)
-      : Unpacker(std::move(bytes)) {
-    Start();
-  }
-  ~Bzip2() override { BZ2_bzDecompressEnd(&stream_); }
+      : Unpacker(std::move(bytes)), decoder_([this] { return More(); }) {}
   bool is_plain() const override { return false; }
 
   std::size_t Unpack(char* output, std::size_t capacity) override {
     while (!done_) {
-      // bzip2 may hold unpacked bytes back when the input is used up, so the
-      // end of the input is the end only once nothing comes out.
-      const bool more = bytes_->Require(1);
-      const unsigned given =
-          static_cast<unsigned>(std::min(bytes_->size(), std::size_t{1} << 30));
-      stream_.next_in = const_cast<char*>(bytes_->data());
-      stream_.avail_in = given;
-      stream_.next_out = output;
-      stream_.avail_out = static_cast<unsigned>(capacity);
-      const int status = BZ2_bzDecompress(&stream_);
-      bytes_->Consume(given - stream_.avail_in);
-      const std::size_t count = capacity - stream_.avail_out;
-      if (status == BZ_STREAM_END) {
-        NextMember();
-      } else if (status != BZ_OK) {
-        damage_ = "bzip2 data is corrupt";
-        done_ = true;
-      } else if (!more && count == 0) {
-        damage_ = "bzip2 data breaks off before its end";
-        done_ = true;
+      const std::size_t count = decoder_.Unpack(output, capacity);
+      switch (decoder_.state()) {
+        case Bzip2Decoder::State::kGoingOn:
+          break;
+        case Bzip2Decoder::State::kEnd:
+          NextMember();
+          break;
+        case Bzip2Decoder::State::kBreaksOff:
+          damage_ = "bzip2 data breaks off before its end";
+          done_ = true;
+          break;
+        case Bzip2Decoder::State::kCorrupt:
+          damage_ = "bzip2 data is corrupt";
+          done_ = true;
       }
       if (count > 0) return count;
     }
@@ -256,25 +247,23 @@ class InputStream::Unpacker::Bzip2 : public Unpacker {
   }
 
  private:
-  void Start() {
-    stream_ = {};
-    if (BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK)
-      throw PLUMBLINE_ERROR("libbz2 cannot be initialized", "enough memory");
+  std::string_view More() {
+    bytes_->Consume(given_);
+    bytes_->Require(1);
+    given_ = bytes_->size();
+    return {bytes_->data(), given_};
   }
 
   void NextMember() {
-    bytes_->Require(4);
-    if (StartsWithBzip2(*bytes_)) {
-      BZ2_bzDecompressEnd(&stream_);
-      Start();
-      return;
-    }
-    if (bytes_->size() > 0)
+    const Bzip2Decoder::Next next = decoder_.NextStream();
+    if (next == Bzip2Decoder::Next::kStream) return;
+    if (next == Bzip2Decoder::Next::kSomethingElse)
       damage_ = "bzip2 data is followed by something else";
     done_ = true;
   }
 
-  bz_stream stream_ = {};
+  Bzip2Decoder decoder_;
+  std::size_t given_ = 0;
   bool done_ = false;
 };
 

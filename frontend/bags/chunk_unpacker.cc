@@ -1,64 +1,62 @@
-#include <bzlib.h>
 #include <lz4frame.h>
 #include <plumbline/frontend/bags/chunk_unpacker.h>
+#include <plumbline/frontend/bzip2_decoder.h>
 #include <zstd.h>
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 namespace plumbline {
 namespace {
 
 constexpr std::size_t kStep = std::size_t{1} << 18;
+// Few chunks unpack to more than so many times their size.
+constexpr std::size_t kLikelyRatio = 64;
 
-// Room for more output behind the first `used` bytes; false at the limit.
-bool MakeRoom(std::size_t used, std::size_t limit, std::string* bytes) {
+// How much is unpacked, bytes.
+struct Sizes {
+  std::size_t expected = 0;
+  std::size_t limit = 0;
+};
+
+// Room for more output behind the first `used` bytes; false at the limit. What
+// is expected is made room for at once.
+bool MakeRoom(std::size_t used, const Sizes& sizes, std::string* bytes) {
   if (used < bytes->size()) return true;
-  if (used >= limit) return false;
-  bytes->resize(std::min(limit, std::max(2 * used, kStep)));
+  if (used >= sizes.limit) return false;
+  // One more, for the end comes behind the last byte.
+  bytes->resize(
+      std::min(sizes.limit, std::max({2 * used, kStep, sizes.expected + 1})));
   return true;
 }
 
 constexpr char kTooMuch[] = "unpacks to more than a chunk may have";
 
-UnpackedChunk UnpackBzip2(std::string_view stored, std::size_t limit) {
+UnpackedChunk UnpackBzip2(std::string_view stored, const Sizes& sizes) {
+  using State = Bzip2Decoder::State;
   UnpackedChunk result;
-  bz_stream stream = {};
-  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) {
-    result.damage = "libbz2 cannot be initialized";
-    return result;
-  }
-  stream.next_in = const_cast<char*>(stored.data());
-  stream.avail_in = static_cast<unsigned>(stored.size());
+  Bzip2Decoder decoder(
+      [&stored] { return std::exchange(stored, std::string_view()); });
   std::size_t used = 0;
-  while (true) {
-    if (!MakeRoom(used, limit, &result.bytes)) {
+  while (decoder.state() == State::kGoingOn) {
+    if (!MakeRoom(used, sizes, &result.bytes)) {
       result.damage = kTooMuch;
       break;
     }
-    const std::size_t room = result.bytes.size() - used;
-    stream.next_out = result.bytes.data() + used;
-    stream.avail_out = static_cast<unsigned>(room);
-    const int status = BZ2_bzDecompress(&stream);
-    const std::size_t count = room - stream.avail_out;
-    used += count;
-    if (status == BZ_STREAM_END) {
-      result.is_whole = true;
-      break;
-    }
-    if (status != BZ_OK) {
-      result.damage = "bz2 data is corrupt";
-      break;
-    }
-    if (stream.avail_in == 0 && count == 0) break;
+    used +=
+        decoder.Unpack(result.bytes.data() + used, result.bytes.size() - used);
   }
-  result.consumed = stored.size() - stream.avail_in;
+  if (decoder.state() == State::kCorrupt) {
+    result.damage = "bz2 data is corrupt";
+  }
+  result.is_whole = decoder.state() == State::kEnd;
+  result.consumed = static_cast<std::size_t>(decoder.consumed());
   result.bytes.resize(used);
-  BZ2_bzDecompressEnd(&stream);
   return result;
 }
 
-UnpackedChunk UnpackLz4(std::string_view stored, std::size_t limit) {
+UnpackedChunk UnpackLz4(std::string_view stored, const Sizes& sizes) {
   UnpackedChunk result;
   LZ4F_dctx* context = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION))) {
@@ -67,7 +65,7 @@ UnpackedChunk UnpackLz4(std::string_view stored, std::size_t limit) {
   }
   std::size_t used = 0;
   while (true) {
-    if (!MakeRoom(used, limit, &result.bytes)) {
+    if (!MakeRoom(used, sizes, &result.bytes)) {
       result.damage = kTooMuch;
       break;
     }
@@ -93,7 +91,7 @@ UnpackedChunk UnpackLz4(std::string_view stored, std::size_t limit) {
   return result;
 }
 
-UnpackedChunk UnpackZstd(std::string_view stored, std::size_t limit) {
+UnpackedChunk UnpackZstd(std::string_view stored, const Sizes& sizes) {
   UnpackedChunk result;
   const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(
       ZSTD_createDCtx(), ZSTD_freeDCtx);
@@ -104,7 +102,7 @@ UnpackedChunk UnpackZstd(std::string_view stored, std::size_t limit) {
   std::size_t used = 0;
   ZSTD_inBuffer input = {stored.data(), stored.size(), 0};
   while (true) {
-    if (!MakeRoom(used, limit, &result.bytes)) {
+    if (!MakeRoom(used, sizes, &result.bytes)) {
       result.damage = kTooMuch;
       break;
     }
@@ -136,10 +134,14 @@ bool IsKnownCompression(std::string_view compression) {
 }
 
 UnpackedChunk UnpackChunk(std::string_view compression, std::string_view stored,
-                          std::size_t limit) {
-  if (compression == "bz2") return UnpackBzip2(stored, limit);
-  if (compression == "lz4") return UnpackLz4(stored, limit);
-  if (compression == "zstd") return UnpackZstd(stored, limit);
+                          std::size_t stated_size, std::size_t limit) {
+  // The stated size may be a lie, which then costs little.
+  Sizes sizes;
+  sizes.expected = std::min(stated_size, kLikelyRatio * stored.size());
+  sizes.limit = limit;
+  if (compression == "bz2") return UnpackBzip2(stored, sizes);
+  if (compression == "lz4") return UnpackLz4(stored, sizes);
+  if (compression == "zstd") return UnpackZstd(stored, sizes);
   UnpackedChunk result;
   result.damage = "is compressed in an unknown way";
   return result;

@@ -23,10 +23,11 @@ struct UnpackedChunk {
 bool IsKnownCompression(std::string_view compression);
 
 /// Unpacks the stream that `stored` begins with, up to `limit` bytes; more than
-/// that counts as damage. Checksums in the stream are tested. Throws for lack
-/// of memory only.
+/// that counts as damage. Room is made for `stated_size` bytes at once, which
+/// need not be right (0: not stated). Checksums in the stream are tested.
+/// Throws for lack of memory only.
 UnpackedChunk UnpackChunk(std::string_view compression, std::string_view stored,
-                          std::size_t limit);
+                          std::size_t stated_size, std::size_t limit);
 
 }  // namespace plumbline
 

@@ -296,7 +296,9 @@ class Mcap : public ChunkedBag {
       unpacked.is_whole = !is_short;
       unpacked.consumed = stored.size();
     } else {
-      unpacked = UnpackChunk(head.compression, stored, kLargestRecord);
+      unpacked =
+          UnpackChunk(head.compression, stored,
+                      static_cast<std::size_t>(head.size), kLargestRecord);
     }
     if (!unpacked.is_whole) {
       SkipDamagedChunk(unpacked);

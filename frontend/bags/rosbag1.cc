@@ -365,7 +365,8 @@ class Rosbag1 : public ChunkedBag {
     input()->Consume(record.header_size);
     std::size_t shown = std::min(stored_size, kLargestRecord);
     std::string_view stored = input()->Peek(shown);
-    UnpackedChunk unpacked = UnpackChunk(compression, stored, kLargestRecord);
+    UnpackedChunk unpacked = UnpackChunk(
+        compression, stored, static_cast<std::size_t>(size), kLargestRecord);
     if (!unpacked.is_whole && unpacked.damage.empty() &&
         stored.size() == shown) {
       // More follows than the chunk says.
@@ -373,7 +374,8 @@ class Rosbag1 : public ChunkedBag {
           kLargestRecord,
           shown + static_cast<std::size_t>(size) + kLargestHeader);
       stored = input()->Peek(shown);
-      unpacked = UnpackChunk(compression, stored, kLargestRecord);
+      unpacked = UnpackChunk(compression, stored,
+                             static_cast<std::size_t>(size), kLargestRecord);
     }
     if (unpacked.is_whole) {
       input()->Consume(unpacked.consumed);

@@ -407,7 +407,7 @@ class Rosbag2Folder : public BagSource {
         message->topic = TopicOf(message->topic);
         if (compression_.empty() || message->data.empty()) return true;
         UnpackedChunk unpacked =
-            UnpackChunk(compression_, message->data, kLargestMessage);
+            UnpackChunk(compression_, message->data, 0, kLargestMessage);
         if (!unpacked.is_whole) {
           Skip("message whose " + compression_ + " data is corrupt");
           continue;

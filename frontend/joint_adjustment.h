@@ -96,9 +96,10 @@ class JointAdjustment {
   /// Puts places into the graph, where `key_poses` say (map frame, one per
   /// record). `robot`: the pose that the front-end keeps in the graph, which
   /// leaves it (kNoId: none). `refined` has one entry per scan. Pointers are
-  /// not owned and must outlive this, and so must what `stop` (may be null)
-  /// refers to: it is asked now and then here and below, and once it has
-  /// returned true the work ends early, the graph whole but unfinished.
+  /// not owned and must outlive this, and so must `registry`, `records` and
+  /// what `stop` (may be null) refers to: it is asked now and then here and
+  /// below; once it has returned true the work ends early, the graph whole but
+  /// unfinished.
   JointAdjustment(Graph* graph, SolverSession* session,
                   const Registry& registry, const std::vector<Scan>& scans,
                   const std::vector<RefinedScan>& refined,

@@ -443,8 +443,12 @@ TEST_F(JointAdjustmentTest, EmptyAndBrokenInput) {
   options_.place_stride = 3;
   Graph empty;
   SolverSession other(&empty, registry_, {});
-  JointAdjustment nothing(&empty, &other, registry_, {}, {}, {}, {}, kNoId,
-                          options_);
+  // It refers to these for as long as it lives.
+  const std::vector<Scan> no_scans;
+  const std::vector<RefinedScan> none_refined;
+  const std::vector<KeyScanRecord> no_records;
+  JointAdjustment nothing(&empty, &other, registry_, no_scans, none_refined,
+                          no_records, {}, kNoId, options_);
   nothing.Adjust();
   EXPECT_TRUE(nothing.KeyPoses().empty());
   EXPECT_EQ(empty.num_features(), 0u);

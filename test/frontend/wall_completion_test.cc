@@ -172,9 +172,9 @@ TEST(WallCompletionStrayTest, StraysHideNoWalls) {
   WallCompletionOptions options;
   const auto length = [&] {
     double sum = 0.0;
-    for (const Feature& wall :
-         FindGlimpsedWalls(Graph(), registry, scans, poses, options)
-             .added_features()) {
+    const Transaction found =
+        FindGlimpsedWalls(Graph(), registry, scans, poses, options);
+    for (const Feature& wall : found.added_features()) {
       EXPECT_LT(AxisDistance(wall.parameters[2]), DegToRad(0.5));
       sum += wall.extent_end - wall.extent_begin;
     }

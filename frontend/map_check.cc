@@ -3,6 +3,7 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/map_check.h>
 #include <plumbline/frontend/place_grid.h>
+#include <plumbline/frontend/way_lengths.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -17,8 +18,7 @@
 namespace plumbline {
 namespace {
 
-// A step between key scans counts as no more way than this, m: where the robot
-// was lost the trajectory may jump.
+// A step between key scans counts as no more way than this, m.
 constexpr double kLongestStep = 2.0;
 
 // Between two times that `stop` is asked.
@@ -127,16 +127,6 @@ bool IsConfirming(const ScanAgreement& agreement,
              options.agreeing_seen_through * agreement.seen;
 }
 
-// Way up to each of the poses, m.
-std::vector<double> Ways(const std::vector<Pose2>& poses) {
-  std::vector<double> way(poses.size(), 0.0);
-  for (std::size_t k = 1; k < poses.size(); ++k) {
-    way[k] = way[k - 1] +
-             std::min(kLongestStep, (poses[k] - poses[k - 1]).head<2>().norm());
-  }
-  return way;
-}
-
 // One pose for each `spacing` of the way.
 std::vector<std::size_t> SpreadOver(const std::vector<double>& way,
                                     double spacing) {
@@ -189,7 +179,7 @@ std::vector<MapContradiction> FindContradictions(
         std::to_string(poses.size()) + " poses",
         "one for each of " + std::to_string(keys.size()) + " key scans");
   }
-  const std::vector<double> way = Ways(poses);
+  const std::vector<double> way = WayLengths(poses, kLongestStep);
   const std::vector<std::size_t> looked_at = SpreadOver(way, options.spacing);
   const PlaceGrid grid(poses, options.radius);
   const MapComparison comparison(scans, keys, poses, options);
@@ -286,7 +276,8 @@ std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
     return result;
   };
   std::map<std::pair<std::size_t, std::size_t>, Evidence> evidence;
-  for (const std::size_t k : SpreadOver(Ways(poses), options.spacing)) {
+  for (const std::size_t k :
+       SpreadOver(WayLengths(poses, kLongestStep), options.spacing)) {
     if (parts[k] == kNoPart) continue;
     // The parts just before and after its own are enough to join all, and what
     // is compared does not grow with the square of the visits.

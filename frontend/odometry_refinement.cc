@@ -70,10 +70,13 @@ constexpr double kTieAngle = DegToRad(0.5);
 // On the variances that odometry and a track's drift are given.
 constexpr double kGenerous = 4.0;
 // Motions between key scans from which on odometry's own noise is believed,
-// the least share of the usual variance and the largest chi-square of one.
+// and the largest chi-square of one.
 constexpr int kLeastMotions = 20;
-constexpr double kLeastOdometryScale = 0.04;
 constexpr double kUsualInnovation = 9.0;
+// The least share of the usual variance that odometry is believed to have: a
+// fifth of the usual standard deviation. What is measured holds for single
+// motions; over a gap errors of scale add up that it does not show.
+constexpr double kLeastOdometryScale = 0.04;
 // Where the returns say nothing, m.
 constexpr double kOpenSigma = 2.0;
 // Of a loose one, m and rad: a weak pull that keeps the map in one frame, not a

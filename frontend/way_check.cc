@@ -2,6 +2,7 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/place_grid.h>
 #include <plumbline/frontend/way_check.h>
+#include <plumbline/frontend/way_lengths.h>
 
 #include <algorithm>
 #include <cmath>
@@ -49,13 +50,7 @@ class WayCheck {
         walls_(walls),
         options_(options),
         grid_(poses, options.radius),
-        way_(poses.size(), 0.0) {
-    for (std::size_t k = 1; k < poses.size(); ++k) {
-      way_[k] =
-          way_[k - 1] + std::min(options.max_step,
-                                 (poses[k] - poses[k - 1]).head<2>().norm());
-    }
-  }
+        way_(WayLengths(poses, options.max_step)) {}
 
   // All crossings, in the order of the way.
   std::vector<Crossing> FindCrossings() const {

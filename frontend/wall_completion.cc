@@ -166,6 +166,7 @@ class WallGrower {
     kinks_.min_length = options.min_length;
     kinks_.min_end = options.min_end;
     kinks_.max_end_share = options.max_end_share;
+    kinks_.min_step = options.min_step;
   }
 
   // What lies in line with a cell, when it is long, whole and straight enough
@@ -639,6 +640,7 @@ void WallCompletionOptions::ScaleToNoise(double scale) {
   explained_offset =
       std::max(explained_offset, kExplainedSigmas * scale * kUsualRangeNoise);
   max_scatter *= scale;
+  min_step *= scale;
   max_end_sigma *= scale;
 }
 

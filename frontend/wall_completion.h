@@ -36,6 +36,9 @@ struct WallCompletionOptions {
   /// a small angle.
   double min_kink = DegToRad(0.5);
   double kink_sigmas = 4.0;
+  /// Where it steps aside by at least this (m), and by `kink_sigmas`, it is two
+  /// walls as well: a door set back in its wall.
+  double min_step = 0.03;
   /// Least length (m) and largest share of an end that turns away and is not
   /// the wall's: the beginning of another corridor's wall, however short it is
   /// up to its next niche.

@@ -68,48 +68,82 @@ std::size_t FindBend(const std::vector<WallSample>& samples,
   return IsKink(turn, sigma, options) ? cut : 0;
 }
 
+// Sums of one more term z of a line, across = a + b x + c z, over the samples.
+struct TermSums {
+  double z = 0.0, zz = 0.0, xz = 0.0, yz = 0.0;
+};
+
+// z = max(0, x - x0): the line turns at x0. `right`: the samples from there.
+TermSums TurnAt(double x0, const LineSums& right) {
+  return {right.x - x0 * right.n,
+          right.xx - 2.0 * x0 * right.x + x0 * x0 * right.n,
+          right.xx - x0 * right.x, right.xy - x0 * right.y};
+}
+
+// z = [x > x0]: it steps aside there.
+TermSums StepAt(const LineSums& right) {
+  return {right.n, right.n, right.x, right.y};
+}
+
+// A term that was fitted.
+struct FittedTerm {
+  // First sample behind it; 0 for none.
+  std::size_t cut = 0;
+  // c, its information at samples of variance 1, and by how much the term makes
+  // the sum of squares smaller, m^2.
+  double amount = 0.0;
+  double information = 0.0;
+  double explained = 0.0;
+
+  // Fits it beside the line; the better of this and what was there stays.
+  void Fit(const TermSums& term, const LineSums& all, std::size_t at) {
+    const double x = term.xz - all.x * term.z / all.n;
+    const double own = term.zz - term.z * term.z / all.n - x * x / all.Spread();
+    if (own <= 1e-9) return;
+    const double cross = all.xy - all.x * all.y / all.n;
+    const double score =
+        term.yz - all.y * term.z / all.n - x * cross / all.Spread();
+    if (score * score / own <= explained) return;
+    *this = {at, std::abs(score / own), own, score * score / own};
+  }
+
+  double Sigma(const LineSums& all) const {
+    const double residual = std::max(all.SquaredError() - explained, 0.0);
+    return std::sqrt(residual / (all.n - 3.0) / information);
+  }
+};
+
 // The same for an end of another wall that is too short for a direction of
-// its own: one line that turns (across = a + b x + c max(0, x - x0)) has the
-// turn c at twice the precision.
-std::size_t FindTurnedEnd(const std::vector<WallSample>& samples,
-                          const LineSums& all, const WallKinkOptions& options) {
+// its own, where one line that turns has the turn at twice the precision, and
+// for two parallel walls: one line through both is tilted, by 2 degrees for a
+// step of 5 cm in 2 m.
+std::size_t FindTurnOrStep(const std::vector<WallSample>& samples,
+                           const LineSums& all,
+                           const WallKinkOptions& options) {
   const std::size_t n = samples.size();
   const double begin = samples.front().along;
   const double end = samples.back().along;
-  const double cross = all.xy - all.x * all.y / all.n;
   LineSums left;
-  double best = 0.0, turn = 0.0, best_information = 0.0;
-  std::size_t cut = 0;
+  FittedTerm turn, step;
   for (std::size_t k = 1; k < n; ++k) {
     left.Add(samples[k - 1].along, samples[k - 1].across);
     const double shorter =
         std::min(samples[k - 1].along - begin, end - samples[k].along);
-    if (shorter < options.min_end ||
-        shorter > options.max_end_share * (end - begin)) {
-      continue;
-    }
+    if (shorter < options.min_end) continue;
     const LineSums right = all - left;
-    const double x0 = 0.5 * (samples[k - 1].along + samples[k].along);
-    // Sums of z = max(0, x - x0), reduced for a and b.
-    const double z = right.x - x0 * right.n;
-    const double zz = right.xx - 2.0 * x0 * right.x + x0 * x0 * right.n;
-    const double xz = right.xx - x0 * right.x - all.x * z / all.n;
-    const double information = zz - z * z / all.n - xz * xz / all.Spread();
-    if (information <= 1e-9) continue;
-    const double score =
-        right.xy - x0 * right.y - all.y * z / all.n - xz * cross / all.Spread();
-    if (score * score / information > best) {
-      best = score * score / information;
-      turn = std::abs(score / information);
-      best_information = information;
-      cut = k;
+    if (options.min_step > 0.0) step.Fit(StepAt(right), all, k);
+    if (shorter <= options.max_end_share * (end - begin)) {
+      turn.Fit(TurnAt(0.5 * (samples[k - 1].along + samples[k].along), right),
+               all, k);
     }
   }
-  if (cut == 0) return 0;
-  const double residual = std::max(all.SquaredError() - best, 0.0);
-  const double sigma =
-      std::sqrt(residual / static_cast<double>(n - 3) / best_information);
-  return IsKink(turn, sigma, options) ? cut : 0;
+  if (step.explained > turn.explained && step.amount >= options.min_step &&
+      step.amount >= options.min_sigmas * step.Sigma(all)) {
+    return step.cut;
+  }
+  return turn.cut != 0 && IsKink(turn.amount, turn.Sigma(all), options)
+             ? turn.cut
+             : 0;
 }
 
 }  // namespace
@@ -122,7 +156,7 @@ std::size_t FindWallKink(const std::vector<WallSample>& samples,
     all.Add(sample.along, sample.across);
   }
   const std::size_t bend = FindBend(samples, all, options);
-  return bend != 0 ? bend : FindTurnedEnd(samples, all, options);
+  return bend != 0 ? bend : FindTurnOrStep(samples, all, options);
 }
 
 }  // namespace plumbline

@@ -19,6 +19,10 @@ struct WallKinkOptions {
   /// and is too short for that.
   double min_end = 0.3;
   double max_end_share = 0.34;
+  /// Least offset of two walls that follow each other side by side, a door set
+  /// back in its wall for one, m; 0 looks for none. `min_sigmas` hold for it,
+  /// too. Neither is shorter than `min_end`.
+  double min_step = 0.0;
 };
 
 /// A point along and across a line, m, with a number of the caller's.
@@ -29,10 +33,11 @@ struct WallSample {
 };
 
 /// Finds where one line of points is better explained by two walls that meet at
-/// a small angle: the index of the first sample of the second wall, 0 where a
-/// straight line will do. Either both walls have a direction of their own, or
-/// an end turns away that is too short for one. `samples` are ascending along
-/// the line. Cost: linear in the samples.
+/// a small angle, or by two parallel ones a step apart: the index of the first
+/// sample of the second wall, 0 where a straight line will do. Of walls that
+/// meet either both have a direction of their own, or an end turns away that is
+/// too short for one. `samples` are ascending along the line. Cost: linear in
+/// the samples.
 std::size_t FindWallKink(const std::vector<WallSample>& samples,
                          const WallKinkOptions& options);
 

@@ -106,6 +106,42 @@ TEST(WallCompletionKinkTest, AWallIsCutAtAKink) {
   }
 }
 
+// A wall of 0.9 m and the door beside it, set back by 5.5 cm, scatter about one
+// line like one wall: it would be tilted by 3 degrees.
+TEST(WallCompletionKinkTest, AWallAndADoorSetBackInItAreTwo) {
+  Registry registry;
+  RegisterBuiltinRelations(&registry);
+  const std::vector<WallEnds> world = {{{-0.9, 2.0}, {0.0, 2.0}},
+                                       {{0.0, 2.045}, {0.9, 2.045}}};
+  testing::Laser laser;
+  laser.start_angle = DegToRad(30.0);
+  laser.angle_step = DegToRad(1.0);
+  laser.beams = 121;
+  laser.sigma = 0.02;
+  Noise noise(4);
+  std::vector<Scan> scans;
+  std::vector<Pose2> poses;
+  for (int i = 0; i <= 30; ++i) {
+    poses.emplace_back(-3.0 + 0.2 * i, 0.0, 0.0);
+    scans.push_back(MakeScan(world, poses.back(), laser, &noise));
+  }
+  WallCompletionOptions options;
+  options.points.usable_range = 10.0;
+  const auto worst = [&] {
+    double tilt = 0.0;
+    const Transaction walls =
+        FindGlimpsedWalls(Graph(), registry, scans, poses, options);
+    EXPECT_FALSE(walls.added_features().empty());
+    for (const Feature& wall : walls.added_features()) {
+      tilt = std::max(tilt, AxisDistance(wall.parameters[2]));
+    }
+    return RadToDeg(tilt);
+  };
+  EXPECT_LT(worst(), 0.8);
+  options.min_step = 0.0;
+  EXPECT_GT(worst(), 1.5);
+}
+
 // Of a wall that turns by 3 degrees 0.7 m before its end the end is too short
 // for a direction of its own, and too little of the wall to tilt it by much: it
 // is cut off all the same.

@@ -68,6 +68,47 @@ TEST(WallKinkTest, TurnMustBeLargeAndCertain) {
   EXPECT_EQ(FindWallKink(Bent(1.5, 0.75, DegToRad(0.6), 0.02, 1), options), 0u);
 }
 
+// Samples of a wall of 2 m that steps aside at `joint`, as a line through all
+// of it has them.
+std::vector<WallSample> Stepped(double step, double joint, double noise,
+                                unsigned seed) {
+  std::vector<WallSample> samples = Bent(2.0, 2.0, 0.0, noise, seed);
+  for (WallSample& sample : samples) {
+    if (sample.along > joint) sample.across += step;
+    sample.across -= 0.5 * step * sample.along;
+  }
+  return samples;
+}
+
+TEST(WallKinkTest, AWallAndADoorSetBackInItArePartedWhereTheyMeet) {
+  WallKinkOptions options;
+  options.min_step = 0.03;
+  for (const double joint : {0.61, 0.92, 1.36}) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      const std::vector<WallSample> samples =
+          Stepped(0.055, joint, 0.008, seed);
+      const std::size_t cut = FindWallKink(samples, options);
+      ASSERT_GT(cut, 0u) << joint << " " << seed;
+      EXPECT_NEAR(samples[cut].along, joint, 0.11) << joint << " " << seed;
+    }
+  }
+  // Too little of a step; two ends too short for a wall; nobody asks.
+  EXPECT_EQ(FindWallKink(Stepped(0.02, 0.92, 0.003, 1), options), 0u);
+  options.min_end = 1.1;
+  options.min_length = 1.1;
+  EXPECT_EQ(FindWallKink(Stepped(0.055, 0.92, 0.003, 1), options), 0u);
+}
+
+TEST(WallKinkTest, StraightWallsHardlyEverHaveAStep) {
+  WallKinkOptions options;
+  options.min_step = 0.005;
+  int found = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    found += FindWallKink(Bent(2.0, 2.0, 0.0, 0.01, seed), options) != 0;
+  }
+  EXPECT_LE(found, 6);
+}
+
 TEST(WallKinkTest, FewSamplesTellNothing) {
   std::vector<WallSample> samples = Bent(6.0, 3.0, DegToRad(10.0), 0.0, 1);
   samples.resize(11);

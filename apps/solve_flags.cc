@@ -110,7 +110,9 @@ DEFINE_string(align, "none",
               "y and lie in the first quadrant; summary.json has the "
               "transform)");
 PLUMBLINE_FLAG_CHOICES(align, "none", "building");
-DEFINE_double(grid_resolution, 0.05, "Side of a cell of occupancy.pgm, m");
+DEFINE_double(
+    grid_resolution, 0.05,
+    "Side of a cell of occupancy.pgm, m; at least 0.1 when interrupted");
 PLUMBLINE_FLAG_RANGE(grid_resolution, 0.001, 10.0);
 
 DEFINE_double(

@@ -32,9 +32,11 @@ using std::filesystem::path;
 // Of a grid on which rooms are found, m.
 constexpr double kPlanResolution = 0.05;
 constexpr double kCoarsestPlanResolution = 0.1;
-// Scans whose rays the grid of a run that was interrupted has: who pressed
-// Ctrl-C waits.
+// Scans whose rays the grid of a run that was interrupted has, and its finest
+// cells, m: whoever pressed Ctrl-C is waiting, and half of the time that
+// writing takes goes by the number of cells.
 constexpr std::size_t kMostScansOfAPart = 4000;
+constexpr double kFinestResolutionOfAPart = kCoarsestPlanResolution;
 
 std::vector<Pose2> Poses(const SolveOutcome& outcome) {
   std::vector<Pose2> poses;
@@ -45,7 +47,10 @@ std::vector<Pose2> Poses(const SolveOutcome& outcome) {
 
 OccupancyOptions GridOptions(const SolveOutcome& outcome) {
   OccupancyOptions options = outcome.occupancy;
-  if (outcome.summary.partial) options.max_scans = kMostScansOfAPart;
+  if (outcome.summary.partial) {
+    options.max_scans = kMostScansOfAPart;
+    options.resolution = std::max(options.resolution, kFinestResolutionOfAPart);
+  }
   return options;
 }
 

@@ -338,6 +338,10 @@ TEST_P(InterruptTest, WritesWhatThereIs) {
   EXPECT_EQ(ReadTum((folder_ / "trajectory.tum").string()).size(),
             static_cast<std::size_t>(scans));
   EXPECT_EQ(FilesOfTheRun(), kFilesOfALog);
+  // Coarser than that of a whole run, since somebody waits.
+  std::ifstream grid(folder_ / "occupancy.yaml");
+  const std::string yaml{std::istreambuf_iterator<char>(grid), {}};
+  EXPECT_THAT(yaml, HasSubstr("resolution: 0.1\n"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Signals, InterruptTest,

@@ -3,6 +3,7 @@
 
   test/faults/run.py BIN_DIR [--kills=N] [--bad_inputs=N] [--interrupts=N]
       [--copies=N,N,...] [--seed=N] [--datasets=FOLDER] [--parts=PART,...]
+      [--slower=FACTOR]
 
 Kills runs of plumbline_solve at moments spread over their whole length, limits
 the size of the files that they may write (a disk that is full at every file in
@@ -485,7 +486,7 @@ def last_step(path):
     return steps[-1].split(", after ")[0].split(":")[-1].strip() if steps else "begin"
 
 
-def interrupts(solve, count, rng, datasets):
+def interrupts(solve, count, rng, datasets, slower):
     """SIGINT at moments spread over the run: how long until the end?"""
     inputs = {"office": os.path.join(SOURCE, "datasets/office.clf.gz")}
     if datasets:
@@ -556,7 +557,7 @@ def interrupts(solve, count, rng, datasets):
                         not in ("none", "partial", "whole")):
                     finding("%s, interrupt %d: status %d, folder %s" %
                             (name, i, status, state_of(folder)))
-                if total - spent > 2.0:
+                if total - spent > 2.0 * slower:
                     finding("%s, interrupt in '%s': %.2f s of processor until "
                             "the end" % (name, step, total - spent))
             shutil.rmtree(folder)
@@ -686,7 +687,7 @@ def spoil(text, rng):
     return bytes(data)
 
 
-def bad_inputs(binaries, root, count, rng):
+def bad_inputs(binaries, root, count, rng, slower):
     folder = os.path.join(root, "bad")
     os.makedirs(folder)
     log = office(8)
@@ -734,11 +735,12 @@ def bad_inputs(binaries, root, count, rng):
         name = names[i % len(names)]
         command = kinds[name]()
         try:
-            result = subprocess.run(command, capture_output=True, timeout=60,
+            result = subprocess.run(command, capture_output=True,
+                                    timeout=60 * slower,
                                     text=True, errors="replace",
                                     stdin=subprocess.DEVNULL)
         except subprocess.TimeoutExpired:
-            finding("%s %d takes more than a minute" % (name, i))
+            finding("%s %d takes more than %g s" % (name, i, 60 * slower))
             continue
         status = result.returncode
         statuses[status] = statuses.get(status, 0) + 1
@@ -765,6 +767,9 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--datasets", default="",
                         help="folder of the public logs and graphs")
+    parser.add_argument("--slower", type=float, default=1.0,
+                        help="how many times slower than those of a release "
+                        "build the binaries are; bounds on times grow by it")
     parser.add_argument("--parts", default=",".join(PARTS))
     arguments = parser.parse_args()
     parts = arguments.parts.split(",")
@@ -785,11 +790,12 @@ def main():
     if "clocks" in parts:
         clocks(solve, rng)
     if "interrupts" in parts:
-        interrupts(solve, arguments.interrupts, rng, arguments.datasets)
+        interrupts(solve, arguments.interrupts, rng, arguments.datasets,
+                   arguments.slower)
     if "bad_inputs" in parts:
         # The same ones whichever parts are run.
         bad_inputs(arguments.bin_dir, root, arguments.bad_inputs,
-                   random.Random(arguments.seed))
+                   random.Random(arguments.seed), arguments.slower)
     if "copies" in parts:
         copies_of_a_log(solve, [int(n) for n in arguments.copies.split(",")])
     if findings:

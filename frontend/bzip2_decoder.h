@@ -9,12 +9,10 @@
 
 namespace plumbline {
 
-/// Unpacks bzip2 streams in less than half the time of libbz2. Most of that
-/// time goes into the inverse of the Burrows-Wheeler transform, a walk around a
-/// permutation of up to 900,000 entries that waits for memory at every step;
-/// here several parts of the way are walked at once. Format: J. Tsai, "BZIP2:
-/// Format Specification" (2016). Randomized blocks, which bzip2 before version
-/// 0.9.5 (1999) wrote, count as corrupt.
+/// Unpacks bzip2 streams with libbz2, ThreadsHere() blocks at a time: a block
+/// of up to 900 kB depends on no other one. Blocks are found by the 48 bits
+/// that each begins with, and given to libbz2 as streams of their own. Format:
+/// J. Tsai, "BZIP2: Format Specification" (2016).
 class Bzip2Decoder {
  public:
   enum class State {
@@ -37,7 +35,8 @@ class Bzip2Decoder {
   Bzip2Decoder& operator=(const Bzip2Decoder&) = delete;
 
   /// Writes up to `capacity` unpacked bytes and returns their number, which is
-  /// smaller only once the state is no longer kGoingOn.
+  /// smaller only once the state is no longer kGoingOn. Throws for lack of
+  /// memory only.
   std::size_t Unpack(char* output, std::size_t capacity);
 
   State state() const;

@@ -2,6 +2,7 @@
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/center_cluster.h>
 #include <plumbline/detectors/circle_ransac.h>
+#include <plumbline/detectors/corridor.h>
 #include <plumbline/detectors/line_ransac.h>
 #include <plumbline/detectors/orientation_mixture.h>
 #include <plumbline/detectors/orientation_relation.h>
@@ -15,8 +16,8 @@ namespace plumbline {
 void RegisterBuiltinDetectors(Registry* registry) {
   for (DetectorType type :
        {CenterClusterType(), CircleCenterType(), CircleRansacType(),
-        LineRansacType(), OrientationMixtureType(), OrientationRelationType(),
-        RectangleType(), SameWallType()}) {
+        CorridorType(), LineRansacType(), OrientationMixtureType(),
+        OrientationRelationType(), RectangleType(), SameWallType()}) {
     if (registry->FindDetector(type.name) == nullptr) {
       registry->Register(std::move(type));
     }

@@ -68,16 +68,19 @@ Feature Moved(const Pose2& by, Feature feature) {
     if (type.traits.leading == Leading::kFrame) turn(2);
     return feature;
   }
+  // A place or a line takes more than one number: one alone is a measure, which
+  // no motion changes.
+  const bool is_measure = type.size == 1;
   for (int i = 0; i < type.size; ++i) {
     if (type.parameters[static_cast<std::size_t>(i)].is_angle) {
       turn(i);
-    } else if (type.anchor_size != 2) {
+    } else if (type.anchor_size != 2 && !is_measure) {
       throw Error("feature " + std::to_string(feature.id), 0,
                   "a " + type.name +
                       " cannot be moved: what its parameters refer to is not "
                       "known",
-                  "types that begin with a position, refer to an anchor, or "
-                  "are angles");
+                  "types that begin with a position, refer to an anchor, are "
+                  "angles, or a single measure");
     }
   }
   return feature;

@@ -20,7 +20,8 @@ Pose2 BuildingFrame(const Graph& graph, const std::vector<Pose2>& path);
 
 /// A feature moved rigidly: its anchor, its position and its angles. Throws
 /// Error for types that it does not know how to move: those that neither begin
-/// with a position, nor refer to an anchor, nor consist of angles.
+/// with a position, nor refer to an anchor, nor consist of angles, nor are a
+/// single measure (a thickness), which stays.
 Feature Moved(const Pose2& by, Feature feature);
 
 /// A copy of a graph with all features moved, under the same ids. Measurements

@@ -499,14 +499,15 @@ TEST_F(BuiltinsTest, SidesOfARectangle) {
 }
 
 TEST_F(BuiltinsTest, CorridorsAndThicknesses) {
-  // The axis y = 6, half width 1.25: the left side is y = 7.25.
-  Feature corridor = Make("corridor", {1.0, 0.0, 1.25});
+  // Beside the anchor the axis is 1 m to its left, and the left side 2.25 m.
+  Feature corridor = Make("corridor", {1.0, -0.1, 1.25});
   corridor.anchor = {100.0, 5.0};
   const Eigen::VectorXd side =
       Residual("segment_corridor", Numbers({0.0, kPi}),
-               {Make("segment", {97.0, 7.75, -kPi + 0.1}), corridor});
+               {Make("segment", {97.0, 7.75, kPi}), corridor});
   EXPECT_NEAR(side[0], 0.5, 1e-12);
   EXPECT_NEAR(side[1], 0.1, 1e-12);
+  corridor.parameters[1] = 0.0;
   EXPECT_EQ(corridor.type->frame(corridor), Eigen::Vector3d(100.0, 6.0, 0.0));
   const Eigen::VectorXd thickness = Residual(
       "segment_segment_thickness", Numbers({0.0, kPi}),

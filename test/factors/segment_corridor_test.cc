@@ -35,19 +35,19 @@ Block MoveCorridor(const Pose2& motion, const Block& corridor) {
 
 TEST(SegmentCorridorTest, ByHand) {
   // The axis is y = 5 + 1, along x; the right side is y = 4.75. The segment is
-  // 0.5 past it, turned by 0.1. Error (0.5 - 0.25, 0.1).
+  // 0.5 past it. Error (0.5 - 0.25, 0.1), the axis being turned by -0.1.
   const std::unique_ptr<ceres::CostFunction> cost(SegmentCorridor::Create(
       Eigen::Vector2d(0.25, kRight), Eigen::Vector2d(100.0, 5.0), Weight2()));
-  const auto result = Evaluate(*cost, {{97.0, 4.25, 0.1}, {1.0, 0.0, 1.25}});
+  const auto result = Evaluate(*cost, {{97.0, 4.25, 0.0}, {1.0, -0.1, 1.25}});
   EXPECT_NEAR(result.residual[0], 0.6, 1e-14);  // 2 * 0.25 + 0.1
   EXPECT_NEAR(result.residual[1], 0.3, 1e-14);
-  // Row 0 of the error: (0, -1, 0) and (1, -3, -1), as turning the axis by a
-  // little lifts the segment, 3 m behind the anchor, off it; row 1: (0, 0, 1)
-  // and (0, -1, 0).
+  // Row 0 of the error: (0, -1, -3), as turning the segment by a little lifts
+  // its line 3 m before it, at the anchor, and (1, 0, -1); row 1: (0, 0, 1) and
+  // (0, -1, 0).
   Eigen::MatrixXd segment(2, 3);
-  segment << 0, -2, 1, 0, 0, 3;
+  segment << 0, -2, -6 + 1, 0, 0, 3;
   Eigen::MatrixXd corridor(2, 3);
-  corridor << 2, -6 - 1, -2, 0, -3, 0;
+  corridor << 2, -1, -2, 0, -3, 0;
   EXPECT_LT((result.jacobians[0] - segment).norm(), 1e-13);
   EXPECT_LT((result.jacobians[1] - corridor).norm(), 1e-13);
 }
@@ -59,14 +59,38 @@ TEST(SegmentCorridorTest, BothSides) {
                           double turn) {
     const Eigen::Vector2d error =
         CorridorError(segment, corridor, phi, Eigen::Vector2d::Zero());
-    EXPECT_NEAR(error[0], past, 1e-14) << phi;
+    EXPECT_NEAR(error[0], past, 1e-13) << phi;
     EXPECT_NEAR(error[1], turn, 1e-14) << phi;
   };
-  expect({3.5, 7.0, kPi / 2 + 0.1}, kRight, 0.5, 0.1);
-  expect({0.75, -9.0, -kPi / 2 - 0.2}, kLeft, 0.25, -0.2);
+  expect({3.5, 7.0, kPi / 2}, kRight, 0.5, 0.0);
+  expect({0.75, -9.0, -kPi / 2}, kLeft, 0.25, 0.0);
   expect({1.5, 0.0, -kPi / 2}, kLeft, -0.5, 0.0);
+  // Turned about the point beside the anchor, which then lies nearer to the
+  // line by the cosine.
+  expect({3.5, 0.0, kPi / 2 + 0.1}, kRight, 3.5 * std::cos(0.1) - 3.0, 0.1);
+  expect({-0.5, 0.0, -kPi / 2 - 0.2}, kLeft, 0.5 * std::cos(0.2) + 1.0, -0.2);
   // Seen from outside it is no side of the corridor.
-  expect({3.0, 0.0, -kPi / 2 + 0.1}, kRight, 0.0, -kPi + 0.1);
+  expect({3.0, 0.0, -kPi / 2 + 0.1}, kRight, -3.0 * std::cos(0.1) - 3.0,
+         -kPi + 0.1);
+}
+
+TEST(SegmentCorridorTest, WhereTheSegmentHasItsPositionDoesNotMatter) {
+  Random random(52);
+  for (int i = 0; i < 50; ++i) {
+    const double angle = random.Uniform(-kPi, kPi);
+    const Block segment = {random.Uniform(-9, 9), random.Uniform(-9, 9), angle};
+    const double step = random.Uniform(-50, 50);
+    const Block elsewhere = {segment[0] + step * std::cos(angle),
+                             segment[1] + step * std::sin(angle), angle};
+    const Block corridor = {random.Uniform(-2, 2), random.Uniform(-kPi, kPi),
+                            random.Uniform(0.5, 2)};
+    for (const double phi : {kRight, kLeft}) {
+      EXPECT_LT((CorridorError(segment, corridor, phi, {1.0, 2.0}) -
+                 CorridorError(elsewhere, corridor, phi, {1.0, 2.0}))
+                    .norm(),
+                1e-12);
+    }
+  }
 }
 
 TEST(SegmentCorridorTest, TheAxisMayRunEitherWay) {
@@ -142,42 +166,31 @@ TEST(SegmentCorridorTest, UnchangedWhenTheWorldMoves) {
   }
 }
 
-TEST(SegmentCorridorTest, UnchangedWhenTheAnchorMoves) {
-  const Block segment = {3.0, 4.0, 0.7};
-  const double alpha = 0.5;
-  const Eigen::Vector2d reference =
-      CorridorError(segment, {0.2, alpha, 1.0}, kRight, {1.0, 2.0});
-  const Eigen::Vector2d normal(-std::sin(alpha), std::cos(alpha));
-  const Eigen::Vector2d step(5.0, -3.0);
-  const Eigen::Vector2d moved =
-      CorridorError(segment, {0.2 - normal.dot(step), alpha, 1.0}, kRight,
-                    Eigen::Vector2d(1.0, 2.0) + step);
-  EXPECT_LT((moved - reference).norm(), 1e-13);
-}
-
-// What the information says of the point at the lever: an error of the offset
+// What the information says of the point so far along: an error of the offset
 // there of so many standard deviations costs the square of that, and so does
-// one of the direction, on either side.
+// one of the direction, on either side. Where the anchor is does not matter.
 TEST(SegmentCorridorTest, InformationCarriesTheLever) {
-  const double lever = 3.0;
-  const Eigen::Matrix2d information = CorridorInformation(0.1, 0.01, lever);
-  const Block corridor = {0.0, 0.3, 1.0};
-  for (const double phi : {kRight, kLeft}) {
-    for (const auto& [past, turn] :
-         {std::pair(0.2, 0.0), std::pair(0.0, 0.01), std::pair(0.1, -0.02)}) {
-      const double q = phi == kRight ? 1.0 : -1.0;
-      const Eigen::Vector2d outward(q * std::sin(0.3), -q * std::cos(0.3));
-      const double direction = 0.3 + phi + turn;
-      const Eigen::Vector2d at = (1.0 + past) * outward;
-      const Eigen::Vector2d position =
-          at -
-          lever * Eigen::Vector2d(std::cos(direction), std::sin(direction));
-      const Eigen::Vector2d error =
-          CorridorError({position.x(), position.y(), NormalizeAngle(direction)},
-                        corridor, phi, Eigen::Vector2d::Zero());
-      const double expected =
-          std::pow(past / 0.1, 2.0) + std::pow(turn / 0.01, 2.0);
-      EXPECT_NEAR(error.dot(information * error), expected, 1e-3);
+  const double angle = 0.3;
+  const Eigen::Vector2d axis(std::cos(angle), std::sin(angle));
+  for (const double along : {3.0, -4.0}) {
+    const Block corridor = {0.0, angle, 1.0};
+    for (const double phi : {kRight, kLeft}) {
+      const Eigen::Matrix2d information =
+          CorridorInformation(0.1, 0.01, phi, along);
+      for (const auto& [past, turn] :
+           {std::pair(0.2, 0.0), std::pair(0.0, 0.01), std::pair(0.1, -0.02)}) {
+        const double q = phi == kRight ? 1.0 : -1.0;
+        const Eigen::Vector2d outward(q * std::sin(angle),
+                                      -q * std::cos(angle));
+        const Eigen::Vector2d at = along * axis + (1.0 + past) * outward;
+        const Eigen::Vector2d error =
+            CorridorError({at.x(), at.y(), NormalizeAngle(angle + phi + turn)},
+                          corridor, phi, Eigen::Vector2d::Zero());
+        const double expected =
+            std::pow(past / 0.1, 2.0) + std::pow(turn / 0.01, 2.0);
+        EXPECT_NEAR(error.dot(information * error), expected,
+                    2e-3 * (1.0 + expected));
+      }
     }
   }
 }

@@ -94,6 +94,19 @@ TEST_F(BuildingFrameTest, FeaturesMoveAsTheirPointsDo) {
   const Feature direction = Moved(by, Make("orientation", {0.4}));
   EXPECT_NEAR(NormalizeAngle(direction.parameters[0] - 2.9), 0.0, 1e-12);
 
+  Feature corridor = Make("corridor", {0.5, 0.4, 1.1});
+  corridor.anchor = {1.0, -2.0};
+  const Feature moved_corridor = Moved(by, corridor);
+  EXPECT_LT(
+      (TransformPoint(moved_corridor.type->frame(moved_corridor), {3.0, 0.0}) -
+       TransformPoint(
+           by, TransformPoint(corridor.type->frame(corridor), {3.0, 0.0})))
+          .norm(),
+      1e-12);
+  EXPECT_EQ(moved_corridor.parameters[2], 1.1);
+
+  EXPECT_EQ(Moved(by, Make("thickness", {0.15})).parameters[0], 0.15);
+
   try {
     Moved(by, Make("end_points", {0.0, 0.0, 1.0, 1.0}));
     FAIL() << "end points were moved";

@@ -1,0 +1,461 @@
+#include <plumbline/frontend/peak_search.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <initializer_list>
+#include <tuple>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr int kLevels = 4;
+static_assert(kPeakPad == 1 << (kLevels - 1));
+constexpr double kMostScore = 255.0;
+// The error at the farthest point that a step of the rotation makes, m, and its
+// bounds, rad.
+constexpr double kRotationError = 0.15;
+constexpr double kLeastRotation = DegToRad(1.0);
+constexpr double kMostRotation = DegToRad(3.0);
+// Search nodes after which the search is given up, how many of the coarsest
+// ones, whose scores are added up together, count as one, and nodes between two
+// questions whether to stop: some hundredths of a second.
+constexpr int kMaxNodes = 3000000;
+constexpr std::int64_t kTogether = 4;
+constexpr int kNodesAtOnce = 20000;
+// One in so many rotations is looked at first.
+constexpr int kFewTurns = 8;
+
+// The coarsest scores in the order in which PeakSearch adds them up: those of
+// cells that are a node apart lie beside each other.
+class StridedScores {
+ public:
+  static constexpr int kStride = kPeakPad;
+
+  StridedScores(const std::vector<std::int16_t>& scores, int columns, int rows)
+      : columns_((columns + kStride - 1) / kStride),
+        rows_((rows + kStride - 1) / kStride),
+        scores_(static_cast<std::size_t>(columns_) * rows_ * kStride *
+                kStride) {
+    for (int y = 0; y < rows; ++y) {
+      const std::int16_t* from = &scores[static_cast<std::size_t>(y) * columns];
+      for (int first = 0; first < kStride; ++first) {
+        std::int16_t* to = &scores_[Begin(first, y % kStride, y / kStride)];
+        for (int x = first; x < columns; x += kStride) *to++ = from[x];
+      }
+    }
+  }
+
+  // Adds the scores of the cells (x + kStride * j, y) for j in [0, count).
+  void AddTo(int x, int y, int count, std::int32_t* sums) const {
+    const int row = FloorDivided(y);
+    if (row < 0 || row >= rows_) return;
+    const int column = FloorDivided(x);
+    const int begin = std::max(0, -column);
+    const int end = std::min(count, columns_ - column);
+    if (begin >= end) return;
+    const std::int16_t* scores =
+        &scores_[Begin(x - kStride * column, y - kStride * row, row) +
+                 static_cast<std::size_t>(column + begin)];
+    for (int j = begin; j < end; ++j) sums[j] += *scores++;
+  }
+
+ private:
+  static int FloorDivided(int x) {
+    return x >= 0 ? x / kStride : -((kStride - 1 - x) / kStride);
+  }
+  // Index of the first score of a row of those at (x, y) modulo kStride.
+  std::size_t Begin(int x, int y, int row) const {
+    return ((static_cast<std::size_t>(y) * kStride + x) * rows_ + row) *
+           columns_;
+  }
+
+  int columns_;
+  int rows_;
+  std::vector<std::int16_t> scores_;
+};
+
+// Branch and bound over translations and rotations of points on a grid.
+class PeakSearch {
+ public:
+  // `minimum_score`: the least of a peak, of a share of what all points on
+  // surfaces would have; `share`: of the best one's score.
+  PeakSearch(const PeakGrid& grid, const std::vector<Eigen::Vector2d>& points,
+             const Pose2& center, double translation_window,
+             double rotation_window, double minimum_score, double share)
+      : grid_(grid),
+        coarsest_(grid.levels.back(), grid.columns, grid.rows),
+        center_(center),
+        window_(
+            static_cast<int>(std::ceil(translation_window / grid.resolution))),
+        rotation_window_(rotation_window),
+        unit_(kMostScore * static_cast<double>(points.size())),
+        share_(share),
+        least_(minimum_score * unit_) {
+    double farthest = 1.0;
+    for (const Eigen::Vector2d& point : points) {
+      farthest = std::max(farthest, point.norm());
+    }
+    const double step =
+        std::clamp(kRotationError / farthest, kLeastRotation, kMostRotation);
+    rotations_ = static_cast<int>(std::ceil(rotation_window / step));
+    cells_.resize(2 * rotations_ + 1);
+    for (std::size_t k = 0; k < cells_.size(); ++k) {
+      cells_[k] = CellsAt(points, Angle(static_cast<int>(k)));
+    }
+  }
+
+  // Opens the coarsest nodes of the window that are within `reach`, m, of a
+  // viewpoint. Once `stop` has returned true there are none.
+  void OpenAll(double reach, const std::function<bool()>& stop) {
+    const std::vector<NodeRun> runs = NearNodes(reach);
+    std::int64_t count = 0;
+    for (const NodeRun& run : runs) count += run.count;
+    count *= static_cast<std::int64_t>(cells_.size());
+    nodes_ = std::min<std::int64_t>(count / kTogether, kMaxNodes);
+    if (nodes_ >= kMaxNodes) return;
+    // What some rotations lead to leaves little to open at the others.
+    for (const int step : {kFewTurns, 1}) {
+      open_.clear();
+      for (int k = 0; k < static_cast<int>(cells_.size()); k += step) {
+        if (stop && stop()) {
+          open_.clear();
+          return;
+        }
+        OpenRotation(k, runs);
+      }
+    }
+    const auto is_left = [this](const Node& node) {
+      return node.bound >= least_;
+    };
+    open_.erase(std::partition(open_.begin(), open_.end(), is_left),
+                open_.end());
+    std::make_heap(open_.begin(), open_.end());
+  }
+
+  // The peaks, best first, that have the share of the best one's score.
+  std::vector<ScoredPose> Run(int max_peaks,
+                              const std::function<bool()>& stop) {
+    std::vector<ScoredPose> peaks;
+    std::int64_t asked_at = nodes_;
+    while (!open_.empty() && static_cast<int>(peaks.size()) < max_peaks &&
+           nodes_ < kMaxNodes) {
+      if (stop && nodes_ - asked_at >= kNodesAtOnce) {
+        if (stop()) return {};
+        asked_at = nodes_;
+      }
+      std::pop_heap(open_.begin(), open_.end());
+      const Node node = open_.back();
+      open_.pop_back();
+      if (node.bound < least_) break;
+      if (IsBesideAny(node, peaks)) continue;
+      if (node.level == 0) {
+        if (peaks.empty()) Raise(node.bound);
+        peaks.push_back({PoseOf(node), node.bound / unit_});
+      } else {
+        Split(node);
+      }
+    }
+    return peaks;
+  }
+
+ private:
+  // Of the coarsest nodes, cells.
+  static constexpr int kStride = StridedScores::kStride;
+
+  struct Cell {
+    int x;
+    int y;
+  };
+  // Translations by [x, x + 2^level) and [y, y + 2^level) cells at one
+  // rotation; none of them scores more than `bound`.
+  struct Node {
+    int bound;
+    int level;
+    int rotation;
+    int x;
+    int y;
+    bool operator<(const Node& other) const {
+      return std::tie(bound, other.level, other.rotation, other.x, other.y) <
+             std::tie(other.bound, level, rotation, x, y);
+    }
+  };
+
+  double Angle(int rotation) const {
+    return center_[2] + (rotations_ > 0 ? (rotation - rotations_) *
+                                              (rotation_window_ / rotations_)
+                                        : 0.0);
+  }
+
+  Pose2 PoseOf(const Node& node) const {
+    return Pose2(center_[0] + node.x * grid_.resolution,
+                 center_[1] + node.y * grid_.resolution,
+                 NormalizeAngle(Angle(node.rotation)));
+  }
+
+  // Cells of the points, the pad included.
+  std::vector<Cell> CellsAt(const std::vector<Eigen::Vector2d>& points,
+                            double angle) const {
+    const double c = std::cos(angle) / grid_.resolution;
+    const double s = std::sin(angle) / grid_.resolution;
+    const Eigen::Vector2d shift =
+        (center_.head<2>() - grid_.origin) / grid_.resolution;
+    std::vector<Cell> cells;
+    cells.reserve(points.size());
+    for (const Eigen::Vector2d& point : points) {
+      const double x = shift.x() + c * point.x() - s * point.y();
+      const double y = shift.y() + s * point.x() + c * point.y();
+      cells.push_back({static_cast<int>(std::floor(x)) + kPeakPad,
+                       static_cast<int>(std::floor(y)) + kPeakPad});
+    }
+    return cells;
+  }
+
+  int Bound(int level, int rotation, int x, int y) const {
+    const std::vector<std::int16_t>& scores = grid_.levels[level];
+    const int columns = grid_.columns;
+    const int rows = grid_.rows;
+    int sum = 0;
+    for (const Cell& cell : cells_[rotation]) {
+      const int column = cell.x + x;
+      const int row = cell.y + y;
+      if (static_cast<unsigned>(column) < static_cast<unsigned>(columns) &&
+          static_cast<unsigned>(row) < static_cast<unsigned>(rows)) {
+        sum += scores[static_cast<std::size_t>(row) * columns + column];
+      }
+    }
+    return sum;
+  }
+
+  // No peak has less than its share of what some pose has.
+  void Raise(int score) { least_ = std::max(least_, share_ * score); }
+
+  // Nodes at the corners (x + kStride * j, y), j in [0, count).
+  struct NodeRun {
+    int x;
+    int y;
+    int count;
+  };
+
+  // Opens those of the nodes at a rotation that may hold a peak, and goes from
+  // the best of them down to a pose.
+  void OpenRotation(int rotation, const std::vector<NodeRun>& runs) {
+    Node best{0, kLevels - 1, rotation, 0, 0};
+    for (const NodeRun& run : runs) {
+      sums_.assign(static_cast<std::size_t>(run.count), 0);
+      for (const Cell& cell : cells_[rotation]) {
+        coarsest_.AddTo(cell.x + run.x, cell.y + run.y, run.count,
+                        sums_.data());
+      }
+      for (int j = 0; j < run.count; ++j) {
+        const int bound = sums_[static_cast<std::size_t>(j)];
+        if (bound < least_ || bound <= 0) continue;
+        const Node node{bound, kLevels - 1, rotation, run.x + kStride * j,
+                        run.y};
+        open_.push_back(node);
+        if (best < node) best = node;
+      }
+    }
+    while (best.bound > 0 && best.level > 0) best = BestPart(best);
+    Raise(best.bound);
+  }
+
+  // Calls `visit(x, y)` with the four parts of a node that are in the window.
+  template <typename Visit>
+  void VisitParts(const Node& node, const Visit& visit) const {
+    const int half = 1 << (node.level - 1);
+    for (int y = node.y; y <= std::min(node.y + half, window_); y += half) {
+      for (int x = node.x; x <= std::min(node.x + half, window_); x += half) {
+        visit(x, y);
+      }
+    }
+  }
+
+  Node BestPart(const Node& node) const {
+    Node best{0, node.level - 1, node.rotation, node.x, node.y};
+    VisitParts(node, [&](int x, int y) {
+      const int bound = Bound(best.level, node.rotation, x, y);
+      if (bound > best.bound) best = {bound, best.level, node.rotation, x, y};
+    });
+    return best;
+  }
+
+  void Split(const Node& node) {
+    const int level = node.level - 1;
+    VisitParts(node, [&](int x, int y) {
+      ++nodes_;
+      const int bound = Bound(level, node.rotation, x, y);
+      if (bound < least_ || bound <= 0) return;
+      open_.push_back({bound, level, node.rotation, x, y});
+      std::push_heap(open_.begin(), open_.end());
+    });
+  }
+
+  // Coarsest nodes along an axis, [begin, end): from -window_ on in steps.
+  struct NodeRange {
+    int begin;
+    int end;
+    std::size_t size() const {
+      return static_cast<std::size_t>(std::max(0, end - begin));
+    }
+  };
+
+  // Those that bring some point onto the grid, of so many cells.
+  NodeRange NodesOnGrid(int Cell::*axis, int size) const {
+    int low = std::numeric_limits<int>::max();
+    int high = std::numeric_limits<int>::lowest();
+    for (const std::vector<Cell>& cells : cells_) {
+      for (const Cell& cell : cells) {
+        low = std::min(low, cell.*axis);
+        high = std::max(high, cell.*axis);
+      }
+    }
+    const std::int64_t first =
+        std::max<std::int64_t>(0, std::int64_t{window_} - high + kStride - 1);
+    const std::int64_t last =
+        window_ + std::min<std::int64_t>(window_, std::int64_t{size} - 1 - low);
+    if (last < 0) return {0, 0};
+    return {static_cast<int>(first / kStride),
+            static_cast<int>(last / kStride + 1)};
+  }
+
+  // The coarsest nodes of which some pose may be within reach, m, of a
+  // viewpoint.
+  std::vector<NodeRun> NearNodes(double reach) const {
+    // Where no point is on the grid no pose has a score.
+    const NodeRange columns = NodesOnGrid(&Cell::x, grid_.columns);
+    const NodeRange rows = NodesOnGrid(&Cell::y, grid_.rows);
+    const std::vector<char> is_near = AreNear(reach, columns, rows);
+    std::vector<NodeRun> runs;
+    std::size_t node = 0;
+    for (int i = rows.begin; i < rows.end; ++i) {
+      bool was_near = false;
+      for (int j = columns.begin; j < columns.end; ++j) {
+        const bool now = is_near[node++] != 0;
+        if (now && !was_near) {
+          runs.push_back({j * kStride - window_, i * kStride - window_, 0});
+        }
+        if (now) ++runs.back().count;
+        was_near = now;
+      }
+    }
+    return runs;
+  }
+
+  // By node, a row of columns after the other: whether some pose of it may be
+  // within reach, m, of a viewpoint.
+  std::vector<char> AreNear(double reach, const NodeRange& columns,
+                            const NodeRange& rows) const {
+    std::vector<char> is_near(columns.size() * rows.size(),
+                              std::isfinite(reach) ? 0 : 1);
+    if (is_near.empty() || !std::isfinite(reach)) return is_near;
+    const double size = kStride * grid_.resolution;
+    const auto middle = [&](int node, int axis) {
+      return center_[axis] +
+             (node * kStride - window_ + 0.5 * kStride) * grid_.resolution;
+    };
+    // From the middle of a node its corners are so far.
+    const double radius = reach + std::sqrt(0.5) * size;
+    const auto clamped = [](double node, const NodeRange& range) {
+      return static_cast<int>(std::clamp<double>(node, range.begin, range.end));
+    };
+    for (const Viewpoint& viewpoint : grid_.viewpoints) {
+      const Eigen::Vector2d at =
+          (viewpoint.position - Eigen::Vector2d(middle(0, 0), middle(0, 1))) /
+          size;
+      const double far = radius / size + 1.0;
+      const int last_row = clamped(at.y() + far, rows);
+      const int last_column = clamped(at.x() + far, columns);
+      for (int i = clamped(at.y() - far, rows); i < last_row; ++i) {
+        for (int j = clamped(at.x() - far, columns); j < last_column; ++j) {
+          const Eigen::Vector2d node(middle(j, 0), middle(i, 1));
+          if ((viewpoint.position - node).norm() <= radius) {
+            is_near[static_cast<std::size_t>(i - rows.begin) * columns.size() +
+                    static_cast<std::size_t>(j - columns.begin)] = 1;
+          }
+        }
+      }
+    }
+    return is_near;
+  }
+
+  // Whether all of the node lies beside one of the peaks.
+  bool IsBesideAny(const Node& node,
+                   const std::vector<ScoredPose>& peaks) const {
+    const double heading = Angle(node.rotation);
+    const double size = ((1 << node.level) - 1) * grid_.resolution;
+    return std::any_of(peaks.begin(), peaks.end(), [&](const ScoredPose& peak) {
+      const double dx = center_[0] + node.x * grid_.resolution - peak.pose[0];
+      const double dy = center_[1] + node.y * grid_.resolution - peak.pose[1];
+      return std::abs(NormalizeAngle(heading - peak.pose[2])) <
+                 ScanMatcher::kPeakRotation &&
+             std::hypot(std::max(std::abs(dx), std::abs(dx + size)),
+                        std::max(std::abs(dy), std::abs(dy + size))) <
+                 ScanMatcher::kPeakDistance;
+    });
+  }
+
+  const PeakGrid& grid_;
+  const StridedScores coarsest_;
+  const Pose2 center_;
+  // Cells each way.
+  const int window_;
+  const double rotation_window_;
+  // The largest sum of scores.
+  const double unit_;
+  const double share_;
+  double least_;
+  // Each way.
+  int rotations_ = 0;
+  // By rotation.
+  std::vector<std::vector<Cell>> cells_;
+  // A heap once all are open.
+  std::vector<Node> open_;
+  std::int64_t nodes_ = 0;
+  // Of OpenRotation, kept for its memory.
+  std::vector<std::int32_t> sums_;
+};
+
+}  // namespace
+
+std::vector<std::vector<std::int16_t>> ScoreLevels(
+    std::vector<std::int16_t> scores, int columns, int rows) {
+  std::vector<std::vector<std::int16_t>> levels(kLevels);
+  levels[0] = std::move(scores);
+  for (int level = 1; level < kLevels; ++level) {
+    const std::vector<std::int16_t>& finer = levels[level - 1];
+    std::vector<std::int16_t>& best = levels[level];
+    best.resize(finer.size());
+    const int half = 1 << (level - 1);
+    // Beyond the grid nothing is known.
+    const std::vector<std::int16_t> beyond(static_cast<std::size_t>(columns),
+                                           0);
+    std::vector<std::int16_t> both(static_cast<std::size_t>(columns + half), 0);
+    for (int y = 0; y < rows; ++y) {
+      const std::int16_t* const upper =
+          &finer[static_cast<std::size_t>(y) * columns];
+      const std::int16_t* const lower =
+          y + half < rows ? &finer[static_cast<std::size_t>(y + half) * columns]
+                          : beyond.data();
+      for (int x = 0; x < columns; ++x) both[x] = std::max(upper[x], lower[x]);
+      std::int16_t* const row = &best[static_cast<std::size_t>(y) * columns];
+      for (int x = 0; x < columns; ++x) {
+        row[x] = std::max(both[x], both[x + half]);
+      }
+    }
+  }
+  return levels;
+}
+
+std::vector<ScoredPose> FindPeaks(
+    const PeakGrid& grid, const std::vector<Eigen::Vector2d>& points,
+    const Pose2& center, double translation_window, double rotation_window,
+    const PeakOptions& options, const std::function<bool()>& stop) {
+  PeakSearch search(grid, points, center, translation_window, rotation_window,
+                    options.minimum_score, options.share);
+  search.OpenAll(options.reach, stop);
+  return search.Run(options.max_peaks, stop);
+}
+
+}  // namespace plumbline

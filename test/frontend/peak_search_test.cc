@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/frontend/peak_search.h>
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+TEST(ScoreLevelsTest, EachLevelHasTheBestOfTwiceAsManyCellsEachWay) {
+  // One row of scores with the pad before it, and rows of the pad above.
+  const int columns = kPeakPad + 8;
+  const int rows = kPeakPad + 1;
+  std::vector<std::int16_t> scores(columns * rows, 0);
+  scores[kPeakPad * columns + kPeakPad + 2] = 90;
+  scores[kPeakPad * columns + kPeakPad + 5] = 40;
+  scores[kPeakPad * columns + kPeakPad + 7] = -128;
+  const auto levels = ScoreLevels(scores, columns, rows);
+  ASSERT_EQ(levels.size(), 4u);
+  EXPECT_EQ(levels[0], scores);
+  const auto at = [&](int level, int x, int y) {
+    return levels[level][(kPeakPad + y) * columns + kPeakPad + x];
+  };
+  EXPECT_EQ(at(1, 1, 0), 90);
+  EXPECT_EQ(at(1, 2, 0), 90);
+  EXPECT_EQ(at(1, 3, 0), 0);
+  EXPECT_EQ(at(1, 4, -1), 40);
+  EXPECT_EQ(at(2, 3, 0), 40);
+  EXPECT_EQ(at(3, 0, -7), 90);
+  EXPECT_EQ(at(3, 3, 0), 40);
+  // Beyond the grid nothing is known, which is better than seen through.
+  EXPECT_EQ(at(1, 7, 0), 0);
+}
+
+// A corner of walls at x = 30 and y = 20 cells, and the same corner once more
+// 25 cells further up.
+class FindPeaksTest : public ::testing::Test {
+ protected:
+  FindPeaksTest() {
+    std::vector<std::int16_t> scores(kColumns * kRows, 0);
+    for (int i = 0; i < 12; ++i) {
+      for (const int y : {20, 45}) {
+        At(30, y + i, &scores) = 255;
+        At(30 - i, y, &scores) = 255;
+      }
+    }
+    // The second one is not quite as good.
+    At(30, 50, &scores) = 0;
+    levels_ = ScoreLevels(scores, kColumns, kRows);
+    for (int i = 0; i < 12; ++i) {
+      points_.emplace_back(1.05, -0.95 + 0.1 * i);
+      points_.emplace_back(1.05 - 0.1 * i, -0.95);
+    }
+    Viewpoint viewpoint;
+    viewpoint.position = {2.0, 3.0};
+    viewpoints_ = {viewpoint};
+  }
+
+  static std::int16_t& At(int x, int y, std::vector<std::int16_t>* scores) {
+    return (*scores)[(y + kPeakPad) * kColumns + x + kPeakPad];
+  }
+
+  std::vector<ScoredPose> Find(const PeakOptions& options,
+                               const std::function<bool()>& stop = nullptr) {
+    const PeakGrid grid{levels_, kColumns, kRows, {0.0, 0.0}, 0.1, viewpoints_};
+    return FindPeaks(grid, points_, Pose2(2.3, 3.4, 0.0), 3.0, DegToRad(20.0),
+                     options, stop);
+  }
+
+  static constexpr int kColumns = 70 + kPeakPad;
+  static constexpr int kRows = 80 + kPeakPad;
+  std::vector<std::vector<std::int16_t>> levels_;
+  std::vector<Eigen::Vector2d> points_;
+  std::vector<Viewpoint> viewpoints_;
+};
+
+TEST_F(FindPeaksTest, BestFirst) {
+  const std::vector<ScoredPose> peaks = Find({0.5, 0.8, 4, 10.0});
+  ASSERT_GE(peaks.size(), 2u);
+  EXPECT_DOUBLE_EQ(peaks[0].score, 1.0);
+  EXPECT_NEAR(peaks[0].pose[0], 2.0, 0.051);
+  EXPECT_NEAR(peaks[0].pose[1], 3.0, 0.051);
+  EXPECT_NEAR(peaks[0].pose[2], 0.0, DegToRad(1.0));
+  EXPECT_NEAR(peaks[1].pose[0], 2.0, 0.051);
+  EXPECT_NEAR(peaks[1].pose[1], 5.5, 0.051);
+  EXPECT_LT(peaks[1].score, 1.0);
+}
+
+TEST_F(FindPeaksTest, LimitsOfPeaks) {
+  EXPECT_EQ(Find({0.5, 0.8, 1, 10.0}).size(), 1u);
+  // Only the best one is as good as the best one.
+  EXPECT_EQ(Find({0.5, 1.0, 4, 10.0}).size(), 1u);
+  EXPECT_TRUE(Find({1.1, 0.8, 4, 10.0}).empty());
+  // The second one is 2.5 m from where anything was seen.
+  EXPECT_EQ(Find({0.5, 0.8, 4, 1.0}).size(), 1u);
+  EXPECT_TRUE(Find({0.5, 0.8, 4, 10.0}, [] { return true; }).empty());
+}
+
+}  // namespace
+}  // namespace plumbline

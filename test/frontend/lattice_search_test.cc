@@ -2,6 +2,7 @@
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/lattice_search.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

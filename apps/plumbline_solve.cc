@@ -1000,6 +1000,8 @@ std::vector<Summary::LogInput> DescribeLogs(
     log.parts = placement.windows;
     log.agreeing = placement.agreeing;
     log.contradicting = placement.contradicting;
+    log.changed_places =
+        placement.walls_through_map + placement.walls_through_track;
     if (!placement.found && in_map.map > 0) log.why_apart = placement.why_not;
     if (placement.found) {
       Remark(
@@ -1007,6 +1009,13 @@ std::vector<Summary::LogInput> DescribeLogs(
           "%.2f m; %d contradict it",
           log.input.c_str(), log.agreeing, log.parts, placement.misfit,
           log.contradicting);
+      if (log.changed_places > 0) {
+        Remark(
+            "%s: at %d place%s one has wall where the other looks through: "
+            "doors were opened or shut, or it is another building",
+            log.input.c_str(), log.changed_places,
+            log.changed_places > 1 ? "s" : "");
+      }
     } else if (!log.why_apart.empty()) {
       Remark("%s: kept apart, in %s: %s", log.input.c_str(),
              (std::filesystem::path(FLAGS_output_dir) / log.map).c_str(),

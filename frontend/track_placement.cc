@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <set>
 #include <string>
 #include <utility>
@@ -44,6 +45,10 @@ constexpr double kLeastKnown = 0.4;
 constexpr double kStretchRange = 8.0;
 constexpr double kStretchGap = 0.3;
 constexpr double kSameStretch = 0.7;
+// A surface is looked through where it is free this far on either side, m, and
+// what is left of a piece in the end has at least this length, m.
+constexpr double kThroughWall = 0.15;
+constexpr double kLeastPiece = 0.1;
 // Position and direction of a window, m and rad, in the fit of the track.
 constexpr double kWindowDistance = 0.1;
 constexpr double kWindowTurn = DegToRad(1.0);
@@ -218,14 +223,32 @@ struct Stretch {
   double length = 0.0;
 };
 
+// Which points of a view lie where the matcher's reference looks through the
+// surface: it is free there and on both sides. A beam along a wall is free
+// beside it, and a little off the wall seems to be in it.
+std::vector<bool> LookedThrough(const ScanMatcher& matcher, const KeyView& view,
+                                const Pose2& pose) {
+  std::vector<bool> through;
+  matcher.Compare(view.points, pose, view.laser, &through);
+  for (const double side : {-kThroughWall, kThroughWall}) {
+    std::vector<ScanPoint> beside = view.points;
+    for (ScanPoint& point : beside) point.position += side * point.normal;
+    std::vector<bool> free;
+    matcher.Compare(beside, pose, view.laser, &free);
+    for (std::size_t i = 0; i < through.size(); ++i) {
+      through[i] = through[i] && free[i];
+    }
+  }
+  return through;
+}
+
 // Appends the stretches that a view sees and that the matcher's reference looks
 // through. `pose`: of the view in the reference's frame, `reference`: of that
 // in the map's.
 void AppendStretches(const ScanMatcher& matcher, const KeyView& view,
                      std::size_t index, const Pose2& pose,
                      const Pose2& reference, std::vector<Stretch>* stretches) {
-  std::vector<bool> intrudes;
-  matcher.Compare(view.points, pose, view.laser, &intrudes);
+  const std::vector<bool> intrudes = LookedThrough(matcher, view, pose);
   const PoseTransform transform(Compose(reference, pose));
   // Legs and the like have no normal.
   const auto is_part = [&](std::size_t i) {
@@ -262,29 +285,50 @@ KeyView NearPart(KeyView view) {
   return view;
 }
 
-// Length of the longest stretch of wall that two scans of one of both see and
-// that the other looks through, m.
-double LongestStretch(const std::vector<Stretch>& stretches) {
-  double longest = 0.0;
+// Lengths of the pieces of wall that two scans of one of both see and that the
+// other looks through, m: of each the shorter view, the longest first.
+std::vector<double> PiecesOf(std::vector<Stretch> stretches) {
+  std::stable_sort(
+      stretches.begin(), stretches.end(),
+      [](const Stretch& a, const Stretch& b) { return a.length > b.length; });
+  std::vector<const Stretch*> taken;
+  std::vector<double> pieces;
   for (const Stretch& a : stretches) {
+    const bool is_known =
+        std::any_of(taken.begin(), taken.end(), [&a](const Stretch* other) {
+          return (other->middle - a.middle).norm() <
+                 std::max(kSameStretch, 0.5 * (other->length + a.length));
+        });
+    if (is_known) continue;
+    double length = 0.0;
     for (const Stretch& b : stretches) {
-      if (a.view == b.view || b.length < longest || a.length < b.length ||
+      if (b.view == a.view || b.length > a.length ||
           (a.middle - b.middle).norm() > kSameStretch) {
         continue;
       }
-      longest = b.length;
+      length = std::max(length, b.length);
     }
+    if (length < kLeastPiece) continue;
+    taken.push_back(&a);
+    pieces.push_back(length);
   }
-  return longest;
+  std::sort(pieces.begin(), pieces.end(), std::greater<double>());
+  return pieces;
 }
 
-// The same for what the windows that agree with a map say of it and the map
-// says of them.
-double ContradictingStretch(const std::vector<KeyView>& map,
-                            const std::vector<KeyView>& track,
-                            const std::vector<Window>& windows,
-                            const std::vector<Judgement>& judgements,
-                            const TrackPlacementOptions& options) {
+// What stands where the other looks through, m, of what the track has and of
+// what the map has.
+struct Contradictions {
+  std::vector<double> of_track;
+  std::vector<double> of_map;
+};
+
+// What the windows that agree with a map say of it and the map says of them.
+Contradictions FindContradictions(const std::vector<KeyView>& map,
+                                  const std::vector<KeyView>& track,
+                                  const std::vector<Window>& windows,
+                                  const std::vector<Judgement>& judgements,
+                                  const TrackPlacementOptions& options) {
   // Those that the track has and those that the map has.
   std::vector<Stretch> of_track;
   std::vector<Stretch> of_map;
@@ -313,7 +357,7 @@ double ContradictingStretch(const std::vector<KeyView>& map,
                       Between(pose, there[k].pose), pose, &of_map);
     }
   }
-  return std::max(LongestStretch(of_track), LongestStretch(of_map));
+  return {PiecesOf(std::move(of_track)), PiecesOf(std::move(of_map))};
 }
 
 // Pose of the track's frame in the map's that suits windows which agree best:
@@ -533,7 +577,7 @@ class Search {
       placement.rival = std::max(placement.rival, rival.support());
     }
     placement.misfit = Misfit(*best);
-    placement.why_not = WhyNot(*best, placement);
+    placement.why_not = WhyNot(*best, &placement);
     placement.found = placement.why_not.empty();
     if (placement.found) TakeTie(*best, &placement);
     return placement;
@@ -568,8 +612,7 @@ class Search {
   }
 
   // Nothing when it is its place.
-  std::string WhyNot(const Candidate& best,
-                     const TrackPlacement& placement) const {
+  std::string WhyNot(const Candidate& best, TrackPlacement* placement) const {
     const int least =
         start_ ? options_.min_agreeing_at_start : options_.min_agreeing;
     const auto parts = [](int number) {
@@ -584,13 +627,13 @@ class Search {
       return "where " + parts(best.agreeing) + " of it would fit, " +
              parts(best.contradicting) + " would contradict";
     }
-    if (placement.rival > options_.rival_share * best.support()) {
+    if (placement->rival > options_.rival_share * best.support()) {
       return "it would fit in more than one place";
     }
-    if (placement.misfit >
+    if (placement->misfit >
         options_.max_misfit + options_.max_misfit_per_metre * Spread(best)) {
       return "its parts fit, but not together: they lie " +
-             ShortText(placement.misfit) + " m (RMS) from where it has them";
+             ShortText(placement->misfit) + " m (RMS) from where it has them";
     }
     Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
     for (const Judgement& judgement : best.judgements) {
@@ -601,12 +644,36 @@ class Search {
         options_.min_information_share * solver.eigenvalues()[1]) {
       return "it could be moved along the walls that it shares with the map";
     }
-    const double stretch =
-        ContradictingStretch(map_, track_, windows_, best.judgements, options_);
-    if (stretch > options_.max_contradicting_stretch) {
+    const Contradictions contradictions =
+        FindContradictions(map_, track_, windows_, best.judgements, options_);
+    placement->walls_through_map =
+        static_cast<int>(contradictions.of_track.size());
+    placement->walls_through_track =
+        static_cast<int>(contradictions.of_map.size());
+    double longest = 0.0;
+    for (const auto* pieces :
+         {&contradictions.of_track, &contradictions.of_map}) {
+      for (const double piece : *pieces) {
+        longest = std::max(longest, piece);
+        placement->contradicting_length += piece;
+      }
+    }
+    if (longest > options_.max_contradicting_stretch) {
       return "where " + parts(best.agreeing) +
-             " of it would fit, one of both has " + ShortText(stretch) +
+             " of it would fit, one of both has " + ShortText(longest) +
              " m of wall where the other has none";
+    }
+    const int both_ways =
+        std::min(placement->walls_through_map, placement->walls_through_track);
+    if (both_ways >= options_.min_exchanged &&
+        both_ways > options_.max_exchanged_share * best.agreeing) {
+      return "where " + parts(best.agreeing) +
+             " of it would fit, it has wall at " +
+             std::to_string(placement->walls_through_map) +
+             " places where the map has openings, and openings at " +
+             std::to_string(placement->walls_through_track) +
+             " places where the map has wall, as a mirror image of the "
+             "building has";
     }
     return "";
   }

@@ -84,6 +84,12 @@ struct TrackPlacementOptions {
   /// moved, but walls of over 1.7 m are not. Corridors of two buildings may
   /// agree wherever both were seen, but for the mouth of a wing.
   double max_contradicting_stretch = 1.1;
+  /// Shorter pieces are doors that were opened or shut, but where walls stand
+  /// in openings of the map and the map's walls in openings of the track, it is
+  /// another building, as its own mirror image is: both happen at this many
+  /// places at least, and at more than this share of the agreeing windows.
+  int min_exchanged = 3;
+  double max_exchanged_share = 0.15;
   /// With a start that somebody gave: windows that have to agree, and how far
   /// from it the track may start, m and rad.
   int min_agreeing_at_start = 1;
@@ -112,6 +118,12 @@ struct TrackPlacement {
   double rival = 0.0;
   /// How far the agreeing windows lie from where `pose` puts them: the RMS, m.
   double misfit = 0.0;
+  /// Pieces of wall of the track that the map looks through, those of the map
+  /// that the track looks through, and the length of all, m, without the 0.3 m
+  /// at either end: doors that were opened or shut, or another building.
+  int walls_through_map = 0;
+  int walls_through_track = 0;
+  double contradicting_length = 0.0;
   /// The views, of the map and of the track, between which the tie is best.
   int from = 0;
   int to = 0;

@@ -169,6 +169,7 @@ Json LogToJson(const Summary::LogInput& log) {
           {"parts", log.parts},
           {"agreeing", log.agreeing},
           {"contradicting", log.contradicting},
+          {"changed_places", log.changed_places},
           {"why_apart",
            log.why_apart.empty() ? Json(nullptr) : Json(log.why_apart)}};
 }

@@ -163,6 +163,8 @@ struct Summary {
     int parts = 0;
     int agreeing = 0;
     int contradicting = 0;
+    /// Where it or the rest of the map has wall that the other looks through.
+    int changed_places = 0;
     /// Why it was kept apart; empty when it was not.
     std::string why_apart;
   };
@@ -205,8 +207,9 @@ std::string CountsAsJson(const Summary& summary);
 /// format, scans, odometry (names; of logs that tell), notes [text]}, tracking
 /// {pieces, loose [{begin, end, why}]}, where the outputs were moved alignment
 /// {kind, x, y, theta_deg} (m and degrees), and where there were several logs
-/// [{input, trajectory, scans, map, parts, agreeing, contradicting, why_apart
-/// (or null)}]. Numbers that are not finite become null.
+/// [{input, trajectory, scans, map, parts, agreeing, contradicting,
+/// changed_places, why_apart (or null)}]. Numbers that are not finite become
+/// null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// Writes it to a file, whole or not at all. Throws Error when it cannot be

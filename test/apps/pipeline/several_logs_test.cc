@@ -1,4 +1,7 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <plumbline/apps/simulation/simulator.h>
+#include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>
 #include <plumbline/detectors/builtins.h>
@@ -13,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -162,6 +166,78 @@ TEST_F(SeveralLogsTest, AMirrorImageIsKeptApart) {
   EXPECT_EQ(result.maps.size(), 2u);
   EXPECT_FALSE(result.logs[1].placement.found);
   EXPECT_FALSE(result.logs[1].placement.why_not.empty());
+}
+
+// Rooms along both sides of a corridor. Those of one side are the mirror images
+// of those of the other, but for the doors of the last ones, which stand 1.5 m
+// farther on in the rooms below.
+Log RowsOfRooms(int moved_doors, std::uint64_t seed) {
+  const double ends[] = {0.0, 5.0, 12.0, 18.0, 23.5, 30.0, 36.0};
+  std::ostringstream walls;
+  const auto wall = [&walls](double x1, double y1, double x2, double y2) {
+    walls << "wall " << x1 << ' ' << y1 << ' ' << x2 << ' ' << y2 << " 0.12\n";
+  };
+  wall(0.0, -6.1, 0.0, 6.1);
+  wall(36.0, -6.1, 36.0, 6.1);
+  std::ostringstream path;
+  path << "path 1 0";
+  double from[] = {0.0, 0.0};
+  for (int room = 0; room < 6; ++room) {
+    for (const int row : {0, 1}) {
+      const double side = row == 0 ? 1.0 : -1.0;
+      const double moved = row == 1 && room >= 6 - moved_doors ? 1.5 : 0.0;
+      const double door = ends[room] + 1.6 + 0.3 * room + moved;
+      wall(from[row], 1.1 * side, door - 0.45, 1.1 * side);
+      from[row] = door + 0.45;
+      if (room > 0) wall(ends[room], 1.1 * side, ends[room], 6.1 * side);
+      const double shelf = (5.5 - 0.1 * room) * side;
+      wall(ends[room] + 0.5, shelf, ends[room] + 1.5 + 0.2 * room, shelf);
+      if (room % 2 != 0) continue;
+      // Into the room and back.
+      const double middle = 0.5 * (ends[room] + ends[room + 1]);
+      const double way[][2] = {
+          {door, 0.0}, {door, 2.6}, {middle, 3.6}, {door, 2.6}, {door, 0.0}};
+      for (const auto& point : way) {
+        path << ' ' << point[0] << ' ' << point[1] * side;
+      }
+    }
+  }
+  for (const int row : {0, 1}) {
+    const double side = row == 0 ? 1.0 : -1.0;
+    wall(from[row], 1.1 * side, 36.0, 1.1 * side);
+    wall(0.0, 6.1 * side, 36.0, 6.1 * side);
+  }
+  std::istringstream world(walls.str() + path.str() + " 35 0\n");
+  const SimulatorOptions options;
+  std::ostringstream log;
+  WriteCarmenLog(Simulate(ReadWorld(world, "rows"), options, seed),
+                 options.laser, {}, log);
+  InputStream input("rows", log.str());
+  return ReadCarmenLog(&input, {});
+}
+
+// What differs is nowhere wider than a door.
+TEST_F(SeveralLogsTest, AMirrorImageWithOtherDoorsIsKeptApart) {
+  const SeveralLogsResult result = SolveSeveralLogs(
+      registry_, {RowsOfRooms(3, 1), Mirrored(RowsOfRooms(3, 2))}, {});
+  EXPECT_EQ(result.maps.size(), 2u);
+  EXPECT_THAT(result.logs[1].placement.why_not,
+              ::testing::HasSubstr("mirror image"));
+}
+
+// One door may as well have been shut and another one opened: that is told.
+TEST_F(SeveralLogsTest, OneOtherDoorIsTold) {
+  const SeveralLogsResult same =
+      SolveSeveralLogs(registry_, {RowsOfRooms(1, 1), RowsOfRooms(1, 2)}, {});
+  ASSERT_EQ(same.maps.size(), 1u);
+  EXPECT_EQ(same.logs[1].placement.walls_through_map, 0);
+  EXPECT_EQ(same.logs[1].placement.walls_through_track, 0);
+  const SeveralLogsResult other = SolveSeveralLogs(
+      registry_, {RowsOfRooms(1, 1), Mirrored(RowsOfRooms(1, 2))}, {});
+  ASSERT_EQ(other.maps.size(), 1u);
+  const TrackPlacement& placement = other.logs[1].placement;
+  EXPECT_GT(placement.walls_through_map + placement.walls_through_track, 0);
+  EXPECT_GT(placement.contradicting_length, 0.0);
 }
 
 TEST_F(SeveralLogsTest, AWrongStartKeepsALogApart) {

@@ -108,8 +108,9 @@ echo "{\"y\": $((x * x)).$seed, \"input\": \"i\"}" > $out/summary.json
     return count;
   }
 
+  // Up to 5 minutes: binaries under sanitizers are slow.
   static bool WaitFor(const std::function<bool()>& condition) {
-    for (int i = 0; i < 3000; ++i) {
+    for (int i = 0; i < 30000; ++i) {
       if (condition()) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }

@@ -8,6 +8,7 @@
 #include <plumbline/detectors/orientation_relation.h>
 #include <plumbline/detectors/rectangle.h>
 #include <plumbline/detectors/same_wall.h>
+#include <plumbline/detectors/wall_thickness.h>
 
 #include <utility>
 
@@ -17,7 +18,8 @@ void RegisterBuiltinDetectors(Registry* registry) {
   for (DetectorType type :
        {CenterClusterType(), CircleCenterType(), CircleRansacType(),
         CorridorType(), LineRansacType(), OrientationMixtureType(),
-        OrientationRelationType(), RectangleType(), SameWallType()}) {
+        OrientationRelationType(), RectangleType(), SameWallType(),
+        WallThicknessType()}) {
     if (registry->FindDetector(type.name) == nullptr) {
       registry->Register(std::move(type));
     }

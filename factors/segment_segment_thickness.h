@@ -33,7 +33,9 @@ namespace plumbline {
 ///               that are seen from the same side are none of a wall. Far apart
 ///               along the wall the two rows depend on each other: L has to
 ///               carry the lever (CollinearityInformation with the distance
-///               from the second face's position along its direction)
+///               from the second face's position along its direction). Where
+///               nothing holds the second face's position along its line, it
+///               slides until f0 fits, however little the two are turned
 ///   source:     ours
 class SegmentSegmentThickness {
  public:

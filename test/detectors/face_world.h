@@ -129,6 +129,16 @@ class FaceWorld {
     transaction.AddConstraint(
         MakeMeasurement(registry_.GetRelation("pose_segment_collinearity"),
                         {pose, face}, seen, covariance.inverse(), "test"));
+    // Where along its line a face has its position is a choice: the first pose
+    // that sees it holds it there.
+    if (graph_.ConstraintsOf(face).empty()) {
+      const Pose2 relative = Between(robot, wall);
+      const Eigen::Vector3d line(std::cos(relative[2]), std::sin(relative[2]),
+                                 0.0);
+      transaction.AddConstraint(MakeMeasurement(
+          registry_.GetRelation("pose_pose"), {pose, face}, relative,
+          line * line.transpose() / (0.01 * 0.01), "test"));
+    }
     graph_.Apply(std::move(transaction));
   }
 

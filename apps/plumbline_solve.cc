@@ -1379,6 +1379,7 @@ int Run() {
                  "--help\n");
     return kExitUsage;
   }
+  RefuseFlagsWithoutEffect();
   // Wrong lists are refused before the work.
   ForFlag("outputs", [&] { SelectOutputs(FLAGS_outputs, registry); });
   if (ParseMarginalsSelection(FLAGS_marginals, registry).empty() &&

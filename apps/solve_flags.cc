@@ -611,9 +611,28 @@ std::vector<std::string> InputsFromFlags() {
   return names;
 }
 
+void RefuseFlagsWithoutEffect() {
+  const auto needs = [](const char* flag, bool has_needed, const char* needed) {
+    const gflags::CommandLineFlagInfo info =
+        gflags::GetCommandLineFlagInfoOrDie(flag);
+    if (has_needed || info.current_value == info.default_value) return;
+    throw Error("--" + std::string(flag), 0, "has no effect here",
+                std::string(needed) + " with it");
+  };
+  for (const char* flag : {"plan_layers", "plan_pose", "plan_sigma"}) {
+    needs(flag, !FLAGS_plan.empty(), "--plan");
+  }
+  needs("live_every", !FLAGS_live_dir.empty(), "--live_dir");
+  needs("marginals_hold_gauge", FLAGS_marginals != "none", "--marginals");
+}
+
 std::vector<std::optional<Pose2>> StartPosesFromFlags(std::size_t num_logs) {
   std::vector<std::optional<Pose2>> starts(num_logs);
   const std::size_t first_log = FLAGS_map.empty() ? 2 : 1;
+  if (!FLAGS_start_pose.empty() && num_logs < first_log) {
+    throw Error("--start_pose", 0, "has no effect on a log alone",
+                "a second log, or --map");
+  }
   std::istringstream entries(FLAGS_start_pose);
   std::string entry;
   while (std::getline(entries, entry, '/')) {

@@ -74,6 +74,10 @@ LaserOptions LaserOptionsFromFlags();
 /// file whose name has commas is one.
 std::vector<std::string> InputsFromFlags();
 
+/// Throws Error for a flag that says more of another one which is not given:
+/// --plan_pose without --plan and the like.
+void RefuseFlagsWithoutEffect();
+
 /// By log: where --start_pose says that it starts, in the frame of the first
 /// log, or of --map.
 /// Throws Error when it does not parse or names a log that is not there.

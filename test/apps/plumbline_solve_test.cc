@@ -1508,6 +1508,26 @@ TEST_F(SolveTest, APipeAsInputAnswersTheFirstInterrupt) {
   EXPECT_THAT(output, HasSubstr("map.svg: is a pipe"));
 }
 
+TEST_F(SolveTest, FlagsThatSayMoreOfOneThatIsNotGiven) {
+  const std::string log = Write("office.log", Join(OfficeLines(20)));
+  const std::pair<const char*, const char*> cases[] = {
+      {"--plan_pose=1,2,90", "--plan"},
+      {"--plan_layers=WALLS", "--plan"},
+      {"--plan_sigma=0.1", "--plan"},
+      {"--live_every=1", "--live_dir"},
+      {"--marginals_hold_gauge", "--marginals"},
+      {"--start_pose=2:0,0,0", "a second log, or --map"}};
+  for (const auto& [flag, needed] : cases) {
+    const std::string name =
+        std::string(flag).substr(0, std::string(flag).find('='));
+    std::string output;
+    EXPECT_EQ(Solve(log, "out", flag, &output), 2) << flag;
+    EXPECT_THAT(output, HasSubstr(name + ": "));
+    EXPECT_THAT(output, HasSubstr(needed));
+  }
+  EXPECT_TRUE(Files("out").empty());
+}
+
 TEST_F(SolveTest, FlagsThatAreNotUnderstood) {
   const std::string log = Write("office.log", Join(OfficeLines(20)));
   std::string output;

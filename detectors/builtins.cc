@@ -8,6 +8,7 @@
 #include <plumbline/detectors/orientation_relation.h>
 #include <plumbline/detectors/rectangle.h>
 #include <plumbline/detectors/same_wall.h>
+#include <plumbline/detectors/visibility.h>
 #include <plumbline/detectors/wall_thickness.h>
 
 #include <utility>
@@ -19,7 +20,7 @@ void RegisterBuiltinDetectors(Registry* registry) {
        {CenterClusterType(), CircleCenterType(), CircleRansacType(),
         CorridorType(), LineRansacType(), OrientationMixtureType(),
         OrientationRelationType(), RectangleType(), SameWallType(),
-        WallThicknessType()}) {
+        VisibilityType(), WallThicknessType()}) {
     if (registry->FindDetector(type.name) == nullptr) {
       registry->Register(std::move(type));
     }

@@ -1,8 +1,11 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/read_ahead.h>
+#include <plumbline/core/sight_lines.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/detectors/default_hierarchy.h>
+#include <plumbline/detectors/visibility.h>
+#include <plumbline/frontend/looks.h>
 #include <plumbline/frontend/place_chain.h>
 #include <plumbline/frontend/wall_views.h>
 #include <plumbline/pipeline/log_solver.h>
@@ -67,10 +70,26 @@ void AddLoose(int begin, int end, std::string why, LogSolverResult* result) {
   result->loose.push_back(std::move(loose));
 }
 
+// Before the detector that refutes closures.
 void AddSameWall(HierarchySpec* hierarchy) {
-  if (!hierarchy->Contains(kSameWallDetector)) {
-    hierarchy->Add(0, kSameWallDetector);
-  }
+  if (hierarchy->Contains(kSameWallDetector)) return;
+  hierarchy->Add(0, kSameWallDetector);
+  std::vector<std::string>& level = hierarchy->levels[0];
+  std::stable_partition(
+      level.begin(), level.end(),
+      [](const std::string& name) { return name != kVisibilityDetector; });
+}
+
+// Detectors that read sight lines get those of these key scans.
+template <typename MakePlaces>
+void ShowScans(const std::vector<Scan>& scans, const ScanPointsOptions& points,
+               const MakePlaces& make_places, const Hierarchy& detectors) {
+  if (GiveLooks(nullptr, detectors) == 0) return;
+  LookOptions options;
+  options.points = points;
+  GiveLooks(std::make_shared<const Looks>(
+                CollectLooks(scans, make_places(), options)),
+            detectors);
 }
 
 }  // namespace
@@ -654,7 +673,7 @@ void LogSolver::CloseLoops(Context* context) {
     return;
   }
   context->Begin("closing of loops");
-  BeginClosing();
+  BeginClosing(context);
   RunEm(context);
 }
 
@@ -846,8 +865,16 @@ void LogSolver::FindStructureAgain(Context* context) {
   if (options_.global_association) AddSameWall(&hierarchy);
   EmOptions options = options_.em;
   options.break_share = options_.closing_break_share;
-  ReplaceEm(options_.structure ? MakeDetectors(hierarchy) : Hierarchy(),
-            options);
+  Hierarchy detectors =
+      options_.structure ? MakeDetectors(hierarchy) : Hierarchy();
+  ShowScans(
+      context->scans, options_.adjustment.points,
+      [&] {
+        return LooksFromPlaces(result.records, context->places,
+                               options_.adjustment.place_stride);
+      },
+      detectors);
+  ReplaceEm(std::move(detectors), options);
   KnownStructureBinder known(options_.known, registry_, context->places.front(),
                              graph_.get());
   if (options_.structure) known.AddStatements();
@@ -966,7 +993,7 @@ void LogSolver::ClearGraph() {
   graph_->Apply(std::move(clear));
 }
 
-void LogSolver::BeginClosing() {
+void LogSolver::BeginClosing(Context* context) {
   const Eigen::Vector3d scale(1.0 / options_.closing_position_scale,
                               1.0 / options_.closing_position_scale, 1.0);
   for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
@@ -984,7 +1011,16 @@ void LogSolver::BeginClosing() {
   options.break_share = options_.closing_break_share;
   HierarchySpec hierarchy = HierarchyOfOptions();
   AddSameWall(&hierarchy);
-  ReplaceEm(MakeDetectors(hierarchy), options);
+  Hierarchy detectors = MakeDetectors(hierarchy);
+  ShowScans(
+      context->scans, options_.adjustment.points,
+      [&] {
+        const std::vector<KeyScanRecord>& records = context->result.records;
+        return LooksFromWalls(records, KeyPoses(records), *graph_,
+                              options_.adjustment.place_stride);
+      },
+      detectors);
+  ReplaceEm(std::move(detectors), options);
 }
 
 void LogSolver::CountEm() {

@@ -320,7 +320,7 @@ class LogSolver {
 
   void RunEm(Context* context);
   // Loosens the relations between features and lets closures be proposed.
-  void BeginClosing();
+  void BeginClosing(Context* context);
   void CountEm();
   void ReplaceEm(Hierarchy detectors, const EmOptions& options);
   // An empty graph in place of the one there was.

@@ -73,6 +73,24 @@ struct WallFinding {
   std::int64_t crossings = 0;
 };
 
+// Ends of sight lines by their bearing from the sensor, the frame's -x axis
+// first, counterclockwise.
+struct BearingOrder {
+  Eigen::Vector2d sensor;
+
+  bool operator()(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const {
+    const Eigen::Vector2d one = a - sensor;
+    const Eigen::Vector2d other = b - sensor;
+    const bool one_is_below =
+        one.y() < 0.0 || (one.y() == 0.0 && one.x() < 0.0);
+    const bool other_is_below =
+        other.y() < 0.0 || (other.y() == 0.0 && other.x() < 0.0);
+    if (one_is_below != other_is_below) return one_is_below;
+    return one.x() * other.y() - one.y() * other.x() > 0.0;
+  }
+};
+
+// Looks are those of Visibility::SetLooks.
 class Search {
  public:
   Search(const Looks& looks, const Graph& graph, const Registry& registry,
@@ -178,24 +196,25 @@ class Search {
     WallFinding finding;
     const double begin = of.wall.begin + options_.door;
     const double end = of.wall.end - options_.door;
+    const std::vector<FeatureId> measured_by = FramesOf(of.id);
     std::vector<std::pair<SightCrossing, std::size_t>> crossings;
     for (const std::size_t i : placed_.Near(of.wall, options_.range)) {
       const Look& look = placed_.look(i);
-      if (look.frame == of.id || look.frame == kNoId) continue;
+      if (look.frame == kNoId || Contains(measured_by, look.frame)) continue;
       ++finding.looks;
       const Wall wall = placed_.Seen(i, of.wall);
       crossings.clear();
-      for (std::size_t k = 0; k < look.ends.size(); ++k) {
+      VisitBetween(look, wall.At(begin), wall.At(end), [&](std::size_t k) {
         const std::optional<SightCrossing> crossing =
             CrossingOf(wall, look.sensor, look.ends[k]);
         if (!crossing || crossing->beyond <= options_.margin ||
             crossing->beyond > options_.depth ||
             crossing->slant < through_.min_slant || crossing->along < begin ||
             crossing->along > end) {
-          continue;
+          return;
         }
         crossings.emplace_back(*crossing, k);
-      }
+      });
       finding.crossings += static_cast<std::int64_t>(crossings.size());
       // A single line may have grazed an edge.
       if (static_cast<int>(crossings.size()) < options_.lines) continue;
@@ -217,12 +236,36 @@ class Search {
     return finding;
   }
 
+  // Calls visit(index) for the sight lines of a look (BearingOrder) that go
+  // between two points of its frame.
+  template <typename Visit>
+  static void VisitBetween(const Look& look, const Eigen::Vector2d& first,
+                           const Eigen::Vector2d& second, const Visit& visit) {
+    Eigen::Vector2d from = first - look.sensor;
+    Eigen::Vector2d to = second - look.sensor;
+    if (from.x() * to.y() - from.y() * to.x() < 0.0) std::swap(from, to);
+    const auto index_of = [&look](const Eigen::Vector2d& direction) {
+      return static_cast<std::size_t>(
+          std::lower_bound(look.ends.begin(), look.ends.end(),
+                           look.sensor + direction, BearingOrder{look.sensor}) -
+          look.ends.begin());
+    };
+    const std::size_t begin = index_of(from);
+    const std::size_t end = index_of(to);
+    const std::size_t size = look.ends.size();
+    const bool is_around =
+        BearingOrder{look.sensor}(look.sensor + to, look.sensor + from);
+    for (std::size_t k = begin; k < (is_around ? size : end); ++k) visit(k);
+    for (std::size_t k = 0; is_around && k < end; ++k) visit(k);
+  }
+
   // Proposes the worst that are not there yet, as many for each frame as there
   // is room for.
   void Propose(FeatureId wall, const std::vector<Violation>& worst,
                Transaction* transaction) const {
     if (worst.empty()) return;
-    std::map<FeatureId, int> room;
+    // Violated lines by frame; where one was broken there is no room.
+    std::map<FeatureId, int> held;
     std::vector<const Constraint*> there;
     for (const ConstraintId id : graph_.ConstraintsOf(wall)) {
       const Constraint& constraint = graph_.GetConstraint(id);
@@ -230,20 +273,21 @@ class Search {
         continue;
       }
       there.push_back(&constraint);
-      if (constraint.state == ConstraintState::kLive &&
-          IsViolated(constraint)) {
-        --room[constraint.features[0]];
+      if (constraint.state == ConstraintState::kBroken) {
+        held[constraint.features[0]] += options_.lines;
+      } else if (IsViolated(constraint)) {
+        ++held[constraint.features[0]];
       }
     }
     for (const Violation& violation : worst) {
-      if (room[violation.frame] + options_.lines <= 0) continue;
+      if (held[violation.frame] >= options_.lines) continue;
       if (std::any_of(there.begin(), there.end(), [&](const Constraint* one) {
             return one->features[0] == violation.frame &&
                    one->expected == violation.expected;
           })) {
         continue;
       }
-      --room[violation.frame];
+      ++held[violation.frame];
       Constraint constraint = MakeStructure(
           relation_, {violation.frame, wall}, violation.expected,
           WallVisibilityInformation(violation.normal, options_.sigma),
@@ -288,25 +332,34 @@ class Search {
     stretch.begin = where.first;
     stretch.end = where.second;
     SeenPieces pieces(where.first, where.second, through_);
+    const std::vector<FeatureId> measured_by = FramesOf(of.id);
     for (const std::size_t i : placed_.Near(stretch, options_.range)) {
       const Look& look = placed_.look(i);
-      if (look.frame != kNoId && look.frame != of.id && !Saw(look.frame, of.id))
-        continue;
+      if (look.frame != kNoId && !Contains(measured_by, look.frame)) continue;
       pieces.Add(placed_.Seen(i, stretch), look);
     }
     return !pieces.Through(options_.min_width).empty();
   }
 
-  // Whether a live measurement ties the frame to the wall.
-  bool Saw(FeatureId frame, FeatureId wall) const {
-    const std::vector<ConstraintId>& ids = graph_.ConstraintsOf(wall);
-    return std::any_of(ids.begin(), ids.end(), [&](ConstraintId id) {
+  // The features that live measurements tie to a wall, and the wall, ascending:
+  // looks of these frames know where it is.
+  std::vector<FeatureId> FramesOf(FeatureId wall) const {
+    std::vector<FeatureId> frames = {wall};
+    for (const ConstraintId id : graph_.ConstraintsOf(wall)) {
       const Constraint& constraint = *graph_.FindConstraint(id);
-      return constraint.state == ConstraintState::kLive &&
-             constraint.kind == ConstraintClass::kMeasurement &&
-             std::find(constraint.features.begin(), constraint.features.end(),
-                       frame) != constraint.features.end();
-    });
+      if (constraint.state != ConstraintState::kLive ||
+          constraint.kind != ConstraintClass::kMeasurement) {
+        continue;
+      }
+      frames.insert(frames.end(), constraint.features.begin(),
+                    constraint.features.end());
+    }
+    std::sort(frames.begin(), frames.end());
+    return frames;
+  }
+
+  static bool Contains(const std::vector<FeatureId>& ids, FeatureId id) {
+    return std::binary_search(ids.begin(), ids.end(), id);
   }
 
   const Graph& graph_;
@@ -326,7 +379,18 @@ const std::string& Visibility::name() const {
 }
 
 void Visibility::SetLooks(std::shared_ptr<const Looks> looks) {
-  looks_ = std::move(looks);
+  looks_ = nullptr;
+  if (looks == nullptr) return;
+  auto ordered = std::make_shared<Looks>(*looks);
+  for (Look& look : *ordered) {
+    // A line of no length has no bearing.
+    look.ends.erase(
+        std::remove(look.ends.begin(), look.ends.end(), look.sensor),
+        look.ends.end());
+    std::stable_sort(look.ends.begin(), look.ends.end(),
+                     BearingOrder{look.sensor});
+  }
+  looks_ = std::move(ordered);
 }
 
 Transaction Visibility::Detect(const Graph& graph, const Registry& registry,

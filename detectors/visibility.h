@@ -47,10 +47,12 @@ struct VisibilityOptions {
 /// one side of a rectangle) where the looks that saw the one went through where
 /// the other stands.
 ///
-/// Lines that hold a wall back stay while they live, whether they are still
-/// violated or not, so that the wall does not come back as soon as it has left;
-/// in each round those of the present state come on top, up to `lines` violated
-/// ones for each wall and frame.
+/// A look whose frame a live measurement ties to the wall holds it not back: it
+/// knows where the wall is, and what it looked through is an opening. Lines
+/// that hold a wall back stay while they live, whether they are still violated
+/// or not, so that the wall does not come back as soon as it has left; in each
+/// round those of the present state come on top, up to `lines` violated ones
+/// for each wall and frame, and none where one was broken.
 ///
 /// Sight lines are not in the graph: without SetLooks nothing is proposed.
 /// Looks in the map frame (Look::frame is kNoId) refute, but hold no wall back:
@@ -68,6 +70,7 @@ class Visibility : public StructureDetector, public LooksReader {
 
  private:
   VisibilityOptions options_;
+  // Ends in the order of bearings.
   std::shared_ptr<const Looks> looks_;
 };
 

@@ -1,15 +1,22 @@
 // What the detectors cost against the number of features that they read.
 
 #include <benchmark/benchmark.h>
+#include <plumbline/core/em.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/core/session.h>
+#include <plumbline/core/sight_lines.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/orientation_mixture.h>
+#include <plumbline/detectors/visibility.h>
 #include <plumbline/factors/angle.h>
 
+#include <cmath>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "benchmark/benchmark_util.h"
+#include "benchmark/corridor_graph.h"
 #include "detectors/wall_samples.h"
 
 namespace plumbline {
@@ -129,6 +136,65 @@ BENCHMARK(OrientationMixtureScope)
     ->Arg(1000)
     ->Arg(10000)
     ->Iterations(100)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
+
+// Looks along the walls of corridors, one each metre from 1.2 m in front of the
+// wall that it moves with: 180 sight lines of at most 15 m that end on that
+// wall's line or, on the other side, on that of the wall across.
+Looks LooksAlongWalls(const Graph& graph) {
+  constexpr double kWidth = 2.4;
+  Looks looks;
+  for (const Feature* wall : graph.Features()) {
+    if (!wall->type->Is(FeatureRole::kWall)) continue;
+    for (double x = wall->extent_begin + 0.5; x < wall->extent_end; x += 2.0) {
+      Look look;
+      look.frame = wall->id;
+      look.sensor = {x, 0.5 * kWidth};
+      for (int beam = 0; beam < 180; ++beam) {
+        const double angle = DegToRad(2.0 * beam + 1.0);
+        const Eigen::Vector2d ray(std::cos(angle), std::sin(angle));
+        look.ends.push_back(look.sensor +
+                            std::min(15.0, 0.5 * kWidth / std::abs(ray.y())) *
+                                ray);
+      }
+      looks.push_back(std::move(look));
+    }
+  }
+  return looks;
+}
+
+// What sight lines cost beside the round of EM that they are part of.
+void VisibilityRound(benchmark::State& state) {
+  CorridorGraph world(Builtins(), static_cast<int>(state.range(0)));
+  SolverSession session(&world.graph(), Builtins(), SessionOptions());
+  session.SolveGlobal();
+  const auto looks =
+      std::make_shared<const Looks>(LooksAlongWalls(world.graph()));
+  Visibility detector{VisibilityOptions()};
+  detector.SetLooks(looks);
+  EmOrchestrator em(&world.graph(), &session, Builtins(),
+                    MakeHierarchy(ParseHierarchy("orientation_mixture"),
+                                  Builtins(), {"segment"}, {}),
+                    EmOptions());
+  std::vector<double> detect_seconds;
+  std::vector<double> round_seconds;
+  for (auto _ : state) {
+    Transaction proposal;
+    detect_seconds.push_back(CpuSecondsOf([&] {
+      proposal = detector.Detect(world.graph(), Builtins(), DetectionScope());
+    }));
+    round_seconds.push_back(CpuSecondsOf([&] { em.Iterate(); }));
+    state.SetIterationTime(detect_seconds.back());
+  }
+  state.counters["looks"] = static_cast<double>(looks->size());
+  state.counters["of_em_round"] =
+      Median(detect_seconds) / Median(round_seconds);
+}
+BENCHMARK(VisibilityRound)
+    ->Arg(1000)
+    ->Arg(3000)
+    ->Iterations(5)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 

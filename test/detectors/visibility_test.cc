@@ -78,8 +78,7 @@ class VisibilityTest : public ::testing::Test {
     return graph_->Apply(std::move(transaction)).features[0];
   }
 
-  // The second one stands so in the frame of the first, or as it stands in the
-  // graph.
+  // The second one stands in the frame of the first as it stands in the graph.
   void Measure(FeatureId first, FeatureId second, double sigma,
                double sigma_angle) {
     Transaction transaction;
@@ -89,6 +88,15 @@ class VisibilityTest : public ::testing::Test {
         InformationFromSigmas(Eigen::Vector3d(sigma, sigma, sigma_angle)),
         "test"));
     graph_->Apply(std::move(transaction));
+  }
+
+  // Measures a wall from a pose beside this one, which has no looks: one that
+  // has knows where the wall is.
+  void MeasureFromBeside(FeatureId pose, FeatureId wall, double sigma,
+                         double sigma_angle) {
+    const FeatureId beside = AddPose(PoseOf(pose));
+    Measure(pose, beside, 1e-3, 1e-3);
+    Measure(beside, wall, sigma, sigma_angle);
   }
 
   // `pose`, which truly stands at `at`, sees the building.
@@ -176,7 +184,7 @@ const std::vector<TrueFace>& OneTrueWall() {
 TEST_F(VisibilityTest, NothingWithoutLooks) {
   const FeatureId pose = AddPose(Pose2::Zero());
   const FeatureId wall = AddWall(Pose2(0.0, 1.5, kPi), -5.0, 5.0);
-  Measure(pose, wall, 1.0, 0.1);
+  MeasureFromBeside(pose, wall, 1.0, 0.1);
   EXPECT_TRUE(Detect().empty());
   const auto detector = registry_.GetDetector("visibility").make({});
   EXPECT_TRUE(detector->Detect(*graph_, registry_, DetectionScope()).empty());
@@ -196,7 +204,7 @@ TEST_F(VisibilityTest, TheWorstFewLinesHoldAWallBack) {
   const FeatureId pose = AddPose(Pose2(0.0, 0.0, 0.7));
   // Half a metre in front of where it is, and turned.
   const FeatureId wall = AddWall(Pose2(0.0, 1.5, kPi + 0.05), -3.0, 3.0);
-  Measure(pose, wall, 1.0, 0.1);
+  MeasureFromBeside(pose, wall, 1.0, 0.1);
   LookAround(pose, Pose2(0.0, 0.0, 0.7), OneTrueWall());
   DetectionCounts counts;
   const Transaction found = Detect({}, &counts);
@@ -236,7 +244,7 @@ TEST_F(VisibilityTest, TheWorstFewLinesHoldAWallBack) {
 TEST_F(VisibilityTest, AWallBehindWhatWasSeenStaysThere) {
   const FeatureId pose = AddPose(Pose2::Zero());
   const FeatureId wall = AddWall(Pose2(0.0, 2.5, kPi), -3.0, 3.0);
-  Measure(pose, wall, 1.0, 0.1);
+  MeasureFromBeside(pose, wall, 1.0, 0.1);
   LookAround(pose, Pose2::Zero(), OneTrueWall());
   EXPECT_TRUE(Detect().empty());
   RunEm();
@@ -247,7 +255,7 @@ TEST_F(VisibilityTest, FromBothSidesOfAFace) {
   const FeatureId pose = AddPose(Pose2::Zero());
   // As seen from above; the robot is below.
   const FeatureId wall = AddWall(Pose2(0.0, 1.5, 0.0), -3.0, 3.0);
-  Measure(pose, wall, 1.0, 0.1);
+  MeasureFromBeside(pose, wall, 1.0, 0.1);
   LookAround(pose, Pose2::Zero(), OneTrueWall());
   const Transaction found = Detect();
   ASSERT_EQ(found.added_constraints().size(), 3u);
@@ -259,7 +267,7 @@ TEST_F(VisibilityTest, FromBothSidesOfAFace) {
 TEST_F(VisibilityTest, DoorsAndOpeningsHoldNothingBack) {
   const FeatureId pose = AddPose(Pose2::Zero());
   const FeatureId wall = AddWall(Pose2(0.0, 2.0, kPi), -5.0, 5.0);
-  Measure(pose, wall, 1.0, 0.1);
+  MeasureFromBeside(pose, wall, 1.0, 0.1);
   // A room of 3 m behind an opening of 2 m; and behind the right end of the
   // wall a niche as deep as a wall may be off, narrower than a door.
   LookAround(pose, Pose2::Zero(),
@@ -272,6 +280,51 @@ TEST_F(VisibilityTest, DoorsAndOpeningsHoldNothingBack) {
   EXPECT_FALSE(Detect({{"door", 0.0}, {"lines", 1.0}}).empty());
 }
 
+TEST_F(VisibilityTest, WhoMeasuredTheWallHoldsItNotBack) {
+  const FeatureId pose = AddPose(Pose2::Zero());
+  const FeatureId wall = AddWall(Pose2(0.0, 1.5, kPi), -3.0, 3.0);
+  LookAround(pose, Pose2::Zero(), OneTrueWall());
+  EXPECT_FALSE(Detect().empty());
+  Measure(pose, wall, 1.0, 0.1);
+  EXPECT_TRUE(Detect().empty());
+}
+
+TEST_F(VisibilityTest, WhatWasBrokenComesNotAgain) {
+  const FeatureId pose = AddPose(Pose2::Zero());
+  AddWall(Pose2(0.0, 1.5, kPi), -3.0, 3.0);
+  LookAround(pose, Pose2::Zero(), OneTrueWall());
+  const ConstraintId first = graph_->Apply(Detect()).constraints[0];
+  EXPECT_TRUE(Detect().empty());
+  Transaction transaction;
+  transaction.BreakConstraint(first);
+  graph_->Apply(std::move(transaction));
+  EXPECT_TRUE(Detect().empty());
+  // Not even from elsewhere on the wall.
+  graph_->GetFeature(1).parameters = {0.0, 1.6, kPi + 0.05};
+  EXPECT_TRUE(Detect().empty());
+}
+
+TEST_F(VisibilityTest, EveryBearing) {
+  // The wall in front of the true one is crossed by as many lines wherever it
+  // stands around the robot, whichever beam is the first.
+  for (int turn = 0; turn < 12; ++turn) {
+    SCOPED_TRACE(turn);
+    graph_ = std::make_unique<Graph>();
+    looks_.clear();
+    const double angle = DegToRad(30.0 * turn);
+    const FeatureId pose = AddPose(Pose2(0.0, 0.0, angle));
+    AddWall(Pose2(0.0, 1.5, kPi), -3.0, 3.0);
+    LookAround(pose, Pose2::Zero(), OneTrueWall());
+    std::swap(looks_[0].ends[17], looks_[0].ends[200]);
+    const Pose2 back = Inverse(Pose2(0.0, 0.0, angle));
+    for (Vector2d& end : looks_[0].ends) end = TransformPoint(back, end);
+    DetectionCounts counts;
+    EXPECT_EQ(Detect({}, &counts).added_constraints().size(), 3u);
+    // |x| < 2.6 at y = 1.5: 120 degrees of 1 degree each.
+    EXPECT_EQ(counts.at("sight lines through walls"), 120);
+  }
+}
+
 TEST_F(VisibilityTest, WhatWasMovedHoldsNothingBackInTheEnd) {
   // Three poses saw the wall as it is, tightly; for the fourth there is a niche
   // behind a part of it, whose door was shut before.
@@ -282,8 +335,12 @@ TEST_F(VisibilityTest, WhatWasMovedHoldsNothingBackInTheEnd) {
   for (int k = 0; k < 4; ++k) {
     const Pose2 at(k - 1.5, 0.0, 0.1 * k);
     const FeatureId pose = AddPose(at);
-    Measure(pose, wall, 0.02, 0.005);
     LookAround(pose, at, k < 3 ? OneTrueWall() : open);
+    if (k < 3) {
+      Measure(pose, wall, 0.02, 0.005);
+    } else {
+      MeasureFromBeside(pose, wall, 0.02, 0.005);
+    }
   }
   EXPECT_EQ(Detect().added_constraints().size(), 3u);
   const EmReport report = RunEm();

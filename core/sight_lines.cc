@@ -1,6 +1,7 @@
 #include <plumbline/core/detector.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/sight_lines.h>
+#include <plumbline/factors/angle.h>
 
 #include <algorithm>
 #include <cmath>
@@ -46,27 +47,53 @@ PlacedLooks::PlacedLooks(const Looks& looks, const Graph& graph) {
       if (feature == nullptr || !feature->type->frame) continue;
       placed.frame = feature->type->frame(*feature);
     }
-    placed.sensor = TransformPoint(placed.frame, look.sensor);
-    by_x_.emplace_back(placed.sensor.x(), placed_.size());
+    placed.axis =
+        Eigen::Vector2d(std::cos(placed.frame[2]), std::sin(placed.frame[2]));
+    const Eigen::Vector2d sensor = TransformPoint(placed.frame, look.sensor);
+    by_x_.push_back({sensor.x(), sensor.y(), placed_.size()});
     placed_.push_back(placed);
   }
-  std::sort(by_x_.begin(), by_x_.end());
+  std::sort(by_x_.begin(), by_x_.end(),
+            [](const Position& a, const Position& b) {
+              return a.x < b.x || (a.x == b.x && a.index < b.index);
+            });
+}
+
+Wall PlacedLooks::Seen(std::size_t i, const Wall& wall) const {
+  const Placed& placed = placed_[i];
+  const auto turned = [&placed](const Eigen::Vector2d& vector) {
+    return Eigen::Vector2d(
+        placed.axis.dot(vector),
+        placed.axis.x() * vector.y() - placed.axis.y() * vector.x());
+  };
+  Wall seen;
+  seen.position = turned(wall.position - placed.frame.head<2>());
+  seen.angle = NormalizeAngle(wall.angle - placed.frame[2]);
+  seen.direction = turned(wall.direction);
+  seen.begin = wall.begin;
+  seen.end = wall.end;
+  return seen;
 }
 
 std::vector<std::size_t> PlacedLooks::Near(const Wall& wall,
                                            double range) const {
   const Eigen::Vector2d begin = wall.At(wall.begin);
   const Eigen::Vector2d end = wall.At(wall.end);
-  const double first = std::min(begin.x(), end.x()) - range;
-  const double last = std::max(begin.x(), end.x()) + range;
+  const double left = std::min(begin.x(), end.x());
+  const double right = std::max(begin.x(), end.x());
+  const double below = std::min(begin.y(), end.y());
+  const double above = std::max(begin.y(), end.y());
   std::vector<std::size_t> near;
-  for (auto entry = std::lower_bound(by_x_.begin(), by_x_.end(),
-                                     std::make_pair(first, std::size_t{0}));
-       entry != by_x_.end() && entry->first <= last; ++entry) {
-    const Eigen::Vector2d& sensor = placed_[entry->second].sensor;
+  if (!(wall.begin <= wall.end)) return near;
+  auto entry = std::lower_bound(
+      by_x_.begin(), by_x_.end(), left - range,
+      [](const Position& position, double x) { return position.x < x; });
+  for (; entry != by_x_.end() && entry->x <= right + range; ++entry) {
+    if (entry->y < below - range || entry->y > above + range) continue;
+    const Eigen::Vector2d sensor(entry->x, entry->y);
     const double along = std::clamp(wall.Along(sensor), wall.begin, wall.end);
     if ((sensor - wall.At(along)).squaredNorm() > range * range) continue;
-    near.push_back(entry->second);
+    near.push_back(entry->index);
   }
   std::sort(near.begin(), near.end());
   return near;

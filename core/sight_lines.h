@@ -11,7 +11,6 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -80,20 +79,24 @@ class PlacedLooks {
   /// wall (map frame), ascending.
   std::vector<std::size_t> Near(const Wall& wall, double range) const;
   /// A wall of the map in the frame of a look.
-  Wall Seen(std::size_t i, const Wall& wall) const {
-    return MakeWall(Between(placed_[i].frame, wall.pose()), wall.begin,
-                    wall.end);
-  }
+  Wall Seen(std::size_t i, const Wall& wall) const;
 
  private:
   struct Placed {
     const Look* look = nullptr;
     Pose2 frame = Pose2::Zero();
-    Eigen::Vector2d sensor = Eigen::Vector2d::Zero();
+    // The frame's x axis in the map.
+    Eigen::Vector2d axis = Eigen::Vector2d::UnitX();
+  };
+  // Position of a sensor in the map.
+  struct Position {
+    double x = 0.0;
+    double y = 0.0;
+    std::size_t index = 0;
   };
   std::vector<Placed> placed_;
-  // By x of the sensor in the map.
-  std::vector<std::pair<double, std::size_t>> by_x_;
+  // Ascending by x.
+  std::vector<Position> by_x_;
 };
 
 /// When a piece of a wall counts as seen through.

@@ -5,6 +5,7 @@
 #include <plumbline/factors/wall_visibility.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -73,29 +74,62 @@ struct WallFinding {
   std::int64_t crossings = 0;
 };
 
-// Ends of sight lines by their bearing from the sensor, the frame's -x axis
-// first, counterclockwise.
-struct BearingOrder {
-  Eigen::Vector2d sensor;
+// The sector around a sensor that a direction lies in, counterclockwise.
+std::size_t SectorOf(const Eigen::Vector2d& direction) {
+  constexpr std::size_t kSectors = SectoredLook::kSectors;
+  const double share =
+      direction.y() / (std::abs(direction.x()) + std::abs(direction.y()));
+  const double turn = direction.x() >= 0.0 ? share + 1.0 : 3.0 - share;
+  return static_cast<std::size_t>(0.25 * kSectors * turn) % kSectors;
+}
 
-  bool operator()(const Eigen::Vector2d& a, const Eigen::Vector2d& b) const {
-    const Eigen::Vector2d one = a - sensor;
-    const Eigen::Vector2d other = b - sensor;
-    const bool one_is_below =
-        one.y() < 0.0 || (one.y() == 0.0 && one.x() < 0.0);
-    const bool other_is_below =
-        other.y() < 0.0 || (other.y() == 0.0 && other.x() < 0.0);
-    if (one_is_below != other_is_below) return one_is_below;
-    return one.x() * other.y() - one.y() * other.x() > 0.0;
+// Unit vectors along the edges of the sectors.
+const std::array<Eigen::Vector2d, SectoredLook::kSectors + 1>& SectorEdges() {
+  static const auto edges = [] {
+    constexpr std::size_t kSectors = SectoredLook::kSectors;
+    std::array<Eigen::Vector2d, kSectors + 1> made;
+    for (std::size_t k = 0; k <= kSectors; ++k) {
+      const double turn = 4.0 * static_cast<double>(k) / kSectors;
+      const double share = turn < 2.0 ? turn - 1.0 : 3.0 - turn;
+      const double x = 1.0 - std::abs(share);
+      made[k] = Eigen::Vector2d(turn < 2.0 ? x : -x, share).normalized();
+    }
+    return made;
+  }();
+  return edges;
+}
+
+SectoredLook InSectors(const Look& look) {
+  SectoredLook sectored;
+  std::vector<std::pair<std::size_t, Eigen::Vector2d>> ends;
+  for (const Eigen::Vector2d& end : look.ends) {
+    // A line of no length has no direction.
+    if (end == look.sensor) continue;
+    const std::size_t sector = SectorOf(end - look.sensor);
+    sectored.reach[sector] = std::max(
+        sectored.reach[sector], static_cast<float>((end - look.sensor).norm()));
+    ++sectored.begin[sector + 1];
+    ends.emplace_back(sector, end);
   }
-};
+  std::stable_sort(ends.begin(), ends.end(),
+                   [](const auto& one, const auto& other) {
+                     return one.first < other.first;
+                   });
+  for (const auto& end : ends) sectored.ends.push_back(end.second);
+  for (std::size_t k = 0; k < SectoredLook::kSectors; ++k) {
+    sectored.begin[k + 1] += sectored.begin[k];
+  }
+  return sectored;
+}
 
-// Looks are those of Visibility::SetLooks.
 class Search {
  public:
-  Search(const Looks& looks, const Graph& graph, const Registry& registry,
+  Search(const Looks& looks, const std::vector<SectoredLook>& sectored,
+         const Graph& graph, const Registry& registry,
          const VisibilityOptions& options)
-      : graph_(graph),
+      : looks_(looks),
+        sectored_(sectored),
+        graph_(graph),
         relation_(registry.GetRelation(WallVisibility::kName)),
         options_(options),
         placed_(looks, graph) {
@@ -197,23 +231,23 @@ class Search {
     const double begin = of.wall.begin + options_.door;
     const double end = of.wall.end - options_.door;
     const std::vector<FeatureId> measured_by = FramesOf(of.id);
-    std::vector<std::pair<SightCrossing, std::size_t>> crossings;
+    std::vector<std::pair<SightCrossing, Eigen::Vector2d>> crossings;
     for (const std::size_t i : placed_.Near(of.wall, options_.range)) {
       const Look& look = placed_.look(i);
       if (look.frame == kNoId || Contains(measured_by, look.frame)) continue;
       ++finding.looks;
       const Wall wall = placed_.Seen(i, of.wall);
       crossings.clear();
-      VisitBetween(look, wall.At(begin), wall.At(end), [&](std::size_t k) {
+      VisitThrough(look, wall, begin, end, [&](const Eigen::Vector2d& at) {
         const std::optional<SightCrossing> crossing =
-            CrossingOf(wall, look.sensor, look.ends[k]);
+            CrossingOf(wall, look.sensor, at);
         if (!crossing || crossing->beyond <= options_.margin ||
             crossing->beyond > options_.depth ||
             crossing->slant < through_.min_slant || crossing->along < begin ||
             crossing->along > end) {
           return;
         }
-        crossings.emplace_back(*crossing, k);
+        crossings.emplace_back(*crossing, at);
       });
       finding.crossings += static_cast<std::int64_t>(crossings.size());
       // A single line may have grazed an edge.
@@ -223,11 +257,10 @@ class Search {
                          return a.first.beyond > b.first.beyond;
                        });
       crossings.resize(static_cast<std::size_t>(options_.lines));
-      for (const auto& [crossing, k] : crossings) {
-        const Eigen::Vector2d line = look.ends[k] - look.sensor;
+      for (const auto& [crossing, at] : crossings) {
+        const Eigen::Vector2d line = at - look.sensor;
         const Eigen::Vector2d cut =
-            look.ends[k] -
-            options_.margin / (crossing.slant * line.norm()) * line;
+            at - options_.margin / (crossing.slant * line.norm()) * line;
         finding.worst.push_back(
             {look.frame, Eigen::Vector3d(cut.x(), cut.y(), crossing.side),
              wall.normal(), crossing.beyond});
@@ -236,27 +269,34 @@ class Search {
     return finding;
   }
 
-  // Calls visit(index) for the sight lines of a look (BearingOrder) that go
-  // between two points of its frame.
+  // Calls visit(end) for the sight lines of a look, and few others, that go
+  // between two points of a wall and reach farther than it by the margin.
   template <typename Visit>
-  static void VisitBetween(const Look& look, const Eigen::Vector2d& first,
-                           const Eigen::Vector2d& second, const Visit& visit) {
-    Eigen::Vector2d from = first - look.sensor;
-    Eigen::Vector2d to = second - look.sensor;
-    if (from.x() * to.y() - from.y() * to.x() < 0.0) std::swap(from, to);
-    const auto index_of = [&look](const Eigen::Vector2d& direction) {
-      return static_cast<std::size_t>(
-          std::lower_bound(look.ends.begin(), look.ends.end(),
-                           look.sensor + direction, BearingOrder{look.sensor}) -
-          look.ends.begin());
-    };
-    const std::size_t begin = index_of(from);
-    const std::size_t end = index_of(to);
-    const std::size_t size = look.ends.size();
-    const bool is_around =
-        BearingOrder{look.sensor}(look.sensor + to, look.sensor + from);
-    for (std::size_t k = begin; k < (is_around ? size : end); ++k) visit(k);
-    for (std::size_t k = 0; is_around && k < end; ++k) visit(k);
+  void VisitThrough(const Look& look, const Wall& wall, double begin,
+                    double end, const Visit& visit) const {
+    // A line may reach this much farther than along the edges of its sector.
+    constexpr double kBetweenEdges = 1.01;
+    const SectoredLook& sectored =
+        sectored_[static_cast<std::size_t>(&look - looks_.data())];
+    const auto& edges = SectorEdges();
+    const double distance = wall.Across(look.sensor);
+    const double least = std::abs(distance) + options_.margin;
+    const Eigen::Vector2d normal = wall.normal();
+    // Counterclockwise, for a sensor to the left of the wall.
+    const std::size_t first =
+        SectorOf(wall.At(distance > 0.0 ? begin : end) - look.sensor);
+    const std::size_t last =
+        SectorOf(wall.At(distance > 0.0 ? end : begin) - look.sensor);
+    for (std::size_t k = first;; k = (k + 1) % SectoredLook::kSectors) {
+      const double steepness = std::max(std::abs(normal.dot(edges[k])),
+                                        std::abs(normal.dot(edges[k + 1])));
+      if (kBetweenEdges * steepness * sectored.reach[k] > least) {
+        for (int e = sectored.begin[k]; e < sectored.begin[k + 1]; ++e) {
+          visit(sectored.ends[static_cast<std::size_t>(e)]);
+        }
+      }
+      if (k == last) break;
+    }
   }
 
   // Proposes the worst that are not there yet, as many for each frame as there
@@ -362,6 +402,9 @@ class Search {
     return std::binary_search(ids.begin(), ids.end(), id);
   }
 
+  const Looks& looks_;
+  // Of each look.
+  const std::vector<SectoredLook>& sectored_;
   const Graph& graph_;
   const RelationType& relation_;
   const VisibilityOptions& options_;
@@ -379,18 +422,10 @@ const std::string& Visibility::name() const {
 }
 
 void Visibility::SetLooks(std::shared_ptr<const Looks> looks) {
-  looks_ = nullptr;
-  if (looks == nullptr) return;
-  auto ordered = std::make_shared<Looks>(*looks);
-  for (Look& look : *ordered) {
-    // A line of no length has no bearing.
-    look.ends.erase(
-        std::remove(look.ends.begin(), look.ends.end(), look.sensor),
-        look.ends.end());
-    std::stable_sort(look.ends.begin(), look.ends.end(),
-                     BearingOrder{look.sensor});
-  }
-  looks_ = std::move(ordered);
+  looks_ = std::move(looks);
+  sectored_.clear();
+  if (looks_ == nullptr) return;
+  for (const Look& look : *looks_) sectored_.push_back(InSectors(look));
 }
 
 Transaction Visibility::Detect(const Graph& graph, const Registry& registry,
@@ -399,7 +434,7 @@ Transaction Visibility::Detect(const Graph& graph, const Registry& registry,
   if (looks_ == nullptr || scope.features != nullptr || scope.level != 0) {
     return transaction;
   }
-  const Search search(*looks_, graph, registry, options_);
+  const Search search(*looks_, sectored_, graph, registry, options_);
   search.Refute(scope, &transaction);
   if (scope.ShouldStop()) return transaction;
   search.HoldBack(scope, &transaction);

@@ -6,8 +6,12 @@
 #include <plumbline/core/sight_lines.h>
 #include <plumbline/factors/angle.h>
 
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace plumbline {
 
@@ -15,7 +19,7 @@ namespace plumbline {
 /// they refute.
 struct VisibilityOptions {
   /// Looks from within this distance of a wall are set against it, m.
-  double range = 10.0;
+  double range = 6.0;
   /// Sight lines cross a wall at least this far from its ends, m: doors stand
   /// there.
   double door = 0.4;
@@ -38,6 +42,18 @@ struct VisibilityOptions {
   /// than a door. They end at least `passed`, m, behind it.
   double min_width = 1.6;
   double passed = 0.2;
+};
+
+/// The sight lines of a look by the sector around the sensor that they lie in.
+struct SectoredLook {
+  /// Number of sectors of the full circle.
+  static constexpr std::size_t kSectors = 64;
+  /// Ends as in Look, by sector; those of sector k are begin[k] to begin[k +
+  /// 1].
+  std::vector<Eigen::Vector2d> ends;
+  std::array<int, kSectors + 1> begin{};
+  /// Length of the longest in each sector, m.
+  std::array<float, kSectors> reach{};
 };
 
 /// Holds walls back from where the sensor has looked through: proposes, for
@@ -70,8 +86,9 @@ class Visibility : public StructureDetector, public LooksReader {
 
  private:
   VisibilityOptions options_;
-  // Ends in the order of bearings.
   std::shared_ptr<const Looks> looks_;
+  // Of each look.
+  std::vector<SectoredLook> sectored_;
 };
 
 /// Name of the detector.

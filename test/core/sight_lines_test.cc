@@ -82,6 +82,8 @@ TEST_F(PlacedLooksTest, MovesWithItsFrame) {
   EXPECT_EQ(placed.Near(wall, 2.01), (std::vector<std::size_t>{0}));
   EXPECT_TRUE(placed.Near(wall, 1.99).empty());
   EXPECT_EQ(placed.Near(wall, 30.0), (std::vector<std::size_t>{0, 1}));
+  // One whose ends are the wrong way round has no visible part.
+  EXPECT_TRUE(placed.Near(AlongX(4.0, 10.0, 0.0), 30.0).empty());
   const Wall seen = placed.Seen(0, wall);
   EXPECT_NEAR(seen.Across(looks[0].sensor), -2.0, 1e-12);
   EXPECT_NEAR(seen.At(5.0).x(), 3.0, 1e-12);

@@ -30,7 +30,7 @@ struct Sight {
   std::vector<Association> associations;
 };
 
-Sight Look(const Pose2& truth, const std::vector<WallEnds>& walls) {
+Sight SeeFrom(const Pose2& truth, const std::vector<WallEnds>& walls) {
   Sight sight;
   for (const WallEnds& wall : walls) {
     const int index = static_cast<int>(sight.observations.size());
@@ -62,7 +62,7 @@ const WallEnds kSide{{5.0, -1.0}, {5.0, 3.0}};
 
 TEST(LocalizationTest, TwoPerpendicularWallsGiveThePose) {
   const Pose2 truth(2.0, 1.0, 0.3);
-  const Sight sight = Look(truth, {kFloor, kSide});
+  const Sight sight = SeeFrom(truth, {kFloor, kSide});
   const Localization result =
       Localize(truth + Pose2(0.1, -0.08, DegToRad(2.0)),
                Eigen::Matrix3d::Identity() * 1e-6, sight);
@@ -77,7 +77,7 @@ TEST(LocalizationTest, TwoPerpendicularWallsGiveThePose) {
 
 TEST(LocalizationTest, OneWallKeepsThePriorAlong) {
   const Pose2 truth(2.0, 1.0, 0.3);
-  const Sight sight = Look(truth, {kFloor});
+  const Sight sight = SeeFrom(truth, {kFloor});
   const Localization result =
       Localize(truth + Pose2(0.1, -0.08, DegToRad(2.0)),
                Eigen::Vector3d(100.0, 1e-3, 1e-3).asDiagonal(), sight);
@@ -92,7 +92,7 @@ TEST(LocalizationTest, OneWallAskewKeepsThePriorAlong) {
   // The wall runs at 30 degrees.
   const Pose2 truth(0.0, 2.0, -0.5);
   const Eigen::Vector2d along(std::cos(kPi / 6.0), std::sin(kPi / 6.0));
-  const Sight sight = Look(truth, {{-1.0 * along, 2.0 * along}});
+  const Sight sight = SeeFrom(truth, {{-1.0 * along, 2.0 * along}});
   const Pose2 predicted = truth + Pose2(0.06, 0.05, 0.02);
   const Localization result =
       Localize(predicted, Eigen::Matrix3d::Identity() * 1e-3, sight);
@@ -112,7 +112,7 @@ TEST(LocalizationTest, HandWorkedFusionWithThePrior) {
   // Seen straight below, so offset and heading do not mix. The observation has
   // 0.01^2 + 0.03^2 = 0.001 m^2; so has the prior: half way.
   const Pose2 truth(1.0, 2.0, 0.0);
-  const Sight sight = Look(truth, {kFloor});
+  const Sight sight = SeeFrom(truth, {kFloor});
   const Localization result =
       Localize(truth + Pose2(0.0, 0.002, 0.0),
                Eigen::Vector3d(1000.0, 1000.0, 1e6).asDiagonal(), sight);
@@ -126,13 +126,13 @@ TEST(LocalizationTest, StrongPriorHolds) {
   const Pose2 predicted = truth + Pose2(0.02, -0.02, 0.01);
   const Localization result =
       Localize(predicted, Eigen::Matrix3d::Identity() * 1e12,
-               Look(truth, {kFloor, kSide}));
+               SeeFrom(truth, {kFloor, kSide}));
   EXPECT_LT((result.pose - predicted).norm(), 1e-6);
 }
 
 TEST(LocalizationTest, FeaturesStayAndPoseIsTheSameFromEitherSide) {
   const Pose2 truth(2.0, 1.0, 3.1);
-  const Sight sight = Look(truth, {kFloor, kSide});
+  const Sight sight = SeeFrom(truth, {kFloor, kSide});
   const Sight before = sight;
   // Headings on the two sides of pi.
   for (double error : {0.06, -0.06}) {
@@ -162,7 +162,7 @@ TEST(LocalizationTest, NothingRecognizedLeavesThePrediction) {
 
 TEST(LocalizationTest, AWrongAssociationDoesNotDrag) {
   const Pose2 truth(2.0, 1.0, 0.3);
-  Sight sight = Look(
+  Sight sight = SeeFrom(
       truth,
       {kFloor, kSide, {{0.0, 4.0}, {3.0, 4.0}}, {{-2.0, 0.0}, {-2.0, 3.0}}});
   // A cupboard 0.4 m before a wall is taken for the wall.
@@ -180,7 +180,7 @@ TEST(LocalizationTest, AWrongAssociationDoesNotDrag) {
 
 TEST(LocalizationTest, OnlyAssociatedPairsCount) {
   const Pose2 truth(2.0, 1.0, 0.3);
-  Sight sight = Look(truth, {kFloor, kSide});
+  Sight sight = SeeFrom(truth, {kFloor, kSide});
   sight.associations.pop_back();
   const Localization result = Localize(truth + Pose2(0.1, 0.0, 0.0),
                                        Eigen::Matrix3d::Identity(), sight);
@@ -189,7 +189,7 @@ TEST(LocalizationTest, OnlyAssociatedPairsCount) {
 
 TEST(LocalizationTest, SameResultTenKilometresAway) {
   const Pose2 truth(2.0, 1.0, 0.3);
-  const Sight here = Look(truth, {kFloor, kSide});
+  const Sight here = SeeFrom(truth, {kFloor, kSide});
   Sight there = here;
   const Pose2 shift(10000.0, -10000.0, 0.0);
   for (AssociationCandidate& candidate : there.candidates) {

@@ -94,6 +94,7 @@ class FlatProblem {
     /// for each pair of its variables.
     int products = 0;
 
+    /// Pairs of its variables, each with itself among them.
     int num_products() const { return num_variables * (num_variables + 1) / 2; }
   };
 
@@ -131,16 +132,22 @@ class FlatProblem {
   const std::vector<Term>& terms() const { return terms_; }
   /// Of all terms, one after the other.
   const std::vector<Argument>& arguments() const { return arguments_; }
+  /// In the order in which terms name them.
   const std::vector<Block>& blocks() const { return blocks_; }
+  /// In the order of the blocks, or that of the last reading.
   const std::vector<Variable>& variables() const { return variables_; }
 
-  /// Terms with variables; sizes of the tangent space, of the state and of the
-  /// array of Jacobians of Plus; products of all terms.
+  /// Terms with variables.
   int num_reduced_terms() const { return num_reduced_terms_; }
+  /// Size of the tangent space.
   int num_columns() const { return num_columns_; }
+  /// Size of the state.
   int state_size() const { return state_size_; }
+  /// Size of the array of Jacobians of Plus.
   int plus_size() const { return plus_size_; }
+  /// Products of all terms.
   int num_products() const { return num_products_; }
+  /// The largest numbers of one term so far.
   const TermSizes& largest() const { return largest_; }
 
  private:

@@ -36,6 +36,7 @@ class NormalMatrix {
   /// in the order of elimination.
   int ColumnOf(int variable) const { return column_[variable]; }
 
+  /// Makes all entries zero.
   void SetZero();
 
   /// Adds the products of a term's Jacobians with respect to tangents, one for

@@ -15,6 +15,7 @@ namespace plumbline {
 /// J. Tsai, "BZIP2: Format Specification" (2016).
 class Bzip2Decoder {
  public:
+  /// How far the present stream is unpacked.
   enum class State {
     /// There is more to unpack.
     kGoingOn,
@@ -39,6 +40,7 @@ class Bzip2Decoder {
   /// memory only.
   std::size_t Unpack(char* output, std::size_t capacity);
 
+  /// Of what Unpack() has given out.
   State state() const;
 
   /// What follows a stream that was unpacked to its end.

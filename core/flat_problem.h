@@ -1,6 +1,9 @@
 #ifndef PLUMBLINE_CORE_FLAT_PROBLEM_H_
 #define PLUMBLINE_CORE_FLAT_PROBLEM_H_
 
+#include <ceres/cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/manifold.h>
 #include <ceres/problem.h>
 
 #include <algorithm>

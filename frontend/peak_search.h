@@ -13,7 +13,7 @@ namespace plumbline {
 
 /// Cells of no score that a grid for FindPeaks has before its first column and
 /// row: as many as a node of the coarsest level has each way.
-constexpr int kPeakPad = 8;
+constexpr int kPeakPad = 4;
 
 /// Scores of the cells of a grid, by rows, the pad included, and for each
 /// coarser level the best of 2^level cells each way from a cell on.

@@ -1,10 +1,10 @@
 #include <plumbline/detectors/curve_hypotheses.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <deque>
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -22,6 +22,9 @@ constexpr int kLineDraws = 24;
 constexpr int kShuffled = 1024;
 constexpr int kCircleDraws = 48;
 constexpr int kMaxRefits = 8;
+// Points that a drawn curve is measured against between two looks whether it
+// can still be the best.
+constexpr Eigen::Index kGainsAtOnce = 32;
 // Points that so many hypotheses explain are not grown from any more.
 constexpr int kEnoughHypotheses = 2;
 // Between two questions whether to stop: some milliseconds.
@@ -162,13 +165,17 @@ class HypothesisDrawer {
             double tolerance, PlanarCurve* best) {
     if (neighborhood.size() < points_.MinPoints(kind)) return false;
     const int draws = kind == CurveKind::kLine ? kLineDraws : kCircleDraws;
+    nearby_.resize(2, static_cast<Eigen::Index>(neighborhood.size()));
+    for (std::size_t k = 0; k < neighborhood.size(); ++k) {
+      nearby_.col(static_cast<Eigen::Index>(k)) =
+          points_.position(neighborhood[k]);
+    }
     double best_gain = 0.0;
     for (int draw = 0; draw < draws; ++draw) {
       PlanarCurve curve;
       std::array<Eigen::Vector2d, 3> sample;
       for (Eigen::Vector2d& position : sample) {
-        position = points_.position(
-            neighborhood[static_cast<std::size_t>(Draw(neighborhood.size()))]);
+        position = nearby_.col(Draw(neighborhood.size()));
       }
       if (kind == CurveKind::kLine) {
         const Eigen::Vector2d along = sample[1] - sample[0];
@@ -179,19 +186,41 @@ class HypothesisDrawer {
                  curve.radius > points_.options().max_radius) {
         continue;
       }
-      const CurveRuler ruler(curve);
-      double gain = 0.0;
-      for (const int i : neighborhood) {
-        const double ratio =
-            ruler.SignedDistance(points_.position(i)) / tolerance;
-        gain += std::max(0.0, 1.0 - ratio * ratio);
-      }
+      const double gain = Gain(curve, tolerance, best_gain);
       if (gain > best_gain) {
         best_gain = gain;
         *best = curve;
       }
     }
     return best_gain > 0.0;
+  }
+
+  // How well a curve fits to the points nearby, each at most 1; less than
+  // `least` where it can't be more.
+  double Gain(const PlanarCurve& curve, double tolerance, double least) const {
+    const double inverse = 1.0 / tolerance;
+    const double c = inverse * std::cos(curve.direction);
+    const double s = inverse * std::sin(curve.direction);
+    const double radius = inverse * curve.radius;
+    const Eigen::Index size = nearby_.cols();
+    double gain = 0.0;
+    Eigen::Array<double, 1, kGainsAtOnce> ratios;
+    for (Eigen::Index begin = 0; begin < size; begin += kGainsAtOnce) {
+      if (gain + static_cast<double>(size - begin) <= least) return 0.0;
+      const Eigen::Index count = std::min(size - begin, kGainsAtOnce);
+      const auto x =
+          nearby_.row(0).segment(begin, count).array() - curve.position.x();
+      const auto y =
+          nearby_.row(1).segment(begin, count).array() - curve.position.y();
+      if (curve.kind == CurveKind::kCircle) {
+        ratios.head(count) =
+            inverse * (x.square() + y.square()).sqrt() - radius;
+      } else {
+        ratios.head(count) = c * y - s * x;
+      }
+      gain += (1.0 - ratios.head(count).square()).max(0.0).sum();
+    }
+    return gain;
   }
 
   // Extends and tightens a drawn curve; false when it is not significant.
@@ -245,26 +274,37 @@ class HypothesisDrawer {
       inlier_stamp_[static_cast<std::size_t>(start)] = epoch;
       const int visit = ++stamp_;
       // Points with the number of points off the curve on the way to them;
-      // those on the curve first.
-      std::deque<std::pair<int, int>> queue = {{start, 0}};
-      while (!queue.empty()) {
-        const auto [from, gap] = queue.front();
-        queue.pop_front();
+      // those on the curve first, the last found of them before all.
+      on_curve_.assign(1, start);
+      off_curve_.clear();
+      std::size_t next = 0;
+      while (!on_curve_.empty() || next < off_curve_.size()) {
+        std::pair<int, int> entry;
+        if (on_curve_.empty()) {
+          entry = off_curve_[next++];
+        } else {
+          entry = {on_curve_.back(), 0};
+          on_curve_.pop_back();
+        }
+        const auto [from, gap] = entry;
         for (const int i : points_.neighbors(from)) {
           const auto k = static_cast<std::size_t>(i);
           if (!points_.IsFree(i) || inlier_stamp_[k] == epoch) continue;
-          if (visit_stamp_[k] == visit && visit_gap_[k] <= gap + 1) continue;
-          if (is_inlier(i)) {
+          const bool was_visited = visit_stamp_[k] == visit;
+          if (was_visited && visit_gap_[k] <= gap + 1) continue;
+          // What was visited is off the curve.
+          if (!was_visited && is_inlier(i)) {
             inlier_stamp_[k] = epoch;
             inliers.push_back(i);
-            queue.emplace_front(i, 0);
+            on_curve_.push_back(i);
             continue;
           }
-          if (visit_stamp_[k] != visit) bystanders.push_back(i);
+          if (!was_visited) bystanders.push_back(i);
           visit_stamp_[k] = visit;
           visit_gap_[k] = gap + 1;
-          if (gap < points_.options().max_gap_points)
-            queue.emplace_back(i, gap + 1);
+          if (gap < points_.options().max_gap_points) {
+            off_curve_.emplace_back(i, gap + 1);
+          }
         }
       }
       if (inliers.size() > hypothesis->inliers.size()) {
@@ -333,6 +373,10 @@ class HypothesisDrawer {
   std::vector<int> inlier_stamp_;
   std::vector<int> visit_stamp_;
   std::vector<int> visit_gap_;
+  std::vector<int> on_curve_;
+  std::vector<std::pair<int, int>> off_curve_;
+  // Positions of a neighbourhood, by columns.
+  Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor> nearby_;
 };
 
 }  // namespace

@@ -175,7 +175,10 @@ Row Measure(int points, bool has_phases, const Registry& registry) {
   EmReport report;
   int steps = 0;
   row.seconds = CpuSecondsOf([&] {
-    SolverSession session(city.graph(), registry, {});
+    SessionOptions session_options;
+    // As plumbline_solve does.
+    session_options.minimizer = "resident";
+    SolverSession session(city.graph(), registry, session_options);
     // As plumbline_solve has it for points.
     EmOptions options;
     options.full_weight_test = true;

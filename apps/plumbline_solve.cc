@@ -294,21 +294,38 @@ void RemoveMapsFrom(std::size_t map, const Registry& registry) {
   }
 }
 
+// Of `flags` those that were given, "--a, --b"; how many.
+int GivenOf(const std::vector<std::string>& flags, std::string* given) {
+  int count = 0;
+  for (const FlagValue& flag : ChangedFlags()) {
+    if (std::count(flags.begin(), flags.end(), flag.name) == 0) continue;
+    *given += (count++ > 0 ? ", --" : "--") + flag.name;
+  }
+  return count;
+}
+
 // Says which flags that were given do nothing for this kind of input.
 void RemarkOnFlags(const std::string& name, const char* kind,
                    const char* other_kind,
                    const std::vector<std::string>& of_the_other) {
   std::string flags;
-  int count = 0;
-  for (const FlagValue& flag : ChangedFlags()) {
-    if (std::count(of_the_other.begin(), of_the_other.end(), flag.name) == 0) {
-      continue;
-    }
-    flags += (count++ > 0 ? ", --" : "--") + flag.name;
-  }
+  const int count = GivenOf(of_the_other, &flags);
   if (count == 0) return;
   Remark("%s is a %s: %s %s for %s and %s no effect", name.c_str(), kind,
          flags.c_str(), count > 1 ? "are" : "is", other_kind,
+         count > 1 ? "have" : "has");
+}
+
+// The same of flags that say more of structure where none is looked for. That
+// is no mistake in a sweep, or in a file of flags that is used with and without
+// structure.
+void RemarkOnStructureFlags() {
+  if (FLAGS_structure) return;
+  std::string flags;
+  const int count = GivenOf(StructureFlags(), &flags);
+  if (count == 0) return;
+  Remark("--structure=false: %s %s of structure and %s no effect",
+         flags.c_str(), count > 1 ? "say more" : "says more",
          count > 1 ? "have" : "has");
 }
 
@@ -408,6 +425,11 @@ void TellOfLog(const std::string& name, const Log& log, Summary* summary) {
            static_cast<long long>(skip.count),
            PrintableUtf8(skip.reason).c_str(), log.position_unit.c_str(),
            places.c_str());
+  }
+  if (!log.skipped.empty() && !log.scans.empty()) {
+    Remark("%s: used are %zu scans, from %.1f s to %.1f s", name.c_str(),
+           log.scans.size(), log.scans.front().timestamp,
+           log.scans.back().timestamp);
   }
   for (const std::string& note : log.notes) {
     Remark("%s: %s", name.c_str(), PrintableUtf8(note).c_str());
@@ -1380,6 +1402,7 @@ int Run() {
     return kExitUsage;
   }
   RefuseFlagsWithoutEffect();
+  RemarkOnStructureFlags();
   // Wrong lists are refused before the work.
   ForFlag("outputs", [&] { SelectOutputs(FLAGS_outputs, registry); });
   if (ParseMarginalsSelection(FLAGS_marginals, registry).empty() &&

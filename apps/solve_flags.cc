@@ -418,6 +418,24 @@ std::vector<std::string> GraphFlags() {
   return {"initial_guess", "max_solver_iterations", "information_frame"};
 }
 
+std::vector<std::string> StructureFlags() {
+  return {"hierarchy",
+          "structure_prior",
+          "detector_parameters",
+          "allowed_angles",
+          "angle_resolution",
+          "structure_sigma_segment_orientation",
+          "structure_sigma_orientation_orientation",
+          "structure_sigma_same_wall",
+          "structure_sigma_same_wall_angle",
+          "structure_sigma_point_line_distance",
+          "structure_sigma_point_circle_distance",
+          "structure_sigma_point_point_coincidence",
+          "delta_threshold",
+          "delta_mode",
+          "full_weight_test"};
+}
+
 std::vector<std::string> LogFlags() {
   return {"align",
           "plan",

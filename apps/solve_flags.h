@@ -78,6 +78,10 @@ std::vector<std::string> InputsFromFlags();
 /// --plan_pose without --plan and the like.
 void RefuseFlagsWithoutEffect();
 
+/// Flags that say how structure is looked for and weighed: without effect where
+/// there is none (--structure=false).
+std::vector<std::string> StructureFlags();
+
 /// By log: where --start_pose says that it starts, in the frame of the first
 /// log, or of --map.
 /// Throws Error when it does not parse or names a log that is not there.

@@ -1528,6 +1528,44 @@ TEST_F(SolveTest, FlagsThatSayMoreOfOneThatIsNotGiven) {
   EXPECT_TRUE(Files("out").empty());
 }
 
+TEST_F(SolveTest, FlagsOfStructureWhereNoneIsLookedFor) {
+  const std::string log = Write("office.log", Join(OfficeLines(20)));
+  // All that the help lists of structure, and its weighing.
+  const std::string flags =
+      "--hierarchy=orientation_mixture --allowed_angles=0,90 "
+      "--angle_resolution=90 --structure_sigma_segment_orientation=1 "
+      "--structure_sigma_orientation_orientation=1 "
+      "--structure_sigma_same_wall=0.1 --structure_sigma_same_wall_angle=1 "
+      "--structure_sigma_point_line_distance=0.1 "
+      "--structure_sigma_point_circle_distance=0.1 "
+      "--structure_sigma_point_point_coincidence=0.1 "
+      "--detector_parameters=same_wall.sigma_offset=0.1 "
+      "--structure_prior='" +
+      Write("my.prior", "angle 0\n") +
+      "' --delta_threshold=0.1 --delta_mode=cauchy --full_weight_test=true ";
+  std::string output;
+  ASSERT_EQ(Solve(log, "out", flags + "--structure=false", &output), 0)
+      << output;
+  const std::size_t begin = output.find("--structure=false: ");
+  ASSERT_NE(begin, std::string::npos) << output;
+  const std::string remark =
+      output.substr(begin, output.find('\n', begin) - begin);
+  EXPECT_THAT(remark, HasSubstr("say more of structure and have no effect"));
+  std::istringstream words(flags);
+  std::string word;
+  while (words >> word) {
+    if (word.substr(0, 2) != "--") continue;
+    EXPECT_THAT(remark, HasSubstr(word.substr(0, word.find('='))));
+  }
+  // One of them is said in the singular, and none where there is structure.
+  ASSERT_EQ(
+      Solve(log, "out", "--delta_threshold=0.1 --structure=false", &output), 0);
+  EXPECT_THAT(output, HasSubstr("--structure=false: --delta_threshold says "
+                                "more of structure and has no effect\n"));
+  ASSERT_EQ(Solve(log, "out", "--delta_threshold=0.1", &output), 0);
+  EXPECT_THAT(output, Not(HasSubstr("no effect")));
+}
+
 TEST_F(SolveTest, FlagsThatAreNotUnderstood) {
   const std::string log = Write("office.log", Join(OfficeLines(20)));
   std::string output;

@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/scan_odometry.h>
 #include <plumbline/frontend/scan_sweep.h>
 
@@ -364,30 +365,58 @@ class Matcher {
   std::deque<Key> keys_;
 };
 
-// In which direction scans, whose matches have these costs, fit each other
-// better as sweeps: 1, -1, or 0 for none. Fills `chosen` with them as seen from
-// the middle of each, placed by matching.
-int ChooseSweep(const ScanOdometryOptions& options, const TurnIntegral& turns,
-                const Calibration* guide, const SweepTrial& trial,
-                std::vector<double> costs, const std::vector<Scan>& scans,
-                std::vector<Scan>* chosen, std::size_t* unmatched) {
-  double best = (1.0 - options.min_sweep_gain) * trial.MeanCost(costs);
-  int sweep = 0;
-  for (const int direction : {1, -1}) {
-    std::vector<Scan> undone = scans;
-    trial.Undo(direction, SweepTrial::kMiddle, &undone);
-    std::size_t lost = 0;
-    if (!Matcher(options, turns).Run(guide, &undone, &lost, nullptr, &costs)) {
-      return 0;
+// Scans taken for sweeps in a direction, or as they are (0), and matched.
+struct SweepRun {
+  int direction = 0;
+  std::vector<Scan> scans;
+  std::vector<double> costs;
+  std::size_t unmatched = 0;
+  // False when the work was stopped.
+  bool is_done = false;
+};
+
+// Matches copies of the scans in each direction. None needs another one: they
+// are run side by side.
+std::vector<SweepRun> RunSweeps(const ScanOdometryOptions& options,
+                                const TurnIntegral& turns,
+                                const Calibration* guide,
+                                const SweepTrial& trial,
+                                const std::vector<int>& directions,
+                                const std::vector<Scan>& scans) {
+  std::vector<SweepRun> runs(directions.size());
+  ParallelFor(runs.size(), ThreadsHere(), [&](std::size_t i) {
+    SweepRun& run = runs[i];
+    run.direction = directions[i];
+    run.scans = scans;
+    if (run.direction != 0) {
+      trial.Undo(run.direction, SweepTrial::kMiddle, &run.scans);
     }
-    const double cost = trial.MeanCost(costs);
+    ScanOdometryOptions own = options;
+    // One of them tells for all.
+    if (i > 0) own.progress = nullptr;
+    run.is_done =
+        Matcher(own, turns)
+            .Run(guide, &run.scans, &run.unmatched, nullptr, &run.costs);
+  });
+  return runs;
+}
+
+// The run in whose direction scans, whose matches have these costs as they are,
+// fit each other better as sweeps; null for none.
+SweepRun* ChooseSweep(const ScanOdometryOptions& options,
+                      const SweepTrial& trial, const std::vector<double>& costs,
+                      std::vector<SweepRun>* runs) {
+  double best = (1.0 - options.min_sweep_gain) * trial.MeanCost(costs);
+  SweepRun* chosen = nullptr;
+  for (SweepRun& run : *runs) {
+    if (!run.is_done) return nullptr;
+    if (run.direction == 0) continue;
+    const double cost = trial.MeanCost(run.costs);
     if (cost >= best) continue;
     best = cost;
-    *chosen = std::move(undone);
-    sweep = direction;
-    *unmatched = lost;
+    chosen = &run;
   }
-  return sweep;
+  return chosen;
 }
 
 }  // namespace
@@ -418,14 +447,16 @@ ScanOdometryReport AddScanOdometry(const ScanOdometryOptions& options,
 
   const SweepTrial trial(scans, turns, guide);
   if (trial.turning().size() < kFewestSweeps) return report;
-  std::vector<Scan> chosen;
-  report.sweep = ChooseSweep(options, turns, guide, trial, costs, scans,
-                             &chosen, &report.unmatched);
-  if (report.sweep == 0) return report;
-  trial.MoveOdometryToBegin(&chosen);
+  std::vector<SweepRun> runs =
+      RunSweeps(options, turns, guide, trial, {1, -1}, scans);
+  SweepRun* const chosen = ChooseSweep(options, trial, costs, &runs);
+  if (chosen == nullptr) return report;
+  report.sweep = chosen->direction;
+  report.unmatched = chosen->unmatched;
+  trial.MoveOdometryToBegin(&chosen->scans);
   trial.Undo(report.sweep, 0.0, &scans);
   for (std::size_t i = 0; i < scans.size(); ++i) {
-    scans[i].odometry = chosen[i].odometry;
+    scans[i].odometry = chosen->scans[i].odometry;
   }
   return report;
 }
@@ -465,15 +496,11 @@ int UndoSweepsByOdometry(const ScanOdometryOptions& options, Log* log) {
   const TurnIntegral turns(rates);
   Calibration odometry;
   odometry.holds = true;
-  std::vector<double> costs;
-  std::size_t unmatched = 0;
-  if (!Matcher(options, turns)
-           .Run(&odometry, &stretch, &unmatched, nullptr, &costs)) {
-    return 0;
-  }
-  std::vector<Scan> chosen;
-  const int sweep = ChooseSweep(options, turns, &odometry, trial, costs,
-                                stretch, &chosen, &unmatched);
+  std::vector<SweepRun> runs =
+      RunSweeps(options, turns, &odometry, trial, {0, 1, -1}, stretch);
+  const SweepRun* const chosen =
+      ChooseSweep(options, trial, runs.front().costs, &runs);
+  const int sweep = chosen == nullptr ? 0 : chosen->direction;
   if (sweep != 0) whole.Undo(sweep, 0.0, &scans);
   return sweep;
 }

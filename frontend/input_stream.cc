@@ -479,6 +479,7 @@ std::uint64_t InputStream::Consume(std::uint64_t count) {
     begin_ += static_cast<std::size_t>(taken);
     left -= taken;
   }
+  position_ += count - left;
   return count - left;
 }
 

@@ -56,6 +56,9 @@ class InputStream {
   /// the input; how many they were. They need not have been peeked at.
   std::uint64_t Consume(std::uint64_t count);
 
+  /// How many bytes were consumed by Consume(), as they are unpacked.
+  std::uint64_t position() const { return position_; }
+
   /// Everything that was not consumed yet, for readers that want a
   /// std::istream. Throws Error on a read error, for more than `limit` bytes
   /// and for nothing but bytes that are zero: what is unpacked may be far
@@ -99,6 +102,7 @@ class InputStream {
   // Unconsumed bytes are buffer_[begin_, end_).
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
+  std::uint64_t position_ = 0;
   int line_number_ = 0;
 };
 

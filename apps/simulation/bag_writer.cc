@@ -309,6 +309,200 @@ std::string BagHeader1(std::uint64_t index, std::size_t topics,
   return bytes;
 }
 
+// Makes an MCAP file.
+class McapFile {
+ public:
+  McapFile(const std::vector<BagRecord>& records,
+           const BagWriterOptions& options)
+      : records_(records),
+        options_(options),
+        topic_of_(Topics(records, &topics_)) {}
+
+  std::string Make() {
+    bytes_ = kMagic;
+    std::string header;
+    PutText("ros2", &header);
+    PutText("plumbline", &header);
+    PutMcap(kHeader, header, &bytes_);
+    std::vector<bool> described(topics_.size(), false);
+    for (std::size_t i = 0; i < records_.size(); ++i) {
+      if (content_.empty()) info_.begin = records_[i].time;
+      const std::size_t topic = topic_of_[i];
+      if (!described[topic]) PutTopic(topic, &content_);
+      described[topic] = true;
+      PutMessage(i);
+      if (content_.size() >= options_.chunk_size) CloseChunk();
+    }
+    CloseChunk();
+    // Checksums of 0 are none.
+    PutMcap(kDataEnd, Number(0, 4), &bytes_);
+    const std::size_t summary = options_.index ? bytes_.size() : 0;
+    if (options_.index) PutSummary();
+    PutMcap(kFooter, Number(summary, 8) + Number(0, 8) + Number(0, 4), &bytes_);
+    return bytes_ + kMagic;
+  }
+
+ private:
+  enum Opcode : unsigned char {
+    kHeader = 0x01,
+    kFooter = 0x02,
+    kSchema = 0x03,
+    kChannel = 0x04,
+    kMessage = 0x05,
+    kChunk = 0x06,
+    kMessageIndex = 0x07,
+    kChunkIndex = 0x08,
+    kStatistics = 0x0b,
+    kDataEnd = 0x0f,
+  };
+
+  // What the index says of a chunk.
+  struct ChunkInfo {
+    std::int64_t begin = 0;
+    std::int64_t end = 0;
+    std::size_t place = 0;
+    std::size_t size = 0;
+    std::size_t index_size = 0;
+    std::size_t packed_size = 0;
+    std::size_t content_size = 0;
+    // By topic: time and place in the chunk of each message.
+    std::map<std::size_t, std::vector<std::pair<std::int64_t, std::size_t>>>
+        messages;
+    // By topic: where the index of its messages stands in the file.
+    std::map<std::size_t, std::size_t> index_places;
+  };
+
+  static void PutMcap(Opcode opcode, const std::string& content,
+                      std::string* bytes) {
+    *bytes += static_cast<char>(opcode);
+    Put(content.size(), 8, bytes);
+    *bytes += content;
+  }
+
+  static std::string Time(std::int64_t time) {
+    return Number(static_cast<std::uint64_t>(time), 8);
+  }
+
+  std::string Compression() const {
+    return options_.compression == "none" ? "" : options_.compression;
+  }
+
+  // Schema and channel.
+  void PutTopic(std::size_t topic, std::string* bytes) const {
+    std::string schema = Number(topic + 1, 2);
+    PutText(Ros2Type(topics_[topic]->type), &schema);
+    PutText("ros2msg", &schema);
+    PutText(Ros2Definition(topics_[topic]->type), &schema);
+    PutMcap(kSchema, schema, bytes);
+    std::string channel = Number(topic, 2) + Number(topic + 1, 2);
+    PutText(topics_[topic]->topic, &channel);
+    PutText("cdr", &channel);
+    Put(0, 4, &channel);
+    PutMcap(kChannel, channel, bytes);
+  }
+
+  void PutMessage(std::size_t i) {
+    const std::int64_t time = records_[i].time;
+    info_.messages[topic_of_[i]].emplace_back(time, content_.size());
+    info_.end = time;
+    PutMcap(kMessage,
+            Number(topic_of_[i], 2) + Number(i, 4) + Time(time) + Time(time) +
+                records_[i].data,
+            &content_);
+  }
+
+  void CloseChunk() {
+    if (content_.empty()) return;
+    if (options_.chunks) {
+      PutChunk();
+    } else {
+      bytes_ += content_;
+    }
+    info_ = ChunkInfo();
+    content_.clear();
+  }
+
+  void PutChunk() {
+    const std::string packed = Compressed(options_.compression, content_);
+    std::string chunk = Time(info_.begin) + Time(info_.end);
+    Put(content_.size(), 8, &chunk);
+    Put(crc32(0, reinterpret_cast<const Bytef*>(content_.data()),
+              static_cast<uInt>(content_.size())),
+        4, &chunk);
+    PutText(Compression(), &chunk);
+    Put(packed.size(), 8, &chunk);
+    chunk += packed;
+    info_.place = bytes_.size();
+    PutMcap(kChunk, chunk, &bytes_);
+    info_.size = bytes_.size() - info_.place;
+    info_.packed_size = packed.size();
+    info_.content_size = content_.size();
+    if (!options_.index) return;
+    const std::size_t index = bytes_.size();
+    for (const auto& [topic, messages] : info_.messages) {
+      std::string entries;
+      for (const auto& [time, place] : messages) {
+        entries += Time(time) + Number(place, 8);
+      }
+      info_.index_places[topic] = bytes_.size();
+      std::string content = Number(topic, 2);
+      PutText(entries, &content);
+      PutMcap(kMessageIndex, content, &bytes_);
+    }
+    info_.index_size = bytes_.size() - index;
+    chunks_.push_back(std::move(info_));
+  }
+
+  // All topics, counts, and where the chunks are.
+  void PutSummary() {
+    for (std::size_t i = 0; i < topics_.size(); ++i) PutTopic(i, &bytes_);
+    std::map<std::size_t, std::uint64_t> counts;
+    std::int64_t begin = records_.empty() ? 0 : records_.front().time;
+    std::int64_t end = begin;
+    for (std::size_t i = 0; i < records_.size(); ++i) {
+      ++counts[topic_of_[i]];
+      begin = std::min(begin, records_[i].time);
+      end = std::max(end, records_[i].time);
+    }
+    std::string by_topic;
+    for (const auto& [topic, count] : counts) {
+      by_topic += Number(topic, 2) + Number(count, 8);
+    }
+    // No attachments, no metadata.
+    std::string statistics =
+        Number(records_.size(), 8) + Number(topics_.size(), 2) +
+        Number(topics_.size(), 4) + Number(0, 4) + Number(0, 4) +
+        Number(chunks_.size(), 4) + Time(begin) + Time(end);
+    PutText(by_topic, &statistics);
+    PutMcap(kStatistics, statistics, &bytes_);
+    for (const ChunkInfo& info : chunks_) {
+      std::string places;
+      for (const auto& [topic, place] : info.index_places) {
+        places += Number(topic, 2) + Number(place, 8);
+      }
+      std::string content = Time(info.begin) + Time(info.end) +
+                            Number(info.place, 8) + Number(info.size, 8);
+      PutText(places, &content);
+      Put(info.index_size, 8, &content);
+      PutText(Compression(), &content);
+      content += Number(info.packed_size, 8) + Number(info.content_size, 8);
+      PutMcap(kChunkIndex, content, &bytes_);
+    }
+  }
+
+  static inline const std::string kMagic{"\x89MCAP0\r\n", 8};
+
+  const std::vector<BagRecord>& records_;
+  const BagWriterOptions& options_;
+  std::vector<const BagRecord*> topics_;
+  std::vector<std::size_t> topic_of_;
+  std::string bytes_;
+  // Of the present chunk.
+  std::string content_;
+  ChunkInfo info_;
+  std::vector<ChunkInfo> chunks_;
+};
+
 // A number with so many digits, as the text of a CARMEN log would give it back.
 double Rounded(double value, int digits) {
   char text[64];
@@ -535,77 +729,7 @@ std::string MakeRosbag1(const std::vector<BagRecord>& records,
 
 std::string MakeMcap(const std::vector<BagRecord>& records,
                      const BagWriterOptions& options) {
-  std::vector<const BagRecord*> topics;
-  const std::vector<std::size_t> topic_of = Topics(records, &topics);
-  const std::string magic("\x89MCAP0\r\n", 8);
-  const auto put = [](unsigned char opcode, const std::string& content,
-                      std::string* bytes) {
-    *bytes += static_cast<char>(opcode);
-    Put(content.size(), 8, bytes);
-    *bytes += content;
-  };
-  std::string bytes = magic;
-  std::string header;
-  PutText("ros2", &header);
-  PutText("plumbline", &header);
-  put(0x01, header, &bytes);
-  std::string content;
-  std::int64_t begin = 0;
-  std::int64_t end = 0;
-  const auto close = [&] {
-    if (content.empty()) return;
-    if (!options.chunks) {
-      bytes += content;
-    } else {
-      std::string chunk;
-      Put(static_cast<std::uint64_t>(begin), 8, &chunk);
-      Put(static_cast<std::uint64_t>(end), 8, &chunk);
-      Put(content.size(), 8, &chunk);
-      Put(crc32(0, reinterpret_cast<const Bytef*>(content.data()),
-                static_cast<uInt>(content.size())),
-          4, &chunk);
-      PutText(options.compression == "none" ? "" : options.compression, &chunk);
-      const std::string packed = Compressed(options.compression, content);
-      Put(packed.size(), 8, &chunk);
-      chunk += packed;
-      put(0x06, chunk, &bytes);
-    }
-    content.clear();
-  };
-  std::vector<bool> described(topics.size(), false);
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const std::size_t topic = topic_of[i];
-    if (content.empty()) begin = records[i].time;
-    if (!described[topic]) {
-      std::string schema;
-      Put(topic + 1, 2, &schema);
-      PutText(Ros2Type(topics[topic]->type), &schema);
-      PutText("ros2msg", &schema);
-      PutText(Ros2Definition(topics[topic]->type), &schema);
-      put(0x03, schema, &content);
-      std::string channel;
-      Put(topic, 2, &channel);
-      Put(topic + 1, 2, &channel);
-      PutText(topics[topic]->topic, &channel);
-      PutText("cdr", &channel);
-      Put(0, 4, &channel);
-      put(0x04, channel, &content);
-      described[topic] = true;
-    }
-    std::string message;
-    Put(topic, 2, &message);
-    Put(i, 4, &message);
-    Put(static_cast<std::uint64_t>(records[i].time), 8, &message);
-    Put(static_cast<std::uint64_t>(records[i].time), 8, &message);
-    message += records[i].data;
-    put(0x05, message, &content);
-    end = records[i].time;
-    if (content.size() >= options.chunk_size) close();
-  }
-  close();
-  put(0x0f, Number(0, 4), &bytes);
-  put(0x02, Number(0, 8) + Number(0, 8) + Number(0, 4), &bytes);
-  return bytes + magic;
+  return McapFile(records, options).Make();
 }
 
 void WriteRosbag2(const std::vector<BagRecord>& records,

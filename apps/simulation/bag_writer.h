@@ -40,7 +40,7 @@ struct BagWriterOptions {
   std::size_t chunk_size = std::size_t{1} << 18;
   /// MCAP: messages in chunks, or one after another.
   bool chunks = true;
-  /// ROS 1: the index at the end.
+  /// The index at the end, and those of chunks (MCAP).
   bool index = true;
 };
 
@@ -49,8 +49,8 @@ struct BagWriterOptions {
 std::string MakeRosbag1(const std::vector<BagRecord>& records,
                         const BagWriterOptions& options = {});
 
-/// An MCAP file with these messages, packed as CDR, without an index. Throws
-/// Error for an unknown compression.
+/// An MCAP file with these messages, packed as CDR. Throws Error for an unknown
+/// compression.
 std::string MakeMcap(const std::vector<BagRecord>& records,
                      const BagWriterOptions& options = {});
 

@@ -28,8 +28,10 @@ constexpr double kOrderSeconds = 1.0;
 constexpr std::size_t kOrderScans = 100;
 // Odometry farther from a scan than this, s, is worth a word.
 constexpr double kFarOdometry = 1.0;
-// Nobody takes longer over a scan, s.
+// Nobody takes longer over a scan, s, nor than from one scan to the next, but
+// for what clocks differ by.
 constexpr double kLongestScan = 1.0;
+constexpr double kLongestSweep = 1.2;
 // Poses that a turn of the laser is sampled with.
 constexpr int kSweepSamples = 16;
 // cos of the angle by which a laser's plane may be out of level.
@@ -175,6 +177,7 @@ class ScanPlacer {
 
   void PlaceScans() {
     const std::vector<Mount> mounts = FindMounts();
+    period_ = TimeBetweenScans();
     const BagScan* before = nullptr;
     std::int64_t far = 0;
     log_->scans.reserve(scans_.size());
@@ -202,6 +205,21 @@ class ScanPlacer {
           " scans are more than 1 s from the next odometry: they are placed "
           "by what is nearest");
     }
+  }
+
+  // Median, s; 0 where nothing is known.
+  double TimeBetweenScans() const {
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < scans_.size(); ++i) {
+      const auto step =
+          static_cast<double>(scans_[i].stamp - scans_[i - 1].stamp);
+      if (step > 0.0) steps.push_back(step / kNanoseconds);
+    }
+    if (steps.empty()) return 0.0;
+    const auto middle =
+        steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    return *middle;
   }
 
   void NoteMount(const Mount& mount, const std::string& frame) {
@@ -289,8 +307,10 @@ class ScanPlacer {
         raw.message.time_increment * static_cast<double>(stride);
     const std::size_t n = scan->ranges.size();
     const double duration = step * static_cast<double>(n - 1);
-    if (!sources_.motion.is_known() || !(std::abs(duration) > 0.0) ||
-        !(std::abs(duration) <= kLongestScan)) {
+    if (!sources_.motion.is_known() || !(std::abs(duration) > 0.0)) return;
+    if (!(std::abs(duration) <= kLongestScan) ||
+        (period_ > 0.0 && std::abs(duration) > kLongestSweep * period_)) {
+      ++impossible_sweeps_;
       return;
     }
     // Of the laser, seen from where it was at first, evenly in time.
@@ -331,6 +351,13 @@ class ScanPlacer {
                             " never changes: it is taken for none");
       log_->odometry_source.clear();
     }
+    if (impossible_sweeps_ > 0) {
+      log_->notes.push_back(
+          "time_increment of " + std::to_string(impossible_sweeps_) + " of " +
+          std::to_string(log_->scans.size()) +
+          " scans says that a sweep takes longer than from one scan to the "
+          "next: it is not believed");
+    }
     if (undone_ > 0) {
       log_->notes.push_back("motion during the scan was undone in " +
                             std::to_string(undone_) + " of " +
@@ -347,6 +374,8 @@ class ScanPlacer {
   Log* log_;
   SkipCounter skips_;
   std::int64_t undone_ = 0;
+  std::int64_t impossible_sweeps_ = 0;
+  double period_ = 0.0;
 };
 
 void AppendReports(const std::vector<SkipReport>& reports, Log* log) {
@@ -373,6 +402,7 @@ Log ReadBag(BagSource* source, const std::string& name,
   BagMessages messages = CollectBagMessages(source, options);
   AppendReports(messages.skipped_by_source, &log);
   AppendReports(messages.skipped, &log);
+  log.notes = source->notes();
   try {
     ScanPlacer placer(options, ChooseBagSources(name, options, &messages, &log),
                       &messages, &log);

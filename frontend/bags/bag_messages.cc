@@ -30,7 +30,11 @@ class Collector {
     source_->SetWanted(
         [this](const BagTopic& topic) { return IsWanted(topic); });
     BagMessage message;
-    while (source_->Next(&message)) TakeMessage(message);
+    while (source_->Next(&message)) {
+      // The bag may say anything.
+      message.time = std::clamp(message.time, -kMostTime, kMostTime);
+      TakeMessage(message);
+    }
     // Topics without messages are known, too.
     if (!source_->topics().empty()) StreamOf(0);
     messages_.topics = source_->topics();
@@ -139,7 +143,7 @@ class Collector {
         }
         for (const TransformMessage& transform : transforms) {
           if (!messages_.tree.Add(
-                  transform, transform.header.stamp,
+                  transform, transform.header.stamp, message.time,
                   stream->kind == BagTopicKind::kStaticTransforms)) {
             Skip("transform of '" + transform.child_frame.substr(0, 60) +
                  "' that has another parent, or no pose: expected one parent, "

@@ -120,6 +120,10 @@ BagMessages CollectBagMessages(BagSource* source, const LaserOptions& options);
 /// and a drive is to be the same in all formats.
 Pose2 PoseInPlane(const Pose3& pose);
 
+/// The most that a time may be, ns, either way: 146 years, which a stamp with
+/// 32 bits of seconds keeps within. Differences of such times fit their type.
+constexpr std::int64_t kMostTime = 4600000000000000000;
+
 /// Seconds of a time in ns: the double nearest to it.
 double SecondsOf(std::int64_t nanoseconds);
 

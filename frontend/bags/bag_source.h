@@ -9,6 +9,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -36,7 +37,8 @@ struct BagMessage {
 };
 
 /// The messages of a bag in the order of the file, one at a time: no more than
-/// a chunk is in memory. What is damaged is passed over and counted.
+/// a chunk for each thread is in memory. What is damaged is passed over and
+/// counted.
 class BagSource {
  public:
   virtual ~BagSource() = default;
@@ -54,6 +56,8 @@ class BagSource {
   const std::vector<BagTopic>& topics() const { return topics_; }
   /// What was passed over so far.
   const std::vector<SkipReport>& skipped() const { return skips_.reports(); }
+  /// What else is to be said of the bag, known at its end.
+  const std::vector<std::string>& notes() const { return notes_; }
   /// "ROS 1 bag", "ROS 2 bag (mcap)", ...: for people.
   const std::string& format() const { return format_; }
 
@@ -70,6 +74,8 @@ class BagSource {
   void Skip(const std::string& reason, std::int64_t count = 1) {
     skips_.Add(reason, position_, count);
   }
+  /// Says something of the bag.
+  void Note(std::string note) { notes_.push_back(std::move(note)); }
   /// A message was met.
   void CountMessage() { ++position_; }
 
@@ -78,6 +84,7 @@ class BagSource {
   std::vector<BagTopic> topics_;
   std::function<bool(const BagTopic&)> wanted_;
   SkipCounter skips_;
+  std::vector<std::string> notes_;
   int position_ = 0;
 };
 

@@ -42,6 +42,13 @@ bool DelayOf(const std::vector<Raw>& messages, std::int64_t* delay) {
   return true;
 }
 
+// Whether poses are not all the same.
+bool Moves(const std::vector<BagPose>& poses) {
+  return std::any_of(poses.begin(), poses.end(), [&](const BagPose& pose) {
+    return pose.pose != poses.front().pose;
+  });
+}
+
 class SourceChooser {
  public:
   SourceChooser(const std::string& name, const LaserOptions& options,
@@ -107,10 +114,19 @@ class SourceChooser {
     const std::string& wanted = options_.odometry_topic;
     std::vector<std::size_t> candidates;
     for (std::size_t i = 0; i < messages_->streams.size(); ++i) {
-      const BagStream& stream = messages_->streams[i];
-      if (stream.kind == BagTopicKind::kOdometry && !stream.poses.empty()) {
-        candidates.push_back(i);
+      BagStream& stream = messages_->streams[i];
+      if (stream.kind != BagTopicKind::kOdometry || stream.poses.empty()) {
+        continue;
       }
+      // What never moves says nothing; another source may.
+      if (wanted.empty() && !Moves(stream.poses)) {
+        stream.seen.why_not = "it never changes";
+        log_->notes.push_back(stream.seen.name +
+                              " never changes: it is taken for none");
+        standing_base_ = stream.child_frame;
+        continue;
+      }
+      candidates.push_back(i);
     }
     const std::string list = messages_->ListOf(BagTopicKind::kOdometry);
     if (wanted == "none") return;
@@ -145,6 +161,7 @@ class SourceChooser {
       return;
     }
     ChooseTransform();
+    if (sources_.base.empty()) sources_.base = standing_base_;
   }
 
   // The frames from the laser to the root, odom -> base -> ... -> laser, and
@@ -161,7 +178,11 @@ class SourceChooser {
         continue;
       }
       sources_.base = chain[i - 1];
-      sources_.motion.SetTransform(&messages_->tree, chain[i], chain[i - 1]);
+      for (const TransformTree::Sample& sample :
+           *messages_->tree.SamplesOf(chain[i - 1])) {
+        transforms_.push_back(
+            {sample.time, sample.received, PoseInPlane(sample.pose)});
+      }
       log_->odometry_source = "tf " + chain[i] + " -> " + chain[i - 1];
       messages_->NoteTransformsUsed("odometry");
       return;
@@ -198,12 +219,21 @@ class SourceChooser {
         if (!is_stamped) return;
       }
       // From its clock to the scans'.
-      const std::int64_t difference = own - (is_stamped ? delay : 0);
+      std::int64_t difference = 0;
+      if (__builtin_sub_overflow(own, is_stamped ? delay : 0, &difference)) {
+        return;
+      }
       if (std::abs(static_cast<double>(difference)) <
           kClockDifference * kNanoseconds) {
         return;
       }
-      for (auto& message : *messages) message.stamp += difference;
+      for (auto& message : *messages) {
+        // Of damaged messages the sum may be too large.
+        if (__builtin_add_overflow(message.stamp, difference, &message.stamp)) {
+          message.stamp = message.received;
+        }
+        message.stamp = std::clamp(message.stamp, -kMostTime, kMostTime);
+      }
       char text[160];
       std::snprintf(text, sizeof text,
                     "is stamped by another clock than the scans: %.3f s are "
@@ -214,7 +244,10 @@ class SourceChooser {
     if (odometry_ != nullptr) {
       align(odometry_->seen.name, &odometry_->poses);
       sources_.motion.SetPoses(std::move(odometry_->poses));
-    } else if (!sources_.motion.is_known()) {
+    } else if (!transforms_.empty()) {
+      align(log_->odometry_source, &transforms_);
+      sources_.motion.SetPoses(std::move(transforms_));
+    } else {
       TakeYawRates(align);
     }
     for (BagStream& stream : messages_->streams) stream.poses = {};
@@ -252,6 +285,10 @@ class SourceChooser {
   Log* log_;
   // The topic of the odometry; null when there is none.
   BagStream* odometry_ = nullptr;
+  // Odometry that comes as a transform.
+  std::vector<BagPose> transforms_;
+  // The robot's frame by odometry that never changes.
+  std::string standing_base_;
   BagSources sources_;
 };
 
@@ -264,19 +301,7 @@ void BagMotion::SetPoses(std::vector<BagPose> poses) {
       [](const BagPose& a, const BagPose& b) { return a.stamp < b.stamp; });
 }
 
-void BagMotion::SetTransform(const TransformTree* tree, std::string odom,
-                             std::string base) {
-  tree_ = tree;
-  odom_ = std::move(odom);
-  base_ = std::move(base);
-}
-
 Pose2 BagMotion::At(std::int64_t time) const {
-  if (tree_ != nullptr) {
-    Pose3 pose;
-    tree_->Lookup(odom_, base_, time, &pose);
-    return PoseInPlane(pose);
-  }
   if (poses_.empty()) return Pose2::Zero();
   const auto after = std::upper_bound(
       poses_.begin(), poses_.end(), time,
@@ -299,6 +324,10 @@ std::int64_t BagMotion::DistanceTo(std::int64_t time) const {
       poses_.begin(), poses_.end(), time,
       [](const BagPose& pose, std::int64_t t) { return pose.stamp < t; });
   std::int64_t distance = -1;
+  if (after != poses_.end() && after != poses_.begin() &&
+      after->pose == (after - 1)->pose) {
+    return 0;
+  }
   if (after != poses_.end()) distance = after->stamp - time;
   if (after != poses_.begin()) {
     const std::int64_t back = time - (after - 1)->stamp;

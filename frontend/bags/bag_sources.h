@@ -12,33 +12,27 @@
 
 namespace plumbline {
 
-/// The robot's poses over time by the odometry of a bag: messages of a topic,
-/// or a transform. Times are ns on the scans' clock.
+/// The robot's poses over time by the odometry of a bag. Times are ns on the
+/// scans' clock.
 class BagMotion {
  public:
-  /// Poses of a topic, in any order.
+  /// Poses of a topic or a transform, in any order.
   void SetPoses(std::vector<BagPose> poses);
-  /// The transform of `base` in `odom`; the tree is not owned.
-  void SetTransform(const TransformTree* tree, std::string odom,
-                    std::string base);
 
   /// Whether there is any odometry.
-  bool is_known() const { return tree_ != nullptr || !poses_.empty(); }
+  bool is_known() const { return !poses_.empty(); }
 
   /// The pose at a time, interpolated; the first and last hold before and after
   /// them. Zero without odometry.
   Pose2 At(std::int64_t time) const;
 
-  /// Time to the nearest pose of a topic, ns; 0 for a transform and without
-  /// odometry.
+  /// Time to the nearest pose, ns; 0 without odometry, and while the robot
+  /// stands still between two.
   std::int64_t DistanceTo(std::int64_t time) const;
 
  private:
   // Ascending.
   std::vector<BagPose> poses_;
-  const TransformTree* tree_ = nullptr;
-  std::string odom_;
-  std::string base_;
 };
 
 /// What the log of a bag is made from.

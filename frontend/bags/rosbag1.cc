@@ -1,4 +1,5 @@
 #include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/bags/chunk_unpacker.h>
 #include <plumbline/frontend/bags/chunked_bag.h>
 #include <plumbline/frontend/bags/little_endian.h>
@@ -8,6 +9,7 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -195,6 +197,10 @@ class Rosbag1 : public ChunkedBag {
         TakeBagHeader(record);
         PassOver(record, bytes);
         break;
+      case kChunkInfo:
+        ++infos_found_;
+        PassOver(record, bytes);
+        break;
       case kIndex:
         PassOverIndex(record, bytes);
         break;
@@ -342,6 +348,9 @@ class Rosbag1 : public ChunkedBag {
     if (Number(record.fields, "chunk_count", 4, &count)) {
       chunks_stated_ = static_cast<std::int64_t>(count);
     }
+    // 0 in a bag that nobody closed.
+    std::uint64_t index = 0;
+    has_index_ = Number(record.fields, "index_pos", 8, &index) && index > 0;
   }
 
   void TakeChunk(const Record& record) {
@@ -354,6 +363,7 @@ class Rosbag1 : public ChunkedBag {
     // believed.
     if (compression == "none") {
       input()->Consume(record.header_size);
+      plain_end_ = input()->position() + stored_size;
       return;
     }
     if (!IsKnownCompression(compression) || compression == "zstd") {
@@ -363,6 +373,13 @@ class Rosbag1 : public ChunkedBag {
       return;
     }
     input()->Consume(record.header_size);
+    UnpackedChunk ahead;
+    if (TakeAhead(compression, stored_size, static_cast<std::size_t>(size),
+                  &ahead)) {
+      input()->Consume(stored_size);
+      SetChunk(std::move(ahead));
+      return;
+    }
     std::size_t shown = std::min(stored_size, kLargestRecord);
     std::string_view stored = input()->Peek(shown);
     UnpackedChunk unpacked = UnpackChunk(
@@ -397,6 +414,73 @@ class Rosbag1 : public ChunkedBag {
     SetChunk(std::move(unpacked));
   }
 
+  // The chunk whose stored bytes the input is at, unpacked, where it and its
+  // record's sizes are as they should be; false else, and where nothing is
+  // gained. Chunks hold a block of bzip2 or so: the next ones are unpacked with
+  // it, one for each thread.
+  bool TakeAhead(const std::string& compression, std::size_t stored_size,
+                 std::size_t size, UnpackedChunk* unpacked) {
+    const std::uint64_t place = input()->position();
+    if (ahead_.count(place) == 0) {
+      ahead_.clear();
+      if (ThreadsHere() > 1) LookAhead(compression, stored_size, size);
+    }
+    const auto found = ahead_.find(place);
+    if (found == ahead_.end()) return false;
+    *unpacked = std::move(found->second);
+    ahead_.erase(found);
+    return unpacked->is_whole && unpacked->consumed == stored_size;
+  }
+
+  // Unpacks the chunk whose stored bytes the input is at, and those that
+  // follow.
+  void LookAhead(const std::string& compression, std::size_t stored_size,
+                 std::size_t size) {
+    struct Job {
+      std::string compression;
+      std::size_t begin;
+      std::size_t stored_size;
+      std::size_t size;
+      UnpackedChunk unpacked;
+    };
+    std::vector<Job> jobs;
+    jobs.push_back({compression, 0, stored_size, size, {}});
+    std::size_t end = stored_size;
+    const auto most = static_cast<std::size_t>(ThreadsHere());
+    while (jobs.size() < most && end <= kFarthestAhead) {
+      const std::string_view view = input()->Peek(end + kUsualHeader);
+      Record record;
+      if (view.size() <= end ||
+          ParseRecord(view.substr(end), &record) != Parsed::kRecord ||
+          (record.op != kIndex && record.op != kChunk)) {
+        break;
+      }
+      const std::size_t begin = end + record.header_size;
+      end = begin + record.data_size;
+      if (record.op == kIndex) continue;
+      std::uint64_t next_size = 0;
+      Number(record.fields, "size", 4, &next_size);
+      jobs.push_back({Text(record.fields, "compression"),
+                      begin,
+                      record.data_size,
+                      static_cast<std::size_t>(next_size),
+                      {}});
+    }
+    if (jobs.size() < 2 || end > kFarthestAhead) return;
+    const std::string_view view = input()->Peek(end);
+    ParallelFor(jobs.size(), ThreadsHere(), [&](std::size_t i) {
+      Job& job = jobs[i];
+      // What breaks off is left to who says so.
+      if (job.begin + job.stored_size > view.size()) return;
+      job.unpacked =
+          UnpackChunk(job.compression, view.substr(job.begin, job.stored_size),
+                      job.size, kLargestRecord);
+    });
+    for (Job& job : jobs) {
+      ahead_[input()->position() + job.begin] = std::move(job.unpacked);
+    }
+  }
+
   // What the bag says it has and has not.
   void Close() {
     if (!input()->damage().empty()) {
@@ -404,16 +488,36 @@ class Rosbag1 : public ChunkedBag {
     } else if (chunks_stated_ > chunks_found_) {
       Skip("chunk that the bag says it has and that is not there",
            chunks_stated_ - chunks_found_);
+    } else if (input()->position() < plain_end_) {
+      Skip("chunk that breaks off: what came before is used");
+    } else if (has_index_ && infos_found_ < chunks_stated_) {
+      Skip("index that breaks off: the messages before it are all there");
+    } else if (!has_index_ && !is_closed_) {
+      Note(
+          "the bag was not closed by its recorder and has no index: what there "
+          "is of it is used");
     }
+    is_closed_ = true;
     chunks_stated_ = 0;
+    plain_end_ = 0;
   }
 
+  // So many stored bytes are looked ahead.
+  static constexpr std::size_t kFarthestAhead = std::size_t{1} << 26;
   // Headers are seldom longer.
   static constexpr std::size_t kUsualHeader = 512;
 
   std::map<std::uint64_t, std::size_t> connections_;
+  // Chunks that are unpacked, by the place of their stored bytes.
+  std::map<std::uint64_t, UnpackedChunk> ahead_;
   std::int64_t chunks_stated_ = 0;
   std::int64_t chunks_found_ = 0;
+  bool has_index_ = false;
+  bool is_closed_ = false;
+  std::int64_t infos_found_ = 0;
+  // Where the last chunk that is not compressed says that it ends, counted as
+  // the input's position.
+  std::uint64_t plain_end_ = 0;
   bool at_end_ = false;
 };
 

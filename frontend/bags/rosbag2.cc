@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -296,6 +297,8 @@ bool NumbersInOrder(const std::string& a, const std::string& b) {
 // entry of a list on each line.
 struct Metadata {
   std::vector<std::string> files;
+  // Of all topics; -1 where it is not said.
+  std::int64_t message_count = -1;
   std::string compression;
   std::string compression_mode;
 };
@@ -318,6 +321,7 @@ Metadata ParseMetadata(const std::string& text) {
   std::istringstream lines(text);
   std::string line;
   bool in_files = false;
+  std::size_t count_indent = std::string::npos;
   while (std::getline(lines, line)) {
     const std::string trimmed = Unquoted(line);
     const auto value_of = [&](std::string_view key, std::string* value) {
@@ -334,6 +338,16 @@ Metadata ParseMetadata(const std::string& text) {
       in_files = false;
       value_of("compression_format:", &metadata.compression);
       value_of("compression_mode:", &metadata.compression_mode);
+      // Topics and files have counts of their own, farther to the right.
+      const std::size_t indent = line.find_first_not_of(" \t");
+      if (indent < count_indent && value_of("message_count:", &rest)) {
+        const auto [end, failure] = std::from_chars(
+            rest.data(), rest.data() + rest.size(), metadata.message_count);
+        if (failure != std::errc() || end != rest.data() + rest.size()) {
+          metadata.message_count = -1;
+        }
+        count_indent = indent;
+      }
     }
   }
   std::transform(metadata.compression_mode.begin(),
@@ -369,6 +383,7 @@ class Rosbag2Folder : public BagSource {
       const Metadata metadata =
           ParseMetadata(ReadTextFile(metadata_path.string(), kLargestMetadata));
       files_ = metadata.files;
+      messages_stated_ = metadata.message_count;
       if (metadata.compression_mode == "MESSAGE") {
         compression_ = metadata.compression;
         if (!IsKnownCompression(compression_)) {
@@ -387,7 +402,7 @@ class Rosbag2Folder : public BagSource {
     }
     if (files_.empty()) files_ = BagFilesIn(path);
     for (const std::string& file : files_) {
-      const auto size = fs::file_size(fs::path(path) / file, error);
+      const auto size = fs::file_size(PathOf(file), error);
       if (!error) size_ += static_cast<std::int64_t>(size);
     }
     OpenNext();
@@ -404,6 +419,7 @@ class Rosbag2Folder : public BagSource {
     while (source_ != nullptr) {
       if (source_->Next(message)) {
         CountMessage();
+        ++messages_found_;
         message->topic = TopicOf(message->topic);
         if (compression_.empty() || message->data.empty()) return true;
         UnpackedChunk unpacked =
@@ -418,8 +434,13 @@ class Rosbag2Folder : public BagSource {
       }
       TakeSkips();
       source_.reset();
-      if (stop_ && stop_()) break;
+      if (stop_ && stop_()) return false;
       OpenNext();
+    }
+    if (messages_found_ < messages_stated_) {
+      Skip("message that metadata.yaml counts and that is not there",
+           messages_stated_ - messages_found_);
+      messages_stated_ = -1;
     }
     return false;
   }
@@ -436,13 +457,28 @@ class Rosbag2Folder : public BagSource {
     for (const SkipReport& skip : source_->skipped()) {
       Skip(files_[next_file_ - 1] + ": " + skip.reason, skip.count);
     }
+    for (const std::string& note : source_->notes()) {
+      Note(files_[next_file_ - 1] + ": " + note);
+    }
+  }
+
+  // Where a file lies that metadata.yaml names: a recorder that compresses
+  // names what it wrote before, or somebody unpacked it.
+  std::string PathOf(const std::string& name) const {
+    constexpr std::string_view kPacked = ".zstd";
+    const std::string path = (fs::path(folder_) / name).string();
+    std::error_code error;
+    if (fs::exists(path, error)) return path;
+    const std::string other = EndsWith(path, kPacked)
+                                  ? path.substr(0, path.size() - kPacked.size())
+                                  : path + std::string(kPacked);
+    return fs::exists(other, error) ? other : path;
   }
 
   // The next file that can be read; none at the end.
   void OpenNext() {
     while (source_ == nullptr && next_file_ < files_.size()) {
-      const std::string path =
-          (fs::path(folder_) / files_[next_file_++]).string();
+      const std::string path = PathOf(files_[next_file_++]);
       try {
         input_ = std::make_unique<InputStream>(path, stop_);
         if (progress_) {
@@ -488,6 +524,8 @@ class Rosbag2Folder : public BagSource {
   std::string compression_;
   std::string unpacked_;
   std::string first_error_;
+  std::int64_t messages_stated_ = -1;
+  std::int64_t messages_found_ = 0;
   std::int64_t done_ = 0;
   std::int64_t size_ = 0;
 };

@@ -53,7 +53,7 @@ std::string PlainFrameName(const std::string& frame) {
 }
 
 bool TransformTree::Add(const TransformMessage& message, std::int64_t time,
-                        bool is_static) {
+                        std::int64_t received, bool is_static) {
   const std::string child = PlainFrameName(message.child_frame);
   const std::string parent = PlainFrameName(message.header.frame);
   Pose3 pose;
@@ -72,7 +72,7 @@ bool TransformTree::Add(const TransformMessage& message, std::int64_t time,
   std::vector<Sample>& samples = edge.samples;
   if (edge.is_static) {
     // Said again, perhaps better: the last word holds.
-    samples.assign(1, {time, pose});
+    samples.assign(1, {time, received, pose});
     return true;
   }
   // Of what stands still the ends are enough.
@@ -80,8 +80,9 @@ bool TransformTree::Add(const TransformMessage& message, std::int64_t time,
   if (n >= 2 && time >= samples[n - 1].time &&
       IsSame(samples[n - 1].pose, pose) && IsSame(samples[n - 2].pose, pose)) {
     samples.back().time = time;
+    samples.back().received = received;
   } else {
-    samples.push_back({time, pose});
+    samples.push_back({time, received, pose});
   }
   return true;
 }
@@ -162,13 +163,10 @@ bool TransformTree::IsMoving(const std::string& frame) const {
   });
 }
 
-bool TransformTree::Span(const std::string& frame, std::int64_t* first,
-                         std::int64_t* last) const {
+const std::vector<TransformTree::Sample>* TransformTree::SamplesOf(
+    const std::string& frame) const {
   const auto edge = edges_.find(PlainFrameName(frame));
-  if (edge == edges_.end()) return false;
-  *first = edge->second.samples.front().time;
-  *last = edge->second.samples.back().time;
-  return true;
+  return edge == edges_.end() ? nullptr : &edge->second.samples;
 }
 
 std::string TransformTree::Describe() const {

@@ -32,10 +32,21 @@ bool ToPose3(const Pose3Message& message, Pose3* pose);
 /// in front.
 class TransformTree {
  public:
-  /// Adds a transform of time `time` (ns). A frame keeps its first parent;
-  /// false when another is given, the frame is its own parent, or its transform
-  /// is no rigid motion: nothing is added then.
-  bool Add(const TransformMessage& message, std::int64_t time, bool is_static);
+  /// A frame's pose in its parent at a time.
+  struct Sample {
+    /// ns, as stamped.
+    std::int64_t time = 0;
+    /// ns, when it was recorded.
+    std::int64_t received = 0;
+    Pose3 pose;
+  };
+
+  /// Adds a transform, stamped with `time` and recorded at `received` (ns). A
+  /// frame keeps its first parent; false when another is given, the frame is
+  /// its own parent, or its transform is no rigid motion: nothing is added
+  /// then.
+  bool Add(const TransformMessage& message, std::int64_t time,
+           std::int64_t received, bool is_static);
 
   /// Puts what was added in the order of time. Call once all is in.
   void Sort();
@@ -56,9 +67,9 @@ class TransformTree {
   /// Whether the pose of `frame` in its parent was given over time and changed.
   bool IsMoving(const std::string& frame) const;
 
-  /// Times (ns) of the first and last transform of `frame` to its parent.
-  bool Span(const std::string& frame, std::int64_t* first,
-            std::int64_t* last) const;
+  /// The poses of `frame` in its parent over time; of a time in which it stood
+  /// still, the ends. Null when it has none.
+  const std::vector<Sample>* SamplesOf(const std::string& frame) const;
 
   /// "odom -> base_link -> laser, ...": every way from a root, for people.
   std::string Describe() const;
@@ -67,10 +78,6 @@ class TransformTree {
   bool empty() const { return edges_.empty(); }
 
  private:
-  struct Sample {
-    std::int64_t time;
-    Pose3 pose;
-  };
   struct Edge {
     std::string parent;
     bool is_static = false;

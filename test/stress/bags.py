@@ -20,6 +20,10 @@ import struct
 import numpy as np
 
 EPOCH = 1.7e9  # s
+# What is done to all time stamps and names of frames, by the options.
+STAMP = lambda time: EPOCH + time
+FRAME = lambda name: name
+RECORDED = lambda time: EPOCH + time
 ODOMETRY_RATE = 30.0  # Hz
 
 
@@ -44,9 +48,9 @@ class Cdr:
         return self
 
     def header(self, time, frame):
-        stamp = round((EPOCH + time) * 1e9)
+        stamp = round(STAMP(time) * 1e9)
         return self.put("i", stamp // 10**9).put(
-            "I", stamp % 10**9).text(frame)
+            "I", stamp % 10**9).text(FRAME(frame))
 
     def numbers(self, kind, values):
         self.align(struct.calcsize(kind))
@@ -62,7 +66,7 @@ class Bag:
 
     def add(self, time, topic, kind, message):
         index = self.topics.setdefault(topic, (len(self.topics) + 1, kind))[0]
-        self.messages.append((round((EPOCH + time) * 1e9), index,
+        self.messages.append((round(RECORDED(time) * 1e9), index,
                               bytes(message.data)))
 
     def write(self, folder):
@@ -137,7 +141,7 @@ def drift(poses, noise):
 
 
 def transform(message, time, parent, child, x, y, rotation):
-    message.header(time, parent).text(child).put("d", x, y, 0.2, *rotation)
+    message.header(time, parent).text(FRAME(child)).put("d", x, y, 0.2, *rotation)
 
 
 def parse():
@@ -160,7 +164,8 @@ def parse():
     parser.add_argument("--lost", type=float, default=0.02,
                         help="share of beams without a return")
     parser.add_argument("--no_return", default="inf",
-                        choices=["inf", "nan", "0", "mixed"])
+                        choices=["inf", "nan", "0", "max", "beyond", "mixed"],
+                        help="max: range_max itself; beyond: more")
     parser.add_argument("--sweep", type=float, default=1.0,
                         help="share of the time between scans that a sweep "
                         "takes; 0: all beams at once")
@@ -178,6 +183,20 @@ def parse():
     parser.add_argument("--two_lasers", action="store_true")
     parser.add_argument("--clock", type=float, default=0.0,
                         help="by how much odometry's clock is ahead, s")
+    parser.add_argument("--clock_jump", type=float, default=0.0,
+                        help="by how much all clocks jump half way, s")
+    parser.add_argument("--odometry_until", type=float, default=1.0,
+                        help="share of the drive after which odometry is gone")
+    parser.add_argument("--odometry_reset", type=float, default=1.0,
+                        help="share after which odometry begins at zero again")
+    parser.add_argument("--zero_stamps", action="store_true",
+                        help="of all headers")
+    parser.add_argument("--out_of_order", type=float, default=0.0,
+                        help="share of scans recorded after the next one")
+    parser.add_argument("--twice", type=float, default=0.0,
+                        help="share of scans recorded twice")
+    parser.add_argument("--slashes", action="store_true",
+                        help="in front of the names of frames")
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args()
 
@@ -185,6 +204,10 @@ def parse():
 def main():
     options = parse()
     noise = np.random.default_rng(options.seed)
+    noise_of_order = np.random.default_rng(options.seed + 1000)
+    global STAMP, FRAME, RECORDED
+    if options.slashes:
+        FRAME = lambda name: "/" + name
     with open(options.truth) as source:
         truth = json.load(source)
     walls = np.array([[wall[key] for key in ("x1", "y1", "x2", "y2")]
@@ -194,6 +217,12 @@ def main():
     drive[:, 0] = (drive[:, 0] - drive[0, 0]) / options.speed
     drive[:, 3] = np.unwrap(drive[:, 3])
     end = drive[-1, 0]
+
+    def clock(time):
+        return EPOCH + time + (options.clock_jump if time > end / 2 else 0.0)
+
+    STAMP = (lambda time: 0.0) if options.zero_stamps else clock
+    RECORDED = clock
 
     def poses_at(times):
         return np.stack([np.interp(times, drive[:, 0], drive[:, i])
@@ -222,6 +251,7 @@ def main():
         is_lost = ((ranges > options.reach) | (ranges < 0.15)
                    | (noise.random(beams) < options.lost))
         kinds = {"inf": [np.inf], "nan": [np.nan], "0": [0.0],
+                 "max": [options.reach], "beyond": [options.reach + 5.0],
                  "mixed": [np.inf, np.nan, 0.0]}[options.no_return]
         ranges = np.where(is_lost, noise.choice(kinds, beams), ranges)
         message = Cdr().header(time, frame)
@@ -229,14 +259,21 @@ def main():
                     per_beam if options.time_increment else 0.0, period, 0.15,
                     options.reach)
         message.put("I", beams).numbers("f", ranges).put("I", 0)
-        bag.add(time + period + 0.01, topic, "sensor_msgs/msg/LaserScan",
-                message)
+        late = period + 0.01
+        if options.out_of_order > noise_of_order.random():
+            late += 1.5 * period
+        bag.add(time + late, topic, "sensor_msgs/msg/LaserScan", message)
+        if options.twice > noise_of_order.random():
+            bag.add(time + late + 0.001, topic, "sensor_msgs/msg/LaserScan",
+                    message)
 
     with open(options.folder.rstrip("/") + ".tum", "w") as reference:
         time = 0.5
         while time < end - 1.0:
             x, y, heading = poses_at(time)
-            reference.write(f"{EPOCH + time:.9f} {x:.6f} {y:.6f} 0 0 0 "
+            stamp = (RECORDED(time + period + 0.01)
+                     if options.zero_stamps else clock(time))
+            reference.write(f"{stamp:.9f} {x:.6f} {y:.6f} 0 0 0 "
                             f"{np.sin(heading / 2):.9f} "
                             f"{np.cos(heading / 2):.9f}\n")
             add_scan(time, "/scan", "laser", options.offset, yaw)
@@ -248,16 +285,25 @@ def main():
     times = np.arange(0.0, end, 1.0 / ODOMETRY_RATE)
     true = poses_at(times)
     odometry = drift(true, noise)
+    after = times > options.odometry_reset * end
+    if after.any():
+        first = odometry[after][0]
+        cos, sin = np.cos(first[2]), np.sin(first[2])
+        moved = odometry[after] - first
+        odometry[after] = np.stack(
+            [cos * moved[:, 0] + sin * moved[:, 1],
+             -sin * moved[:, 0] + cos * moved[:, 1], moved[:, 2]], -1)
     rates = np.gradient(true[:, 2]) * ODOMETRY_RATE
     for i, time in enumerate(times):
         x, y, heading = odometry[i]
         turn = (0.0, 0.0, np.sin(heading / 2), np.cos(heading / 2))
         stamp = time + options.clock
-        if options.odometry in ("both", "odom"):
-            message = Cdr().header(stamp, "odom").text("base_link")
+        is_there = time <= options.odometry_until * end
+        if is_there and options.odometry in ("both", "odom"):
+            message = Cdr().header(stamp, "odom").text(FRAME("base_link"))
             message.put("d", x, y, 0.0, *turn).numbers("d", np.zeros(78))
             bag.add(time + 0.005, "/odom", "nav_msgs/msg/Odometry", message)
-        if options.odometry in ("both", "tf"):
+        if is_there and options.odometry in ("both", "tf"):
             message = Cdr().put("I", 1)
             transform(message, stamp, "odom", "base_link", x, y, turn)
             bag.add(time + 0.006, "/tf", "tf2_msgs/msg/TFMessage", message)

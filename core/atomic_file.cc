@@ -21,43 +21,77 @@ namespace fs = std::filesystem;
   throw Error(path, 0, "cannot " + action + reason, "a writable place");
 }
 
-// Removes the temporary file unless it was renamed.
+// A file to write to that stands beside `target` until it takes its place. It
+// has no name until it is whole, so that a process that ends before leaves
+// nothing behind, whatever ended it. Not every file system has such files: then
+// it has a name from the beginning, which is removed unless it was renamed.
 class TemporaryFile {
  public:
-  // Creates a new file beside `target`; the user's umask applies.
-  explicit TemporaryFile(const fs::path& target) {
-    for (int attempt = 0; attempt < 100; ++attempt) {
-      path_ = target.string() + ".tmp" + std::to_string(getpid()) + "_" +
-              std::to_string(attempt);
-      const int descriptor =
-          open(path_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
-      if (descriptor >= 0) {
-        close(descriptor);
-        return;
-      }
-      if (errno != EEXIST) break;
+  // The user's umask applies.
+  explicit TemporaryFile(const fs::path& target) : target_(target.string()) {
+    const fs::path folder = target.parent_path();
+    descriptor_ = open(folder.empty() ? "." : folder.c_str(),
+                       O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+    // What it is given a name by in the end.
+    if (descriptor_ >= 0 && access(Descriptor().c_str(), F_OK) != 0) {
+      close(descriptor_);
+      descriptor_ = -1;
     }
-    const int error_number = errno;
-    path_.clear();
-    Fail(target.string(), "create a file", error_number);
+    if (descriptor_ >= 0) return;
+    const bool has_name = TryNames([this](const std::string& name) {
+      descriptor_ =
+          open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+      return descriptor_ >= 0;
+    });
+    if (!has_name) Fail(target_, "create a file", errno);
   }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
   ~TemporaryFile() {
-    if (!path_.empty()) unlink(path_.c_str());
+    if (!name_.empty()) unlink(name_.c_str());
+    close(descriptor_);
   }
 
-  const std::string& path() const { return path_; }
+  int descriptor() const { return descriptor_; }
 
-  void RenameTo(const std::string& target) {
-    if (std::rename(path_.c_str(), target.c_str()) != 0) {
-      Fail(target, "replace the file", errno);
+  void Replace() {
+    if (name_.empty() && !TryNames([this](const std::string& name) {
+          return linkat(AT_FDCWD, Descriptor().c_str(), AT_FDCWD, name.c_str(),
+                        AT_SYMLINK_FOLLOW) == 0;
+        })) {
+      Fail(target_, "create a file", errno);
     }
-    path_.clear();
+    if (std::rename(name_.c_str(), target_.c_str()) != 0) {
+      Fail(target_, "replace the file", errno);
+    }
+    name_.clear();
   }
 
  private:
-  std::string path_;
+  std::string Descriptor() const {
+    return "/proc/self/fd/" + std::to_string(descriptor_);
+  }
+
+  // Names the file so as `make` could make it; false, with errno, when it could
+  // not.
+  template <typename Function>
+  bool TryNames(const Function& make) {
+    for (int attempt = 0; attempt < 100; ++attempt) {
+      const std::string name = target_ + ".tmp" + std::to_string(getpid()) +
+                               "_" + std::to_string(attempt);
+      if (make(name)) {
+        name_ = name;
+        return true;
+      }
+      if (errno != EEXIST) break;
+    }
+    return false;
+  }
+
+  std::string target_;
+  // Empty while it has none.
+  std::string name_;
+  int descriptor_ = -1;
 };
 
 // Writes to a descriptor and keeps why it failed: a std::ofstream forgets the
@@ -103,14 +137,14 @@ class DescriptorBuffer : public std::streambuf {
   int error_number_ = 0;
 };
 
-// Opens a file that exists for writing.
-class OpenFile {
+// A pipe or a device, open for writing.
+class OpenDevice {
  public:
   // Opening a pipe waits for its reader, for ever if none comes, unless
   // O_NONBLOCK is given.
-  OpenFile(const std::string& file, const std::string& path)
+  explicit OpenDevice(const std::string& path)
       : descriptor_(
-            open(file.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC | O_NONBLOCK)) {
+            open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC | O_NONBLOCK)) {
     if (descriptor_ < 0 && errno == ENXIO) {
       throw Error(path, 0, "cannot open the pipe for writing: nobody reads it",
                   "a file, or a pipe with a reader");
@@ -118,9 +152,9 @@ class OpenFile {
     if (descriptor_ < 0) Fail(path, "open the file for writing", errno);
     fcntl(descriptor_, F_SETFL, fcntl(descriptor_, F_GETFL) & ~O_NONBLOCK);
   }
-  ~OpenFile() { close(descriptor_); }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
+  ~OpenDevice() { close(descriptor_); }
+  OpenDevice(const OpenDevice&) = delete;
+  OpenDevice& operator=(const OpenDevice&) = delete;
 
   int descriptor() const { return descriptor_; }
 
@@ -128,19 +162,18 @@ class OpenFile {
   int descriptor_;
 };
 
-// Runs `write` on a stream to `file`, all of which is on the disk afterwards;
-// `path` is what messages name.
-void WriteStream(const std::string& file, const std::string& path,
+// Runs `write` on a stream to `descriptor`, all of which is on the disk
+// afterwards; `path` is what messages name.
+void WriteStream(int descriptor, const std::string& path,
                  const std::function<void(std::ostream&)>& write) {
-  const OpenFile open_file(file, path);
-  DescriptorBuffer buffer(open_file.descriptor());
+  DescriptorBuffer buffer(descriptor);
   std::ostream stream(&buffer);
   write(stream);
   stream.flush();
   if (!stream) Fail(path, "write the file", buffer.error_number());
   // The data must be on the disk before the name is, or a crash could leave
   // the new name with no content. Pipes and devices have no disk (EINVAL).
-  if (fsync(open_file.descriptor()) != 0 && errno != EINVAL && errno != EROFS) {
+  if (fsync(descriptor) != 0 && errno != EINVAL && errno != EROFS) {
     Fail(path, "write the file", errno);
   }
 }
@@ -154,7 +187,8 @@ void WriteFileAtomically(const std::string& path,
   if (fs::is_directory(status)) Fail(path, "write the file", EISDIR);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     // A pipe or a terminal cannot be replaced, only written to.
-    WriteStream(path, path, write);
+    const OpenDevice device(path);
+    WriteStream(device.descriptor(), path, write);
     return;
   }
   // A symbolic link stays a link: what it points at is replaced.
@@ -164,8 +198,8 @@ void WriteFileAtomically(const std::string& path,
     if (!ignored) target = resolved;
   }
   TemporaryFile temporary(target);
-  WriteStream(temporary.path(), path, write);
-  temporary.RenameTo(target.string());
+  WriteStream(temporary.descriptor(), path, write);
+  temporary.Replace();
 }
 
 }  // namespace plumbline

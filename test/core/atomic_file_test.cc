@@ -4,9 +4,11 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -154,6 +156,39 @@ TEST_F(AtomicFileTest, APipeWithoutAReaderIsRefused) {
   char text[8];
   EXPECT_EQ(read(reader, text, sizeof(text)), 3);
   close(reader);
+  EXPECT_EQ(FilesInFolder(), 1);
+}
+
+// Also after kill -9 in the middle of a large file.
+TEST_F(AtomicFileTest, AProcessThatIsKilledLeavesTheOldFileAlone) {
+  const int probe = open(folder_.c_str(), O_TMPFILE | O_WRONLY, 0600);
+  if (probe < 0) GTEST_SKIP() << "no files without names here";
+  close(probe);
+  const std::string path = folder_ / "map.txt";
+  WriteFileAtomically(path, [](std::ostream& out) { out << "old"; });
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    WriteFileAtomically(path, [](std::ostream& out) {
+      out << std::string(1000000, 'x') << std::flush;
+      raise(SIGKILL);
+    });
+    _exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(Read(path), "old");
+  EXPECT_EQ(FilesInFolder(), 1);
+}
+
+// The file is named beside its target, wherever the process stands.
+TEST_F(AtomicFileTest, NamesWithoutAFolder) {
+  const fs::path before = fs::current_path();
+  fs::current_path(folder_);
+  WriteFileAtomically("map.txt", [](std::ostream& out) { out << "here"; });
+  fs::current_path(before);
+  EXPECT_EQ(Read(folder_ / "map.txt"), "here");
   EXPECT_EQ(FilesInFolder(), 1);
 }
 

@@ -4,6 +4,7 @@
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/output_files.h>
 #include <plumbline/apps/evaluation/closure_truth.h>
 #include <plumbline/apps/evaluation/grid_file.h>
 #include <plumbline/apps/evaluation/map_evaluation.h>
@@ -171,7 +172,7 @@ void TellTrajectory(const char* role, const TrajectoryFile& file) {
               file.format.c_str(), file.source.empty() ? "" : " ",
               PrintableUtf8(file.source).c_str(), file.poses.size());
   for (const std::string& note : file.notes) {
-    std::fprintf(stderr, "%s: %s\n", file.name.c_str(),
+    std::fprintf(stderr, "%s: %s\n", PrintableUtf8(file.name).c_str(),
                  PrintableUtf8(note).c_str());
   }
 }
@@ -571,6 +572,18 @@ int Run() {
                       ": expected a name that ends in .svg or .png");
   }
 
+  CheckOutputFiles({{"trajectory", FLAGS_trajectory},
+                    {"reference", FLAGS_reference},
+                    {"relations", FLAGS_relations},
+                    {"truth", FLAGS_truth},
+                    {"map", FLAGS_map},
+                    {"plan", FLAGS_plan},
+                    {"rooms", FLAGS_rooms},
+                    {"grid", FLAGS_grid}},
+                   {{"output", FLAGS_output},
+                    {"plot", FLAGS_plot},
+                    {"pose_errors", FLAGS_pose_errors},
+                    {"relation_errors", FLAGS_relation_errors}});
   std::vector<TimedPose> trajectory;
   Json result;
   if (!FLAGS_trajectory.empty()) {

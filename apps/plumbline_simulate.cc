@@ -4,6 +4,7 @@
 
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/output_files.h>
 #include <plumbline/apps/cli/progress.h>
 #include <plumbline/apps/simulation/bag_writer.h>
 #include <plumbline/apps/simulation/bent_world.h>
@@ -149,12 +150,20 @@ bool EndsWith(const std::string& text, const std::string& ending) {
 // Bytes.
 constexpr std::size_t kLargestWorldFile = std::size_t{1} << 28;
 
-World LoadWorld() {
+bool IsBuiltIn(const std::string& world) {
   const std::vector<std::string>& names = BuiltInWorlds();
-  if (std::find(names.begin(), names.end(), FLAGS_world) != names.end()) {
+  return std::find(names.begin(), names.end(), world) != names.end();
+}
+
+bool IsBent(const std::string& world) {
+  return world == "bent" || world == "bent_niches";
+}
+
+World LoadWorld() {
+  if (IsBuiltIn(FLAGS_world)) {
     return MakeWorld(FLAGS_world, FLAGS_seed, FLAGS_size);
   }
-  if (FLAGS_world == "bent" || FLAGS_world == "bent_niches") {
+  if (IsBent(FLAGS_world)) {
     BentOptions options =
         FLAGS_world == "bent" ? BentOptions() : NichesOptions();
     options.bend_deg = FLAGS_bend_deg;
@@ -299,21 +308,22 @@ int Run() {
     throw Error("plumbline_simulate", 0, "a flag is missing",
                 "--world and --output (--help explains them)");
   }
+  const bool is_file = !IsSynthetic(FLAGS_world) && !IsBuiltIn(FLAGS_world) &&
+                       !IsBent(FLAGS_world);
+  CheckOutputFiles({{"world", is_file ? FLAGS_world : ""}},
+                   {{"output", FLAGS_output},
+                    {"truth", FLAGS_truth},
+                    {"relations", FLAGS_relations},
+                    {"save_world", FLAGS_save_world}});
   if (IsSynthetic(FLAGS_world)) return RunSynthetic();
   CheckCompression();
   World world = LoadWorld();
   RotateWorld(FLAGS_rotation, &world);
-  if (!FLAGS_save_world.empty()) {
-    WriteFileAtomically(FLAGS_save_world, [&](std::ostream& output) {
-      output << "# " << Provenance() << '\n';
-      WriteWorld(world, output);
-    });
-  }
   SimulatorOptions options = OptionsFromFlags();
   Progress progress("simulating", "per mille", 1000);
   options.progress = [&progress](double share) {
     progress.Update(static_cast<std::int64_t>(1000 * share));
-    return !InterruptRequested();
+    return true;
   };
   Simulation simulation = Simulate(world, options, FLAGS_seed);
   progress.Finish();
@@ -325,6 +335,12 @@ int Run() {
          FLAGS_output.c_str());
 
   WriteLog(simulation, options.laser);
+  if (!FLAGS_save_world.empty()) {
+    WriteFileAtomically(FLAGS_save_world, [&](std::ostream& output) {
+      output << "# " << Provenance() << '\n';
+      WriteWorld(world, output);
+    });
+  }
   if (!FLAGS_truth.empty()) {
     WriteFileAtomically(FLAGS_truth, [&](std::ostream& output) {
       WriteTruth(simulation, output);
@@ -381,6 +397,8 @@ int main(int argc, char** argv) {
         "odometry_noise", "odometry_heading_noise", "odometry_turn_noise"}},
       {"Drive", {"speed", "turn_rate", "sway", "scan_rate"}},
       {"Stress", {"stress", "stress_count"}}};
+  // A log that is cut short would not tell: what was there before stays.
+  info.interrupts_end_it = true;
   plumbline::ParseFlags(info, argc, argv);
   return plumbline::RunMain(plumbline::Run);
 }

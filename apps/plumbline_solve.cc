@@ -34,6 +34,7 @@
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/several_logs.h>
 #include <plumbline/pipeline/without_structure.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -235,7 +236,7 @@ void TellEnd(const SolveOutcome& outcome, RunClock* clock) {
   for (const std::string& line :
        FLAGS_localize ? ClosingLinesInMap(outcome, FLAGS_output_dir, FLAGS_map)
                       : ClosingLines(outcome, FLAGS_output_dir)) {
-    std::printf("%s\n", line.c_str());
+    std::printf("%s\n", PrintableLines(line).c_str());
   }
 }
 
@@ -597,6 +598,11 @@ std::string DigestOf(const Log& log) {
 // the map in the end, nor on the number of threads.
 CheckpointFile::Identity IdentityOfRun(const Log& log) {
   CheckpointFile::Identity identity;
+  // A state is memory of this program, which nobody else is to write: whoever
+  // sends a folder with one does not know what the folder will be here.
+  struct stat folder = {};
+  stat(FLAGS_output_dir.c_str(), &folder);
+  identity["the folder's inode"] = std::to_string(folder.st_ino);
   identity["the version"] = kVersion;
   identity["the program's digest"] = Sha256OfFile("/proc/self/exe");
   identity["the input's digest"] = DigestOf(log);

@@ -58,4 +58,15 @@ std::string PrintableUtf8(std::string_view text) {
   return printable;
 }
 
+std::string PrintableLines(std::string_view text) {
+  std::string printable;
+  while (true) {
+    const std::size_t end = text.find('\n');
+    printable += PrintableUtf8(text.substr(0, end));
+    if (end == std::string_view::npos) return printable;
+    printable += '\n';
+    text.remove_prefix(end + 1);
+  }
+}
+
 }  // namespace plumbline

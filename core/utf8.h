@@ -22,6 +22,9 @@ inline void RemoveByteOrderMark(std::string* text) {
 /// files and other words of users that are shown.
 std::string PrintableUtf8(std::string_view text);
 
+/// The same line by line, line ends kept: for messages.
+std::string PrintableLines(std::string_view text);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_CORE_UTF8_H_

@@ -42,18 +42,23 @@ namespace plumbline {
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
+// Whether messages go to one.
+volatile std::sig_atomic_t has_terminal = 0;
 
 extern "C" void HandleInterrupt(int) { interrupted = 1; }
 
 // Only what is safe within a signal handler.
 extern "C" void EndAtInterrupt(int) {
-  constexpr char kWords[] = "interrupted\n";
+  // On a terminal there may be a progress bar, which goes.
+  constexpr char kWords[] = "\r\033[Kinterrupted\n";
+  const std::size_t begin = has_terminal != 0 ? 0 : 4;
   [[maybe_unused]] const ssize_t written =
-      write(STDERR_FILENO, kWords, sizeof(kWords) - 1);
+      write(STDERR_FILENO, kWords + begin, sizeof(kWords) - 1 - begin);
   _exit(kExitInterrupted);
 }
 
 void CatchInterrupts(bool end_at_once) {
+  has_terminal = isatty(STDERR_FILENO);
   struct sigaction action = {};
   action.sa_handler = end_at_once ? EndAtInterrupt : HandleInterrupt;
   // The second signal finds the default action: the way out of work that does
@@ -146,8 +151,8 @@ FlagValue ToFlagValue(const gflags::CommandLineFlagInfo& info) {
 
 [[noreturn]] void ExitWithUsageError(const AppInfo& info,
                                      const std::string& message) {
-  std::fprintf(stderr, "%s%s: --help lists the flags\n", message.c_str(),
-               info.name.c_str());
+  std::fprintf(stderr, "%s%s: --help lists the flags\n",
+               PrintableLines(message).c_str(), info.name.c_str());
   std::exit(kExitUsage);
 }
 
@@ -281,13 +286,14 @@ int RunMain(const std::function<int()>& run) {
     std::fprintf(stderr, "interrupted\n");
     status = kExitInterrupted;
   } catch (const Error& error) {
-    std::fprintf(stderr, "%s\n", error.what());
+    std::fprintf(stderr, "%s\n", PrintableLines(error.what()).c_str());
     status = kExitInput;
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "out of memory\n");
     status = kExitInternal;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "internal error: %s\n", error.what());
+    std::fprintf(stderr, "internal error: %s\n",
+                 PrintableLines(error.what()).c_str());
     status = kExitInternal;
   } catch (...) {
     // A plug-in may throw anything.

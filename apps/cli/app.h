@@ -49,9 +49,9 @@ struct AppInfo {
   std::vector<FlagGroup> groups;
   /// Arguments that are no flags are refused unless this is true.
   bool takes_arguments = false;
-  /// Ctrl-C and SIGTERM end the process at once, with status kExitInterrupted:
-  /// of binaries that have nothing to show before they are done, and so do not
-  /// ask InterruptRequested().
+  /// Ctrl-C and SIGTERM end the process at once, with status kExitInterrupted
+  /// and the files as they were: of binaries that have nothing to show before
+  /// they are done, and so do not ask InterruptRequested().
   bool interrupts_end_it = false;
 };
 

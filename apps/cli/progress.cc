@@ -1,5 +1,6 @@
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/progress.h>
+#include <plumbline/core/utf8.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -33,9 +34,16 @@ void WipeBar() {
 }
 
 void PrintLine(const char* format, va_list arguments) {
+  va_list again;
+  va_copy(again, arguments);
+  const int size = std::vsnprintf(nullptr, 0, format, again);
+  va_end(again);
+  std::string line(static_cast<std::size_t>(std::max(size, 0)) + 1, '\0');
+  std::vsnprintf(line.data(), line.size(), format, arguments);
+  line.pop_back();
   WipeBar();
-  std::vfprintf(stderr, format, arguments);
-  std::fputc('\n', stderr);
+  // A terminal would obey what a name may hold.
+  std::fprintf(stderr, "%s\n", PrintableLines(line).c_str());
 }
 
 int TerminalColumns() {

@@ -70,6 +70,19 @@ TEST_F(EvaluateTest, AnInterruptEndsIt) {
   EXPECT_THAT(output, HasSubstr("interrupted"));
 }
 
+TEST_F(EvaluateTest, WhatIsReadIsNotReplaced) {
+  const std::string before = Read("path.tum");
+  std::string output;
+  EXPECT_EQ(
+      Run(Flag("trajectory", "path.tum") + Flag("relations", "true.relations") +
+              Flag("output", "path.tum"),
+          &output),
+      2);
+  EXPECT_THAT(output, HasSubstr("--output: "));
+  EXPECT_THAT(output, HasSubstr("what --trajectory reads"));
+  EXPECT_EQ(Read("path.tum"), before);
+}
+
 TEST_F(EvaluateTest, Relations) {
   std::string output;
   ASSERT_EQ(

@@ -864,6 +864,11 @@ TEST_F(SolveTest, AKilledRunIsGoneOnWith) {
   const std::string other = Write("other.log", Join(OfficeLines(249)));
   EXPECT_EQ(Solve(other, "out", flags, &output), 2);
   EXPECT_THAT(output, HasSubstr("the input's digest"));
+  // So is the state of a folder that was sent by somebody.
+  fs::create_directories(folder_ / "sent");
+  fs::copy_file(checkpoint, folder_ / "sent/checkpoint.plumbline");
+  EXPECT_EQ(Solve(log, "sent", flags, &output), 2);
+  EXPECT_THAT(output, HasSubstr("the folder's inode was '"));
   EXPECT_TRUE(fs::exists(checkpoint));
 
   ASSERT_EQ(Solve(log, "out", flags, &output), 0) << output;
@@ -1431,6 +1436,12 @@ TEST_F(SolveTest, NamesThatAreNoText) {
     EXPECT_FALSE(
         nlohmann::json::parse(Out("out", "floorplan.geojson"), nullptr, false)
             .is_discarded());
+    // Nor does a terminal obey what a folder is named, or a file that is bad.
+    ASSERT_EQ(Solve(log, "out" + name, "--outputs=map.json", &output), 0)
+        << output;
+    EXPECT_EQ(output.find('\x1b'), std::string::npos);
+    EXPECT_EQ(Solve(Write("bad" + name, "nothing"), "out", "", &output), 2);
+    EXPECT_EQ(output.find('\x1b'), std::string::npos);
   }
 }
 

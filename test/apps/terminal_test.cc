@@ -225,12 +225,41 @@ TEST_F(TerminalTest, BarWithTimeLeft) {
   EXPECT_THAT(process.output(), HasSubstr("simulating ["));
   EXPECT_THAT(process.output(), HasSubstr("%"));
   EXPECT_THAT(process.output(), HasSubstr(" per mille/s"));
-  // It does not take more than it has to: what is there is written.
+  // The bar gives way.
   process.Signal(SIGINT);
   EXPECT_EQ(process.Wait(), 130);
-  EXPECT_THAT(process.output(),
-              HasSubstr("interrupted: what was done so far is written"));
-  EXPECT_GT(fs::file_size(folder_ / "log.clf"), 1000u);
+  EXPECT_THAT(process.output(), HasSubstr("\r\033[Kinterrupted"));
+  EXPECT_FALSE(fs::exists(folder_ / "log.clf"));
+}
+
+// Half a log would not tell that it is half a log: what was there stays, and
+// nothing comes beside it.
+TEST_F(TerminalTest, AnInterruptedSimulationLeavesWhatWasThere) {
+  const std::string simulate =
+      std::string(PLUMBLINE_BIN_DIR) + "/plumbline_simulate";
+  for (const int signal : {SIGINT, SIGTERM}) {
+    for (const char* name : {"log", "truth.json", "relations", "world"}) {
+      std::ofstream(folder_ / name) << "of yesterday";
+    }
+    Process process(simulate,
+                    {"--world=killian_like", "--size=4", "--verbose",
+                     "--output=" + (folder_ / "log").string(),
+                     "--truth=" + (folder_ / "truth.json").string(),
+                     "--relations=" + (folder_ / "relations").string(),
+                     "--save_world=" + (folder_ / "world").string()},
+                    /*on_terminal=*/true);
+    // Of the bar: it comes while the beams are cast.
+    EXPECT_TRUE(process.WaitFor(" left")) << process.output();
+    process.Signal(signal);
+    EXPECT_EQ(process.Wait(), 130);
+    for (const char* name : {"log", "truth.json", "relations", "world"}) {
+      std::ifstream file(folder_ / name);
+      const std::string text{std::istreambuf_iterator<char>(file), {}};
+      EXPECT_EQ(text, "of yesterday") << name;
+      fs::remove(folder_ / name);
+    }
+    EXPECT_TRUE(fs::is_empty(folder_));
+  }
 }
 
 TEST_F(TerminalTest, NoBarInAPipe) {

@@ -31,6 +31,13 @@ TEST(Utf8Test, IllFormedBytesAndControlsAreReplaced) {
   EXPECT_EQ(PrintableUtf8("\xF4\x90\x80\x80"), kNone + kNone + kNone + kNone);
 }
 
+TEST(Utf8Test, LinesKeepTheirEnds) {
+  EXPECT_EQ(PrintableLines(""), "");
+  EXPECT_EQ(PrintableLines("a\nb"), "a\nb");
+  EXPECT_EQ(PrintableLines("\na\x1b[2J\n\xFC\n"),
+            "\na\xEF\xBF\xBD[2J\n\xEF\xBF\xBD\n");
+}
+
 TEST(Utf8Test, ByteOrderMark) {
   std::string text =
       "\xEF\xBB\xBF"

@@ -1,0 +1,50 @@
+#include <plumbline/apps/cli/output_files.h>
+#include <plumbline/core/error.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <system_error>
+
+namespace plumbline {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool AreTheSame(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  if (fs::exists(a, error) && fs::exists(b, error)) {
+    return (fs::is_regular_file(a, error) || fs::is_directory(a, error)) &&
+           fs::equivalent(a, b, error);
+  }
+  // One that is not there yet, perhaps through a link to its folder.
+  const fs::path first = fs::weakly_canonical(fs::absolute(a, error), error);
+  return !error &&
+         first == fs::weakly_canonical(fs::absolute(b, error), error) && !error;
+}
+
+}  // namespace
+
+void CheckOutputFiles(const std::vector<FlagFile>& inputs,
+                      const std::vector<FlagFile>& outputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const FlagFile& output = outputs[i];
+    if (output.path.empty()) continue;
+    for (const FlagFile& input : inputs) {
+      if (input.path.empty() || !AreTheSame(output.path, input.path)) continue;
+      throw Error("--" + output.flag, 0,
+                  "'" + output.path + "' is what --" + input.flag +
+                      " reads, and would be replaced",
+                  "another name");
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (outputs[j].path.empty() || !AreTheSame(output.path, outputs[j].path))
+        continue;
+      throw Error("--" + output.flag, 0,
+                  "'" + output.path + "' is written for --" + outputs[j].flag +
+                      " already",
+                  "another name");
+    }
+  }
+}
+
+}  // namespace plumbline

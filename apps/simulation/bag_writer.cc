@@ -3,6 +3,7 @@
 #include <plumbline/apps/simulation/bag_writer.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/sha256.h>
 #include <sqlite3.h>
 #include <zlib.h>
 #include <zstd.h>
@@ -13,14 +14,20 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <map>
+#include <new>
+#include <set>
 #include <sstream>
 
 namespace plumbline {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr char kMetadata[] = "metadata.yaml";
 
 void Put(std::uint64_t value, std::size_t size, std::string* bytes) {
   for (std::size_t i = 0; i < size; ++i) {
@@ -523,10 +530,12 @@ Pose3Message ToPose(const Pose2& pose) {
 // Microseconds, as the text of a CARMEN log has them.
 std::int64_t StampOf(double time) { return std::llround(time * 1e6) * 1000; }
 
+// In memory, so that the file comes to stand whole.
 class Database {
  public:
+  // `path`: what messages name.
   explicit Database(const std::string& path) : path_(path) {
-    if (sqlite3_open_v2(path.c_str(), &database_,
+    if (sqlite3_open_v2(":memory:", &database_,
                         SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
                         nullptr) != SQLITE_OK) {
       Fail();
@@ -553,10 +562,20 @@ class Database {
     if (sqlite3_step(statement) != SQLITE_DONE) Fail();
     sqlite3_reset(statement);
   }
+  // The content of a file with this database.
+  std::string Bytes() {
+    sqlite3_int64 size = 0;
+    unsigned char* const bytes = sqlite3_serialize(database_, "main", &size, 0);
+    if (bytes == nullptr) throw std::bad_alloc();
+    const std::string content(reinterpret_cast<const char*>(bytes),
+                              static_cast<std::size_t>(size));
+    sqlite3_free(bytes);
+    return content;
+  }
   [[noreturn]] void Fail() {
     throw Error(path_, 0,
-                std::string("cannot be written: ") + sqlite3_errmsg(database_),
-                "a folder to write to, with room");
+                std::string("cannot be made: ") + sqlite3_errmsg(database_),
+                "messages that fit into a database");
   }
 
  private:
@@ -564,10 +583,10 @@ class Database {
   sqlite3* database_ = nullptr;
 };
 
-void WriteDatabase(const std::vector<BagRecord>& records,
-                   const std::vector<const BagRecord*>& topics,
-                   const std::vector<std::size_t>& topic_of,
-                   const std::string& path) {
+std::string MakeDatabase(const std::vector<BagRecord>& records,
+                         const std::vector<const BagRecord*>& topics,
+                         const std::vector<std::size_t>& topic_of,
+                         const std::string& path) {
   Database database(path);
   database.Run(
       "PRAGMA journal_mode=OFF; PRAGMA synchronous=OFF; BEGIN;"
@@ -604,6 +623,54 @@ void WriteDatabase(const std::vector<BagRecord>& records,
   }
   sqlite3_finalize(message);
   database.Run("COMMIT");
+  return database.Bytes();
+}
+
+std::string DigestOf(const std::string& text) {
+  Sha256 digest;
+  digest.Update(text);
+  return digest.HexDigest();
+}
+
+// metadata.yaml begins with lines that prove who wrote the bag: the digests
+// that the database may have, and that of the lines of YAML that follow.
+constexpr char kDatabaseLine[] = "# plumbline: SHA-256 of the database: ";
+constexpr char kTextLine[] = "# plumbline: SHA-256 of the lines below: ";
+
+std::string SignedMetadata(const std::set<std::string>& digests,
+                           const std::string& text) {
+  std::string content;
+  for (const std::string& digest : digests) {
+    content += kDatabaseLine + digest + '\n';
+  }
+  return content + kTextLine + DigestOf(text) + '\n' + text;
+}
+
+// Whether all that is in a folder are files of SignedMetadata and the database
+// that it tells of, if that is there.
+bool IsOurBag(const fs::path& folder, const std::string& database) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if ((name != kMetadata && name != database) ||
+        !fs::is_regular_file(fs::symlink_status(entry->path(), error))) {
+      return false;
+    }
+  }
+  std::ifstream file(folder / kMetadata, std::ios::binary);
+  std::set<std::string> digests;
+  std::string line;
+  const auto value = [&line](const std::string& key) {
+    return line.compare(0, key.size(), key) == 0 ? line.substr(key.size()) : "";
+  };
+  while (std::getline(file, line) && !value(kDatabaseLine).empty()) {
+    digests.insert(value(kDatabaseLine));
+  }
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  return value(kTextLine) == DigestOf(text) &&
+         (!fs::exists(folder / database, error) ||
+          digests.count(Sha256OfFile((folder / database).string())) > 0);
 }
 
 }  // namespace
@@ -736,39 +803,36 @@ void WriteRosbag2(const std::vector<BagRecord>& records,
                   const std::string& folder) {
   std::error_code error;
   const fs::path path(folder);
-  const fs::path metadata = path / "metadata.yaml";
-  if (fs::exists(path, error) &&
+  std::string name = path.filename().string();
+  if (name.empty()) name = path.parent_path().filename().string();
+  const std::string file = name + "_0.db3";
+  if (fs::exists(fs::symlink_status(path, error)) &&
       !(fs::is_directory(path, error) &&
-        (fs::is_empty(path, error) || fs::exists(metadata, error)))) {
-    throw Error(folder, 0, "is something else than a ROS 2 bag",
-                "a new folder, or such a bag to replace");
+        (fs::is_empty(path, error) || IsOurBag(path, file)))) {
+    throw Error(folder, 0, "holds something else than this program wrote there",
+                "a new or empty folder, or a ROS 2 bag that was simulated "
+                "there and not changed");
   }
   fs::create_directories(path, error);
   if (error) {
     throw Error(folder, 0, "cannot be made: " + error.message(),
                 "a folder to write to");
   }
-  std::string name = path.filename().string();
-  if (name.empty()) name = path.parent_path().filename().string();
-  const std::string file = name + "_0.db3";
-  const fs::path whole = path / file;
-  const fs::path part = path / (file + ".part");
-  fs::remove(part, error);
-  // Without its description the folder is no bag until all is there.
-  fs::remove(metadata, error);
+  const std::string whole = (path / file).string();
+  const std::string metadata = (path / kMetadata).string();
   std::vector<const BagRecord*> topics;
   const std::vector<std::size_t> topic_of = Topics(records, &topics);
-  try {
-    WriteDatabase(records, topics, topic_of, part.string());
-  } catch (const Error&) {
-    fs::remove(part, error);
-    throw;
-  }
-  fs::rename(part, whole, error);
-  if (error) {
-    throw Error(whole.string(), 0, "cannot be written: " + error.message(),
-                "a folder to write to");
-  }
+  const std::string database = MakeDatabase(records, topics, topic_of, whole);
+  const std::string digest = DigestOf(database);
+  const auto write = [](const std::string& place, const std::string& content) {
+    WriteFileAtomically(
+        place, [&content](std::ostream& output) { output << content; });
+  };
+  // Until all is there the description says nothing but whose the bag is.
+  std::set<std::string> digests = {digest};
+  if (fs::exists(whole, error)) digests.insert(Sha256OfFile(whole));
+  write(metadata, SignedMetadata(digests, ""));
+  write(whole, database);
   std::vector<std::int64_t> counts(topics.size(), 0);
   for (const std::size_t topic : topic_of) ++counts[topic];
   std::int64_t begin = records.empty() ? 0 : records.front().time;
@@ -777,30 +841,30 @@ void WriteRosbag2(const std::vector<BagRecord>& records,
     begin = std::min(begin, record.time);
     end = std::max(end, record.time);
   }
-  WriteFileAtomically(metadata.string(), [&](std::ostream& output) {
-    output << "rosbag2_bagfile_information:\n"
-              "  version: 5\n"
-              "  storage_identifier: sqlite3\n"
-              "  duration:\n"
-              "    nanoseconds: "
-           << end - begin
-           << "\n  starting_time:\n"
-              "    nanoseconds_since_epoch: "
-           << begin << "\n  message_count: " << records.size()
-           << "\n  topics_with_message_count:\n";
-    for (std::size_t i = 0; i < topics.size(); ++i) {
-      output << "    - topic_metadata:\n        name: " << topics[i]->topic
-             << "\n        type: " << Ros2Type(topics[i]->type)
-             << "\n        serialization_format: cdr\n"
-                "        offered_qos_profiles: \"\"\n"
-                "      message_count: "
-             << counts[i] << '\n';
-    }
-    output << "  compression_format: \"\"\n"
-              "  compression_mode: \"\"\n"
-              "  relative_file_paths:\n    - "
-           << file << '\n';
-  });
+  std::ostringstream text;
+  text << "rosbag2_bagfile_information:\n"
+          "  version: 5\n"
+          "  storage_identifier: sqlite3\n"
+          "  duration:\n"
+          "    nanoseconds: "
+       << end - begin
+       << "\n  starting_time:\n"
+          "    nanoseconds_since_epoch: "
+       << begin << "\n  message_count: " << records.size()
+       << "\n  topics_with_message_count:\n";
+  for (std::size_t i = 0; i < topics.size(); ++i) {
+    text << "    - topic_metadata:\n        name: " << topics[i]->topic
+         << "\n        type: " << Ros2Type(topics[i]->type)
+         << "\n        serialization_format: cdr\n"
+            "        offered_qos_profiles: \"\"\n"
+            "      message_count: "
+         << counts[i] << '\n';
+  }
+  text << "  compression_format: \"\"\n"
+          "  compression_mode: \"\"\n"
+          "  relative_file_paths:\n    - "
+       << file << '\n';
+  write(metadata, SignedMetadata({digest}, text.str()));
 }
 
 std::vector<BagRecord> SimulatedMessages(const Simulation& simulation,

@@ -55,8 +55,10 @@ std::string MakeMcap(const std::vector<BagRecord>& records,
                      const BagWriterOptions& options = {});
 
 /// Writes a ROS 2 bag, a folder with metadata.yaml and a .db3, with these
-/// messages, packed as CDR. Throws Error when it cannot, or when there is
-/// something at `folder` that is no such bag.
+/// messages, packed as CDR. Until both are there, metadata.yaml names no file.
+/// Throws Error when it cannot, or when there is something at `folder` that is
+/// not provably, by the digests in its metadata.yaml, a bag that this wrote and
+/// nobody changed.
 void WriteRosbag2(const std::vector<BagRecord>& records,
                   const std::string& folder);
 

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -91,6 +92,28 @@ Json ToJson(const ExperimentResult& result) {
           {"means", std::move(means)}};
 }
 
+// Throws Error when the summary.json of a folder is of another program, which
+// it may need to know its own files by.
+void CheckFolder(const std::string& folder) {
+  const std::string path = folder + "/summary.json";
+  std::ifstream file(path);
+  if (!file) return;
+  const Json json = Json::parse(file, nullptr, false);
+  const std::vector<std::string>& names = ExperimentNames();
+  bool is_ours = json.is_object() && json.contains("seed");
+  if (is_ours) {
+    for (const auto& item : json.items()) {
+      is_ours =
+          is_ours && (item.key() == "version" || item.key() == "seed" ||
+                      std::count(names.begin(), names.end(), item.key()) > 0);
+    }
+  }
+  if (!is_ours) {
+    throw Error(path, 0, "is of no experiments, and would be replaced",
+                "another --output_dir");
+  }
+}
+
 int Run() {
   const std::vector<std::string> selected = SelectedExperiments();
   if (FLAGS_output_dir.empty()) {
@@ -102,6 +125,7 @@ int Run() {
     throw Error("--output_dir", 0, "cannot make '" + FLAGS_output_dir + "'",
                 "a folder that can be written to");
   }
+  CheckFolder(FLAGS_output_dir);
   Registry registry;
   RegisterBuiltins(&registry);
   ExperimentOptions options;

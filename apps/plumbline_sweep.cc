@@ -13,6 +13,7 @@
 #include <plumbline/apps/sweep/sweep_table.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/sha256.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/outputs/summary.h>
@@ -379,8 +380,23 @@ std::string EstimateText(const Estimate& estimate, std::size_t trials) {
   return text;
 }
 
+// Removes the best.flags of an earlier question, which would be taken for the
+// answer to this one; false when somebody else's is in its place, which stays.
+bool RemoveBest(SweepDefinition* definition, const std::string& folder) {
+  const std::string path = folder + "/best.flags";
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(path, error))) return true;
+  if (definition->best_digest.empty() ||
+      Sha256OfFile(path) != definition->best_digest) {
+    return false;
+  }
+  fs::remove(path);
+  return true;
+}
+
 // Prints the best setting, and writes it as a flag file.
-void TellBest(const SweepResult& result, const std::string& folder) {
+void TellBest(const SweepResult& result, bool may_write,
+              SweepDefinition* definition, const std::string& folder) {
   const bool minimize = !FLAGS_minimize.empty();
   const std::string figure = minimize ? FLAGS_minimize : FLAGS_maximize;
   const std::optional<BestSetting> best = FindBest(result, figure, minimize);
@@ -398,12 +414,21 @@ void TellBest(const SweepResult& result, const std::string& folder) {
     std::printf("as good as far as one can tell: %s\n",
                 SettingText(result.definition, settings[i].values).c_str());
   }
-  WriteFileAtomically(folder + "/best.flags", [&](std::ostream& output) {
-    for (const std::string& flag :
-         SettingFlags(result.definition, setting.values)) {
-      output << flag << '\n';
-    }
-  });
+  const std::string path = folder + "/best.flags";
+  if (!may_write) {
+    throw Error(path, 0, "is not what this sweep wrote, and stays",
+                "the file in another place");
+  }
+  std::string text;
+  for (const std::string& flag :
+       SettingFlags(result.definition, setting.values)) {
+    text += flag + '\n';
+  }
+  Sha256 digest;
+  digest.Update(text);
+  definition->best_digest = digest.HexDigest();
+  WriteDefinition(*definition, folder);
+  WriteFileAtomically(path, [&](std::ostream& output) { output << text; });
 }
 
 // sweep.svg and sweep.html.
@@ -458,6 +483,19 @@ void AskForTrust(const SweepDefinition& definition, const std::string& folder) {
       "the command behind --, or --trust");
 }
 
+// Nothing of somebody else is replaced by the first run in a folder.
+void CheckNewFolder(const std::string& folder) {
+  for (const char* name :
+       {"sweep.csv", "sweep.svg", "sweep.html", "best.flags", "runs"}) {
+    std::error_code error;
+    if (fs::exists(fs::symlink_status(folder + "/" + name, error))) {
+      throw Error(folder + "/" + name, 0,
+                  "is there, and no sweep.json that tells of it",
+                  "another --output_dir");
+    }
+  }
+}
+
 int RunOne(const std::string& folder) {
   const std::optional<SweepDefinition> definition = ReadDefinition(folder);
   if (!definition) throw Error(folder, 0, "holds no sweep", "sweep.json");
@@ -491,7 +529,10 @@ int Run(const std::vector<std::string>& command) {
   SweepDefinition definition;
   if (!command.empty()) {
     definition = DefinitionFromFlags(command);
-    if (old_one) CheckSameRuns(*old_one, definition, folder);
+    if (old_one) {
+      CheckSameRuns(*old_one, definition, folder);
+      definition.best_digest = old_one->best_digest;
+    }
   } else if (old_one) {
     definition = *old_one;
     AskForTrust(definition, folder);
@@ -507,6 +548,7 @@ int Run(const std::vector<std::string>& command) {
     throw Error("--output_dir", 0, "cannot make '" + folder + "'",
                 "a folder that can be written to");
   }
+  if (!old_one) CheckNewFolder(folder);
   CheckObjectiveBeforehand(definition);
   CheckFlagsOfRuns(definition);
   const FolderLock lock(folder);
@@ -519,10 +561,12 @@ int Run(const std::vector<std::string>& command) {
   });
   TellRuns(result);
   WriteOverview(result, folder);
-  // An earlier question's answer would be taken for this one's.
-  fs::remove(folder + "/best.flags");
+  const bool may_write = RemoveBest(&definition, folder);
   if (!FLAGS_minimize.empty() || !FLAGS_maximize.empty()) {
-    TellBest(result, folder);
+    TellBest(result, may_write, &definition, folder);
+  } else if (!may_write) {
+    Remark("%s/best.flags is not what this sweep wrote, and stays",
+           folder.c_str());
   }
   return TellFailures(result) && !InterruptRequested() ? kExitInput
                                                        : kExitSuccess;

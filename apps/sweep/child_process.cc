@@ -20,7 +20,8 @@ namespace plumbline {
 namespace {
 
 constexpr std::chrono::milliseconds kPause(10);
-constexpr std::chrono::seconds kGrace(5);
+// Somebody waits for this one, too.
+constexpr std::chrono::milliseconds kGrace(1500);
 
 // Closes it at the end.
 struct Descriptor {

@@ -10,9 +10,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cerrno>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -37,6 +42,9 @@ constexpr double kMostRuns = 1e6;
 constexpr std::size_t kLargestDefinition = std::size_t{1} << 26;
 
 bool ReadText(const std::string& path, std::string* text) {
+  // Opening a pipe would wait for who writes to it, and a device has no end.
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return false;
   std::ifstream file(path, std::ios::binary);
   text->assign(std::istreambuf_iterator<char>(file),
                std::istreambuf_iterator<char>());
@@ -196,17 +204,50 @@ std::string LastLine(const std::string& path) {
   return last.size() > kLongest ? last.substr(0, kLongest) + "..." : last;
 }
 
+// The files that figures are read from, as they were before a run: what is
+// still so after it is none of that run's.
+class FiguresBefore {
+ public:
+  explicit FiguresBefore(const std::string& run_folder)
+      : folder_(run_folder),
+        summary_(Look("summary.json")),
+        evaluation_(Look("evaluation.json")) {}
+
+  // False when there is none, or that of before.
+  bool ReadSummary(std::string* text) const {
+    return Look("summary.json") != summary_ &&
+           ReadText(folder_ + "/summary.json", text);
+  }
+  bool ReadEvaluation(std::string* text) const {
+    return Look("evaluation.json") != evaluation_ &&
+           ReadText(folder_ + "/evaluation.json", text);
+  }
+
+ private:
+  // Number, size and time of last change.
+  using Stamp = std::array<std::int64_t, 4>;
+
+  Stamp Look(const char* name) const {
+    struct stat status = {};
+    if (stat((folder_ + "/" + name).c_str(), &status) != 0) return {};
+    return {static_cast<std::int64_t>(status.st_ino), status.st_size,
+            status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
+  }
+
+  std::string folder_;
+  Stamp summary_;
+  Stamp evaluation_;
+};
+
 // Reads the run's figures; what is wrong with them otherwise.
 std::string ReadFigures(const SweepDefinition& definition,
-                        const std::string& run_folder,
+                        const FiguresBefore& before,
                         std::vector<Figure>* figures) {
-  const std::string path = run_folder + "/summary.json";
   std::string text;
-  if (!ReadText(path, &text)) return "no summary.json";
+  if (!before.ReadSummary(&text)) return "no summary.json";
   try {
     *figures = Numbers(text, false, "summary.json");
-    const std::string evaluation = run_folder + "/evaluation.json";
-    if (!definition.evaluate.empty() && ReadText(evaluation, &text)) {
+    if (!definition.evaluate.empty() && before.ReadEvaluation(&text)) {
       for (Figure& figure : Numbers(text, true, "evaluation.json")) {
         figures->emplace_back("evaluation." + figure.first, figure.second);
       }
@@ -239,6 +280,7 @@ void WriteDefinition(const SweepDefinition& definition,
              {"working_directory", definition.working_directory},
              {"environment", std::move(environment)},
              {"time_limit", definition.time_limit},
+             {"best_digest", definition.best_digest},
              {"made_in", PlaceOf(folder)}},
             folder + "/sweep.json");
 }
@@ -287,6 +329,9 @@ void CheckDefinition(const SweepDefinition& definition,
 std::optional<SweepDefinition> ReadDefinition(const std::string& folder) {
   const std::string path = folder + "/sweep.json";
   if (!fs::exists(path)) return std::nullopt;
+  if (!fs::is_regular_file(path)) {
+    throw Error(path, 0, "is no regular file", "a sweep, or nothing there");
+  }
   const std::string text = ReadTextFile(path, kLargestDefinition);
   try {
     const Json json = Json::parse(text);
@@ -318,6 +363,7 @@ std::optional<SweepDefinition> ReadDefinition(const std::string& folder) {
       definition.environment.emplace_back(name, value.get<std::string>());
     }
     definition.time_limit = json.at("time_limit").get<double>();
+    definition.best_digest = json.value("best_digest", "");
     CheckDefinition(definition, path);
     return definition;
   } catch (const Json::exception& error) {
@@ -437,11 +483,17 @@ void CheckFlagsOfRuns(const SweepDefinition& definition) {
       return;
     }
     command.push_back("--check_flags");
-    // A file of its own: several sweeps may do it at a time.
-    const std::string log =
-        (fs::temp_directory_path() /
-         ("plumbline_sweep_" + std::to_string(getpid()) + ".txt"))
-            .string();
+    // A new file of a name that nobody knows beforehand: others may write to
+    // the folder, too.
+    std::string log =
+        (fs::temp_directory_path() / "plumbline_sweep_XXXXXX").string();
+    const int descriptor = mkstemp(log.data());
+    if (descriptor < 0) {
+      throw Error(log, 0,
+                  std::string("cannot be made: ") + std::strerror(errno),
+                  "a writable folder for temporary files");
+    }
+    close(descriptor);
     ChildOptions child;
     child.command = command;
     child.working_directory = definition.working_directory;
@@ -519,12 +571,13 @@ std::optional<RunRecord> ExecuteRun(const SweepDefinition& definition,
                                     const std::function<bool()>& stop) {
   const std::string run_folder = RunFolder(folder, run);
   std::error_code error;
-  // What an earlier attempt left behind.
-  fs::remove_all(run_folder, error);
+  // What an earlier attempt left there stays: the command may go on from it,
+  // and nobody can tell it from what somebody else put there.
   fs::create_directories(run_folder, error);
   if (!fs::is_directory(run_folder)) {
     throw Error(run_folder, 0, "cannot be made", "a writable place");
   }
+  const FiguresBefore before(run_folder);
   const Stopwatch watch;
   bool is_late = false;
   ChildOptions child;
@@ -570,7 +623,7 @@ std::optional<RunRecord> ExecuteRun(const SweepDefinition& definition,
     if (!take(command, "evaluation: ")) return std::nullopt;
   }
   if (record.reason.empty()) {
-    record.reason = ReadFigures(definition, run_folder, &record.figures);
+    record.reason = ReadFigures(definition, before, &record.figures);
     if (record.reason.empty()) record.status = RunStatus::kDone;
   }
   if (record.status != RunStatus::kDone) record.figures.clear();

@@ -35,6 +35,8 @@ struct SweepDefinition {
   std::vector<std::pair<std::string, std::string>> environment;
   /// Most time of a run, command and evaluation, s; 0: no limit.
   double time_limit = 0.0;
+  /// SHA-256 of best.flags as the sweep wrote it last; empty: it wrote none.
+  std::string best_digest;
 };
 
 /// Writes sweep.json into a folder, whole or not at all.

@@ -77,6 +77,23 @@ TEST_F(ExperimentsBinaryTest, WritesTablesAndFigures) {
   EXPECT_FALSE(summary["S6"]["means"].empty());
 }
 
+// That of plumbline_solve tells which files are its own.
+TEST_F(ExperimentsBinaryTest, ASummaryOfAnotherProgramStays) {
+  std::string output;
+  const std::string path = folder_ + "/summary.json";
+  for (const char* text :
+       {"{\"version\": \"1\", \"seed\": 1, \"files\": []}", "[]", "notes"}) {
+    std::ofstream(path) << text;
+    EXPECT_EQ(Run("plumbline_experiments --experiment=S6 --trials=1"
+                  " --output_dir=" +
+                      folder_,
+                  &output),
+              2);
+    EXPECT_THAT(output, HasSubstr("summary.json: is of no experiments"));
+    EXPECT_EQ(Read("summary.json"), text);
+  }
+}
+
 TEST_F(ExperimentsBinaryTest, SameFilesWithOneAndTwoThreads) {
   std::string output;
   for (const std::string threads : {"1", "2"}) {

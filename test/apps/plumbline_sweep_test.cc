@@ -168,6 +168,31 @@ TEST_F(SweepBinaryTest, ATableOfAllRuns) {
   EXPECT_EQ(Read("out/best.flags"), "--x=1\n");
 }
 
+TEST_F(SweepBinaryTest, FilesOfOthersAreNeitherReplacedNorRemoved) {
+  const std::string command =
+      "--grid=x=1,2 --output_dir=" + folder_ + "/out -- " + program_;
+  std::string output;
+  fs::create_directories(folder_ + "/out");
+  for (const char* name : {"sweep.csv", "sweep.html", "best.flags", "runs"}) {
+    const std::string path = folder_ + "/out/" + name;
+    std::ofstream(path) << "of somebody else";
+    EXPECT_EQ(Run(command, &output), 2) << name;
+    EXPECT_THAT(output, HasSubstr(std::string(name) + ": is there"));
+    EXPECT_EQ(Read(std::string("out/") + name), "of somebody else");
+    fs::remove(path);
+  }
+  EXPECT_TRUE(Notes().empty());
+
+  ASSERT_EQ(Run("--minimize=y " + command, &output), 0) << output;
+  EXPECT_EQ(Read("out/best.flags"), "--x=1\n");
+  std::ofstream(folder_ + "/out/best.flags") << "--x=2\n# edited\n";
+  EXPECT_EQ(Run("--maximize=y " + command, &output), 2);
+  EXPECT_THAT(output, HasSubstr("best.flags: is not what this sweep wrote"));
+  EXPECT_EQ(Run(command, &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("best.flags is not what this sweep wrote"));
+  EXPECT_EQ(Read("out/best.flags"), "--x=2\n# edited\n");
+}
+
 TEST_F(SweepBinaryTest, FailuresAndTimeOutsAreRows) {
   std::string output;
   const std::string out = " --output_dir=" + folder_ + "/out";

@@ -72,6 +72,7 @@ TEST_F(SweepTest, DefinitionsComeBackFromTheirFile) {
   EXPECT_FALSE(ReadDefinition(folder_));
   definition_.axes = {{"x", {"1", "a,b"}}, {"y", {""}}};
   definition_.one_at_a_time = true;
+  definition_.best_digest = "abc";
   definition_.trials = 7;
   definition_.first_seed = 18446744073709551000u;
   definition_.seed_flag = "";
@@ -145,6 +146,15 @@ TEST_F(SweepTest, DefinitionsThatMakeNoSense) {
   const std::string axes = R"([{"flag": "x", "values": [)" + values +
                            R"(]}, {"flag": "y", "values": [)" + values + "]}]";
   EXPECT_THAT(refusal("axes", axes), HasSubstr("a million at most"));
+}
+
+// Nor is a pipe waited for.
+TEST_F(SweepTest, APipeIsNoDefinition) {
+  ASSERT_EQ(mkfifo((folder_ + "/sweep.json").c_str(), 0600), 0);
+  EXPECT_THROW(ReadDefinition(folder_), Error);
+  EXPECT_FALSE(WasDefinedHere(folder_));
+  ASSERT_EQ(mkfifo((folder_ + "/run.json").c_str(), 0600), 0);
+  EXPECT_FALSE(ReadRecord(folder_));
 }
 
 TEST_F(SweepTest, DefinitionsKnowTheirFolder) {
@@ -269,6 +279,24 @@ TEST_F(SweepTest, ARunGivesItsFiguresAndItsLog) {
   EXPECT_EQ(read->seconds, record.seconds);
 }
 
+// Of an attempt that failed or was killed, and of whoever put notes there.
+TEST_F(SweepTest, WhatIsInTheFolderOfARunStays) {
+  SetScript("echo '{\"x\": 1}' > $out/summary.json\nexit 3");
+  EXPECT_EQ(Execute().reason, "exit status 3");
+  const std::string folder =
+      RunFolder(folder_, MakeRuns(definition_).at(0)) + "/";
+  std::ofstream(folder + "thesis.tex") << "years of work";
+  // Its figures are none of another attempt's.
+  SetScript("true");
+  EXPECT_EQ(Execute().reason, "no summary.json");
+  EXPECT_TRUE(fs::exists(folder + "summary.json"));
+  SetScript("echo '{\"x\": 2}' > $out/summary.json");
+  EXPECT_THAT(Execute().figures, ElementsAre(Pair("x", 2.0)));
+  std::ifstream thesis(folder + "thesis.tex");
+  const std::string text{std::istreambuf_iterator<char>(thesis), {}};
+  EXPECT_EQ(text, "years of work");
+}
+
 TEST_F(SweepTest, WhatGoesWrongIsSaid) {
   const auto reason = [this](const std::string& script) {
     SetScript(script);
@@ -296,8 +324,8 @@ TEST_F(SweepTest, WhatGoesWrongIsSaid) {
   definition_.evaluate.clear();
   fs::remove(folder_ + "/program.sh");
   EXPECT_EQ(Execute().reason, "cannot be run: No such file or directory");
-  // An earlier attempt's files are none of the next one's.
-  EXPECT_FALSE(fs::exists(folder_ + "/runs/seed=1/summary.json"));
+  // With what an earlier attempt wrote in the folder.
+  EXPECT_TRUE(fs::exists(folder_ + "/runs/seed=1/summary.json"));
 }
 
 TEST_F(SweepTest, ATimeLimitEndsTheRunAndWhatItStarted) {

@@ -35,6 +35,8 @@ int Run(const std::vector<std::string>& arguments) {
   options.odometry_topic = FLAGS_odometry_topic;
   options.stop = [] { return InterruptRequested(); };
   const LogInspection inspection = InspectLog(arguments[0], readers, options);
+  // What is not read to its end may be refused for that.
+  if (inspection.is_refused && InterruptRequested()) throw Interruption();
   std::cout << (FLAGS_json ? inspection.json : inspection.text);
   return inspection.is_refused ? kExitInput : kExitSuccess;
 }

@@ -23,6 +23,12 @@ void LoadPlugin(const std::string& path, Registry* registry) {
       std::filesystem::exists(path, ignored)) {
     file = "./" + path;
   }
+  // The loader would wait for who writes to a pipe.
+  if (std::filesystem::exists(file, ignored) &&
+      !std::filesystem::is_regular_file(file, ignored)) {
+    throw Error(path, 0, "cannot load plug-in: it is no regular file",
+                "a shared object built for this program");
+  }
   void* const handle = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) {
     throw plumbline::Error(path, 0, "cannot load plug-in: " + LoaderMessage(),

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <system_error>
 #include <vector>
 
 namespace plumbline {
@@ -96,6 +98,9 @@ std::string Sha256::HexDigest() {
 }
 
 std::string Sha256OfFile(const std::string& path) {
+  // Opening a pipe would wait for who writes to it, and a device has no end.
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return "";
   std::ifstream file(path, std::ios::binary);
   Sha256 digest;
   std::vector<char> buffer(1 << 16);

@@ -30,7 +30,8 @@ class Sha256 {
   std::uint64_t size_ = 0;
 };
 
-/// Digest of a file's content; empty when the file cannot be read.
+/// Digest of a regular file's content; empty for anything else and when the
+/// file cannot be read.
 std::string Sha256OfFile(const std::string& path);
 
 }  // namespace plumbline

@@ -33,6 +33,12 @@ bool ParseEightNumbers(const InputStream& input, std::string_view line,
             "'" + PrintableUtf8(token.substr(0, 40)) + "' is no finite number",
             expected);
       }
+      // Not of the first, the time: logs may say anything.
+      if (count > 0 && std::abs(number) > kAbsurdNumber) {
+        throw Error(input.name(), input.line_number(),
+                    "'" + PrintableUtf8(token.substr(0, 40)) + "' is absurd",
+                    expected + ", within 1e20");
+      }
     }
     ++count;
   }

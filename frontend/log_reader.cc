@@ -36,7 +36,7 @@ Log ReadLog(const std::string& path, const Registry& registry,
     const LogReaderType* reader = RecognizeLogPath(registry, path);
     if (reader != nullptr) return reader->read_path(path, options);
   }
-  InputStream input(path);
+  InputStream input(path, options.stop);
   const LogReaderType* reader =
       RecognizeLog(registry, input.Peek(kRecognizedBytes));
   if (reader == nullptr) {

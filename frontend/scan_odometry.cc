@@ -29,8 +29,10 @@ constexpr double kClearlyBetter = 0.02;
 constexpr double kLeastMotion = 0.01;
 constexpr double kLeastTurn = DegToRad(0.5);
 constexpr double kSearchSigmas = 2.5;
-// Longer than this the robot does not go steadily, s.
+// Longer than this the robot does not go steadily, and from times that are
+// nearer to each other no speed is told, s.
 constexpr double kLongestStep = 0.5;
+constexpr double kShortestStep = 1e-6;
 // Robust fit of the gyroscope: scans it needs, and the share of the residuals
 // that are the largest and do not count.
 constexpr std::size_t kFewestTurns = 30;
@@ -68,8 +70,9 @@ class TurnIntegral {
         end > times_.back()) {
       return false;
     }
+    if (end - begin < kShortestStep) return false;
     *rate = (At(end) - At(begin)) / (end - begin);
-    return true;
+    return std::isfinite(*rate);
   }
 
  private:
@@ -167,12 +170,13 @@ class SweepTrial {
     std::nth_element(steps.begin(), steps.begin() + steps.size() / 2,
                      steps.end());
     period_ = steps[steps.size() / 2];
-    if (!(period_ > 0.0) || period_ > kLongestStep) return;
+    if (!(period_ >= kShortestStep) || period_ > kLongestStep) return;
     velocities_.assign(scans.size(), Pose2::Zero());
     for (std::size_t i = 1; i + 1 < scans.size(); ++i) {
       const double span = scans[i + 1].timestamp - scans[i - 1].timestamp;
       const Scan& scan = scans[i];
-      if (!(span > 0.0) || span > 3.0 * period_ || !scan.bearings.empty() ||
+      if (!(span >= kShortestStep) || span > 3.0 * period_ ||
+          !scan.bearings.empty() ||
           scan.angle_step * static_cast<double>(scan.ranges.size()) <
               kLeastSweep) {
         continue;
@@ -281,7 +285,7 @@ class Matcher {
           Match(points, guess, sigma, turn_sigma, &matched, &(*costs)[i]);
       if (found) {
         const Pose2 moved = Between(pose, matched);
-        if (step > 0.0) {
+        if (step >= kShortestStep) {
           velocity = moved / step;
           if (turns != nullptr && is_measured) {
             turns->emplace_back(rate, moved[2] / step);
@@ -488,7 +492,7 @@ int UndoSweepsByOdometry(const ScanOdometryOptions& options, Log* log) {
   std::vector<TimedYawRate> rates;
   for (std::size_t i = 1; i < stretch.size(); ++i) {
     const double step = stretch[i].timestamp - stretch[i - 1].timestamp;
-    if (!(step > 0.0)) continue;
+    if (!(step >= kShortestStep)) continue;
     const double turn =
         Between(stretch[i - 1].odometry, stretch[i].odometry)[2];
     rates.push_back({stretch[i].timestamp - 0.5 * step, turn / step});

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <unsupported/Eigen/FFT>
 
 namespace plumbline {
@@ -22,6 +24,11 @@ constexpr double kSeen = 0.6;
 constexpr double kCell = 0.1;
 constexpr double kMiddleCell = 0.2;
 constexpr double kCoarseCell = 0.4;
+// Cells of the search everywhere, which takes as many numbers a hundred times
+// over: a square of 300 m with rooms of the same size.
+constexpr double kMostCells = 1 << 22;
+// Pairs of a traced room and one of the plan.
+constexpr double kMostPairs = 1 << 26;
 // What of a room of the plan lies in rooms seen, m^2, to be judged.
 constexpr double kLeastJudged = 1.0;
 
@@ -101,6 +108,33 @@ struct Place {
   double overlap = -1.0;
 };
 
+int PowerOfTwo(int least) {
+  int size = 1;
+  while (size < least) size *= 2;
+  return size;
+}
+
+// Refuses what would take all memory, or hours.
+void CheckSizes(const TracedRooms& rooms, const SpaceGrid& space) {
+  const double margin =
+      std::hypot(rooms.width, rooms.height) * rooms.metres_per_pixel;
+  double cells = 1.0;
+  for (const int side : {space.width, space.height}) {
+    const double needed = (side * space.resolution + margin) / kCoarseCell;
+    cells *= needed > kMostCells ? kMostCells + 1.0
+                                 : PowerOfTwo(static_cast<int>(needed) + 8);
+  }
+  if (cells <= kMostCells) return;
+  char sizes[120];
+  std::snprintf(sizes, sizeof(sizes),
+                "is %.0f x %.0f m large and the picture of the rooms %.0f x "
+                "%.0f m",
+                space.width * space.resolution, space.height * space.resolution,
+                rooms.width * rooms.metres_per_pixel,
+                rooms.height * rooms.metres_per_pixel);
+  throw PLUMBLINE_ERROR(sizes, "a building of up to 300 m");
+}
+
 // Cross-correlation with one raster, by Fourier transforms.
 class Correlation {
  public:
@@ -140,12 +174,6 @@ class Correlation {
 
  private:
   using Complex = std::complex<double>;
-
-  static int PowerOfTwo(int least) {
-    int size = 1;
-    while (size < least) size *= 2;
-    return size;
-  }
 
   std::vector<Complex> Transformed(const Raster& raster) {
     std::vector<Complex> values(static_cast<std::size_t>(width_) * height_);
@@ -408,6 +436,7 @@ TracedPlacement PlaceTracedRooms(const TracedRooms& rooms,
     throw PLUMBLINE_ERROR("nothing in the grid was seen free",
                           "the grid of a building, to place rooms over");
   }
+  CheckSizes(rooms, space);
   const auto degrees = [](double most, double step) {
     std::vector<double> turns;
     for (double turn = -most; turn <= most + 1e-9; turn += step)
@@ -432,6 +461,14 @@ TracedEvaluation EvaluateTracedRooms(const BuildingPlan& plan,
                                      const TracedRooms& rooms,
                                      const SpaceGrid& space) {
   TracedEvaluation result;
+  if (static_cast<double>(rooms.count) *
+          static_cast<double>(plan.rooms.size()) >
+      kMostPairs) {
+    throw PLUMBLINE_ERROR("lies under " + std::to_string(plan.rooms.size()) +
+                              " rooms, and " + std::to_string(rooms.count) +
+                              " are traced",
+                          "fewer rooms");
+  }
   result.placement = PlaceTracedRooms(rooms, space);
   result.traced = rooms.count;
   result.drawn = static_cast<int>(plan.rooms.size());

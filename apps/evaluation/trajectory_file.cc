@@ -88,6 +88,9 @@ void ReadKittiPoses(InputStream* input, TrajectoryFile* file) {
       if (!ParseNumber(text, &number) || !std::isfinite(number)) {
         fail("'" + PrintableUtf8(text.substr(0, 40)) + "' is no finite number");
       }
+      if (std::abs(number) > kAbsurdNumber) {
+        fail("'" + PrintableUtf8(text.substr(0, 40)) + "' is absurd");
+      }
     }
     const Eigen::Matrix3d rotation = matrix.leftCols<3>();
     const double off =

@@ -15,6 +15,9 @@ namespace fs = std::filesystem;
 
 // Whether a file begins as a page of WriteReport does.
 bool IsReport(const fs::path& path) {
+  // Opening a pipe would wait for who writes to it.
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return false;
   std::string begin(1 << 10, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(begin.data(), static_cast<std::streamsize>(begin.size()));

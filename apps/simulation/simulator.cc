@@ -16,6 +16,8 @@ using Eigen::Vector2d;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kStepsPerScan = 4;
+// Of a drive, which is held in memory.
+constexpr double kMostSteps = 5e7;
 constexpr double kJoinHits = 0.25;
 // Of coinciding faces the first one wins, whatever the rounding.
 constexpr double kSameRange = 1e-9;
@@ -259,6 +261,13 @@ std::vector<SimulatedState> Drive(const World& world,
       (way / (0.5 * options.speed) +
        (world.path.size() * 2 * kPi) / options.turn_rate + 60.0) /
       dt;
+  if (!(most_steps < kMostSteps)) {
+    throw Error(world.name, 0,
+                "a way of " + Fixed(way, 0) + " m may take " +
+                    Fixed(most_steps, 0) + " steps",
+                "at most " + Fixed(kMostSteps, 0) +
+                    ": a shorter way, more speed, fewer scans a second");
+  }
   while (true) {
     const Vector2d position = state.pose.head<2>();
     if (!((position - nearby_center).norm() < kNearbyMargin)) {

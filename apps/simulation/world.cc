@@ -68,6 +68,9 @@ double AxialDeg(const Vector2d& along) {
 }
 
 // Whole text as a number, or false.
+// Of a building, and of the way through it.
+constexpr double kAbsurdNumber = 1e5;
+
 bool ParseNumber(const std::string& text, double* value) {
   const char* end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, *value);
@@ -239,6 +242,11 @@ class WorldReader {
         throw Error(world_.name, line_,
                     "'" + PrintableUtf8(word) + "' is not a number",
                     "a finite number");
+      }
+      if (std::abs(value) > kAbsurdNumber) {
+        throw Error(world_.name, line_,
+                    "'" + PrintableUtf8(word) + "' is absurd",
+                    "metres and degrees within 1e5");
       }
       values_.push_back(value);
     }

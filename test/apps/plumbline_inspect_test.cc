@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -49,6 +50,18 @@ class InspectTest : public ::testing::Test {
               0)
         << output;
     return path;
+  }
+
+  // Of a pipe that nobody writes to.
+  void ExpectAnswersTheFirstInterrupt() {
+    const std::string pipe = folder_ / "pipe";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    std::string output;
+    EXPECT_EQ(RunInShell("timeout --signal=INT --kill-after=20 1 " + binary_ +
+                             " " + pipe + "; exit $?",
+                         &output),
+              124);
+    EXPECT_THAT(output, HasSubstr("interrupted"));
   }
 
   int Inspect(const std::string& arguments, std::string* output) {
@@ -188,6 +201,10 @@ TEST_F(InspectTest, RefusalsSayWhatIsThere) {
   }
   EXPECT_EQ(Inspect("", &text), 1);
   EXPECT_EQ(Inspect(bag + " " + bag, &text), 1);
+}
+
+TEST_F(InspectTest, APipeAnswersTheFirstInterrupt) {
+  ExpectAnswersTheFirstInterrupt();
 }
 
 // Half a log is told as such.

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/plugin.h>
+#include <sys/stat.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -36,6 +37,10 @@ TEST(PluginTest, FileThatIsNoSharedObject) {
   const std::string path = folder / "libmine.so";
   std::ofstream(path) << "not ELF";
   EXPECT_THAT(MessageOfLoading(path), HasSubstr("cannot load plug-in"));
+  // A pipe that nobody writes to.
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(MessageOfLoading(folder / "pipe"),
+              HasSubstr("it is no regular file"));
   std::filesystem::remove_all(folder);
 }
 

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/sha256.h>
+#include <sys/stat.h>
 
 #include <cstddef>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -47,6 +49,12 @@ TEST(Sha256Test, OfAFile) {
   std::filesystem::remove(path);
   EXPECT_EQ(Sha256OfFile(path), "");
   EXPECT_EQ(Sha256OfFile(::testing::TempDir()), "");
+  // It would not come back from one of these.
+  EXPECT_EQ(Sha256OfFile("/dev/zero"), "");
+  const std::string pipe = path + ".pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(Sha256OfFile(pipe), "");
+  std::remove(pipe.c_str());
 }
 
 }  // namespace

@@ -531,7 +531,11 @@ def interrupts(solve, count, rng, datasets, slower):
         times = count if name == "office" else max(1, count // 3)
         for i in range(times):
             at = length * (i + rng.random()) / times
-            folder = new_folder(solve.root, "interrupted_%s_%d" % (name, i))
+            # A state is taken in the folder that it was made in, and nowhere
+            # else.
+            for entry in os.listdir(folder):
+                if entry != "thesis.tex":
+                    os.remove(os.path.join(folder, entry))
             # From the last state before.
             before = [state for state in states if state[0] <= at]
             if before:
@@ -560,13 +564,117 @@ def interrupts(solve, count, rng, datasets, slower):
                 if total - spent > 2.0 * slower:
                     finding("%s, interrupt in '%s': %.2f s of processor until "
                             "the end" % (name, step, total - spent))
-            shutil.rmtree(folder)
         worst.sort(reverse=True)
         print("interrupts, %s (%.1f s of processor, %d states): %d; longest "
               "until the end:" % (name, length, len(states), times))
         for processor, wall, step in worst[:8]:
             print("  %.2f s of processor, %.2f s by the clock, after '%s'" %
                   (processor, wall, step), flush=True)
+
+
+def cpu_of_tree(pid):
+    """Processor time of a process with its children, s, also of those that it
+    has waited for; None once it has ended."""
+    own = cpu_seconds(pid)
+    if own is None:
+        return None
+    total = own
+    try:
+        with open("/proc/%d/stat" % pid) as file:
+            fields = file.read().rsplit(")", 1)[1].split()
+        total += (int(fields[13]) + int(fields[14])) / os.sysconf("SC_CLK_TCK")
+        with open("/proc/%d/task/%d/children" % (pid, pid)) as file:
+            children = file.read().split()
+    except OSError:
+        return total
+    return total + sum(cpu_of_tree(int(child)) or 0.0 for child in children)
+
+
+def wait_for_tree(process, seconds):
+    """False when the process ends before."""
+    while True:
+        spent = cpu_of_tree(process.pid)
+        if spent is None:
+            return False
+        if spent >= seconds:
+            return True
+        time.sleep(min(0.05, max(0.002, (seconds - spent) / 2)))
+
+
+def interrupted_binaries(solve, count, rng, datasets, slower):
+    """The same with the other binaries, SIGINT and SIGTERM by turns. What they
+    were to write is there whole or as it was."""
+    def binary(name):
+        return os.path.join(os.path.dirname(solve.binary), "plumbline_" + name)
+
+    folder = new_folder(solve.root, "binaries")
+    log = os.path.join(folder, "input.log")
+    repeated(6, True, log)
+    if datasets:
+        log = os.path.join(datasets, "mit-killian.clf.bz2")
+    path = os.path.join(folder, "path.tum")
+    with open(path, "w") as file:
+        for i in range(400000):
+            file.write("%d %f %f 0 0 0 0 1\n" % (i, 0.01 * i, rng.random()))
+    short = os.path.join(folder, "short.log")
+    with open(short, "w") as file:
+        file.write(office(250))
+    output = os.path.join(folder, "output")
+    commands = {
+        "simulate": [binary("simulate"), "--world=killian_like", "--size=8",
+                     "--output=" + output, "--truth=" + output + ".json"],
+        "inspect": [binary("inspect"), log],
+        "evaluate": [binary("evaluate"), "--trajectory=" + path,
+                     "--reference=" + path, "--output=" + output,
+                     "--pose_errors=" + output + ".csv"],
+        "experiments": [binary("experiments"), "--experiment=S6", "--trials=200",
+                        "--num_threads=1",
+                        "--output_dir=" + os.path.join(folder, "experiments")],
+        "sweep": [binary("sweep"), "--grid=link_radius=5,10,20", "--jobs=1",
+                  "--quiet", "--output_dir=" + os.path.join(folder, "sweep"),
+                  "--", solve.binary, "--input=" + short, "--num_threads=1",
+                  "--quiet"]}
+    for name, command in commands.items():
+        def start():
+            return subprocess.Popen(command, stdout=subprocess.DEVNULL,
+                                    stderr=subprocess.DEVNULL,
+                                    stdin=subprocess.DEVNULL)
+
+        status, length, _ = finish(start())
+        if status != 0:
+            finding("%s: status %d" % (name, status))
+            continue
+        wanted = digest(output) if os.path.exists(output) else ""
+        worst = 0.0
+        ended = 0
+        for i in range(count):
+            shutil.rmtree(os.path.join(folder, "sweep"), ignore_errors=True)
+            process = start()
+            alive = wait_for_tree(process, length * (i + rng.random()) / count)
+            spent = cpu_of_tree(process.pid)
+            os.kill(process.pid, [signal.SIGINT, signal.SIGTERM][i % 2])
+            status, total, _ = finish(process)
+            if not alive or spent is None or status == 0:
+                ended += 1
+                continue
+            worst = max(worst, total - spent)
+            # Before the flags are read the signal ends the process.
+            if status not in (130, -signal.SIGINT, -signal.SIGTERM):
+                finding("%s, interrupt %d: status %d" % (name, i, status))
+            if total - spent > 2.0 * slower:
+                finding("%s, interrupt %d: %.2f s of processor until the end" %
+                        (name, i, total - spent))
+            if wanted and digest(output) != wanted:
+                finding("%s, interrupt %d: another output" % (name, i))
+        left = [entry for entry in os.listdir(folder) if ".tmp" in entry]
+        if left or not foreign_ok(folder):
+            finding("%s: left behind: %s" % (name, " ".join(left)))
+        for entry in os.listdir(folder):
+            if entry.startswith("output"):
+                os.remove(os.path.join(folder, entry))
+        print("interrupts, %s (%.1f s of processor): %d, %d of them after the "
+              "end; at most %.2f s of processor until the end" %
+              (name, length, count, ended, worst), flush=True)
 
 
 def repeated(copies, has_jump, path):
@@ -792,6 +900,8 @@ def main():
     if "interrupts" in parts:
         interrupts(solve, arguments.interrupts, rng, arguments.datasets,
                    arguments.slower)
+        interrupted_binaries(solve, max(2, arguments.interrupts // 4), rng,
+                             arguments.datasets, arguments.slower)
     if "bad_inputs" in parts:
         # The same ones whichever parts are run.
         bad_inputs(arguments.bin_dir, root, arguments.bad_inputs,

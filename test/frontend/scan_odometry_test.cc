@@ -108,6 +108,24 @@ TEST(ScanOdometryTest, ANarrowViewIsNoSweep) {
   EXPECT_EQ(UndoSweepsByOdometry({}, &log), 0);
 }
 
+// A log may say anything about times; the robot stays somewhere.
+TEST(ScanOdometryTest, TimesThatCannotBe) {
+  const double times[] = {5.0, 6.0, 0.0, 5e-324, 1e308, -1e308, 1e-310};
+  for (const bool has_gyroscope : {false, true}) {
+    Log log = Drive(0.0, 1, false);
+    log.scans.resize(40);
+    for (std::size_t i = 0; i < log.scans.size(); ++i) {
+      log.scans[i].timestamp = times[i % 7];
+      if (has_gyroscope) log.yaw_rates.push_back({times[i % 7], 1.0});
+    }
+    AddScanOdometry({}, &log);
+    for (const Scan& scan : log.scans) {
+      EXPECT_TRUE(scan.odometry.allFinite());
+      EXPECT_LT(scan.odometry.head<2>().norm(), 100.0);
+    }
+  }
+}
+
 // Poses are those of the time stamps, at which sweeps begin.
 TEST(ScanOdometryTest, SweepsAreStampedWhenTheyBegin) {
   for (const int direction : {1, -1}) {

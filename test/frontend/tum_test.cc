@@ -68,6 +68,9 @@ TEST(TumTest, RefusesBadFiles) {
               HasSubstr("path.tum:1: quaternion is not of unit length"));
   EXPECT_THAT(Refusal([] { ParseTum("1 0 inf 0 0 0 0 1\n"); }),
               HasSubstr("'inf' is no finite number"));
+  // Squares of it would be none.
+  EXPECT_THAT(Refusal([] { ParseTum("1 0 1e200 0 0 0 0 1\n"); }),
+              HasSubstr("path.tum:1: '1e200' is absurd"));
   EXPECT_THAT(Refusal([] { ParseTum(""); }), HasSubstr("holds no pose"));
   EXPECT_THAT(Refusal([] { ReadTum("no/such.tum"); }),
               HasSubstr("no/such.tum: cannot be opened"));

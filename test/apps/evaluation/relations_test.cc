@@ -162,6 +162,8 @@ TEST(RelationsTest, RefusesBadRelations) {
               HasSubstr("'4x' is no finite number"));
   EXPECT_THAT(Refusal([] { ParseRelations("1 2 3 1e999 5 6 7 8\n"); }),
               HasSubstr("'1e999' is no finite number"));
+  EXPECT_THAT(Refusal([] { ParseRelations("1 2 -1e308 4 5 6 7 8\n"); }),
+              HasSubstr("'-1e308' is absurd"));
   EXPECT_THAT(Refusal([] { ParseRelations("# nothing\n"); }),
               HasSubstr("file.relations: holds no relation"));
   EXPECT_THAT(Refusal([] { ParseRelations("\x1f\x8b\x08"); }),

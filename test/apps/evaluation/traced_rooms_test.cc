@@ -135,6 +135,34 @@ TEST(TracedRoomsTest, ArePlacedOverFreeSpace) {
       HasSubstr("nothing in the grid was seen free"));
 }
 
+// Pixels of 10 m are within what each file may have.
+TEST(TracedRoomsTest, BuildingsOfKilometresAreRefused) {
+  TracedRooms rooms = ParseRooms(TwoRooms());
+  SpaceGrid grid;
+  grid.width = 3000;
+  grid.height = 1;
+  grid.cells.assign(3000, Space::kFree);
+  grid.resolution = 10.0;
+  EXPECT_THAT(Refusal([&] { PlaceTracedRooms(rooms, grid); }),
+              HasSubstr("is 30000 x 10 m large"));
+  grid.resolution = 0.05;
+  rooms.metres_per_pixel = 10.0;
+  EXPECT_THAT(Refusal([&] { PlaceTracedRooms(rooms, grid); }),
+              HasSubstr("picture of the rooms 1000 x 600 m"));
+}
+
+TEST(TracedRoomsTest, ManyRoomsAreRefused) {
+  TracedRooms rooms = ParseRooms(TwoRooms());
+  rooms.count = 65535;
+  SpaceGrid grid;
+  grid.width = grid.height = 1;
+  grid.cells = {Space::kFree};
+  BuildingPlan plan;
+  plan.rooms.resize(10000);
+  EXPECT_THAT(Refusal([&] { EvaluateTracedRooms(plan, rooms, grid); }),
+              HasSubstr("lies under 10000 rooms"));
+}
+
 TEST(TracedRoomsTest, PlansAreMeasured) {
   Seen seen;
   const TracedRooms rooms = ParseRooms(TwoRooms());

@@ -94,6 +94,8 @@ TEST_F(TrajectoryFileTest, BadInputIsRefused) {
               HasSubstr("file:2: 7 fields: expected twelve numbers"));
   EXPECT_THAT(RefusalOf("1 0 0 7 0 1 0 8 0 0 1 inf\n"),
               HasSubstr("file:1: 'inf' is no finite number"));
+  EXPECT_THAT(RefusalOf("1 0 0 7 0 1 0 8 0 0 1 1e300\n"),
+              HasSubstr("file:1: '1e300' is absurd"));
   EXPECT_THAT(RefusalOf("1 0 0 7 0 1 0 8 0 0 2 9\n"),
               HasSubstr("file:1: the matrix is no rotation"));
   // A mirror.

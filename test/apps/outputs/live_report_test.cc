@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/error.h>
 #include <plumbline/outputs/live_report.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -100,6 +101,10 @@ TEST_F(LiveReportTest, NothingOfOthersIsReplaced) {
     EXPECT_THAT(error.what(), HasSubstr("is there and is no report"));
   }
   EXPECT_THROW(LiveReport(folder_ / "report.html/live", 1.0), Error);
+  // Nor is a pipe waited for.
+  std::filesystem::create_directories(folder_ / "pipe");
+  ASSERT_EQ(mkfifo((folder_ / "pipe/report.html").c_str(), 0600), 0);
+  EXPECT_THROW(LiveReport(folder_ / "pipe", 1.0), Error);
   // A report may be replaced.
   WriteReport(Titled("earlier"), (folder_ / "report.html").string());
   EXPECT_NO_THROW(LiveReport(folder_, 1.0));

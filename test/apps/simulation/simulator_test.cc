@@ -174,6 +174,18 @@ TEST(DriveTest, RefusesWaysThroughWalls) {
   EXPECT_THROW(Drive(ReadSimulated("path 0 0\n"), DriveOptions(), 1), Error);
 }
 
+// All of a drive is held in memory.
+TEST(DriveTest, RefusesWaysWithoutEnd) {
+  std::string path = "path 0 0";
+  for (int i = 0; i < 100; ++i) path += " 1e5 0 0 0";
+  try {
+    Drive(ReadSimulated(path + "\n"), DriveOptions(), 1);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("a way of 20000000 m may take"));
+  }
+}
+
 TEST(DriveTest, EveryBuildingCanBeDrivenThrough) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const World world = MakeWorld("office", seed, 1.0);

@@ -97,6 +97,8 @@ TEST(WorldTest, ErrorsNameFileAndLine) {
   EXPECT_THAT(ErrorOf("path\n"), HasSubstr("bad 'path'"));
   EXPECT_THAT(ErrorOf("circle 0 0 nan\n"), HasSubstr("'nan' is not a number"));
   EXPECT_THAT(ErrorOf("circle 0 0 1e999\n"), HasSubstr("is not a number"));
+  EXPECT_THAT(ErrorOf("wall 0 0 1 0\npath 0 1 1e300 1\n"),
+              HasSubstr("test.world:2: '1e300' is absurd"));
   EXPECT_THAT(ErrorOf("doorway 0 0 0 0\n"), HasSubstr("two different points"));
   EXPECT_THAT(ErrorOf("doorway 0 0 1\n"), HasSubstr("bad 'doorway'"));
   EXPECT_THAT(ErrorOf("house 1 2\n"),

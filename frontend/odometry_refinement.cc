@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -86,7 +87,14 @@ constexpr double kLooseAngle = DegToRad(20.0);
 
 // Parts that are looked for in the rest when all scans are in, at most.
 constexpr int kMostLateParts = 24;
-// A tie that is known worse than this is no better than a loose one, m and rad.
+// A part is looked for again when the rest has grown by this factor.
+constexpr double kMoreRest = 1.25;
+// Points at most that tell how clearly a window of a part fits somewhere, and
+// nodes of the searches for all windows of a part.
+constexpr std::size_t kClearPoints = 128;
+constexpr std::int64_t kLateNodes = 6000000;
+// A tie that is known worse than this is a rough one: the part is still loose,
+// m and rad.
 constexpr double kLateSigma = 0.5;
 constexpr double kLateAngle = DegToRad(5.0);
 
@@ -732,13 +740,14 @@ bool OdometryRefiner::FindTie(
     const std::vector<KeyScan>& keys, const ScanMatcher& reference,
     const std::function<std::vector<Visit>(const Pose2&)>& visits,
     const Pose2& center, double translation_window, std::size_t begin,
-    std::size_t end, double seen_through, bool is_global, Hypothesis* found) {
+    std::size_t end, double seen_through, bool is_global, std::int64_t* nodes,
+    Hypothesis* found) {
   const TrackView view = ViewOf(keys, begin, end);
   const std::vector<ScoredPose> peaks = reference.Peaks(
       view.sparse, center, translation_window, kPi, kLeastScore, kPeakShare,
       kPeaks,
-      is_global ? kNearArchive : std::numeric_limits<double>::infinity(),
-      stop_);
+      is_global ? kNearArchive : std::numeric_limits<double>::infinity(), stop_,
+      nodes);
   std::vector<Hypothesis> hypotheses;
   for (const ScoredPose& peak : peaks) {
     for (const Visit& visit : visits(peak.pose)) {
@@ -800,7 +809,7 @@ void OdometryRefiner::Tie(bool last) {
               return std::vector<Visit>{{&reference, 0, 0}};
             },
             open_->keys[middle].pose, window, 0, end, open_->seen_through,
-            false, &found)) {
+            false, nullptr, &found)) {
       const bool is_expected =
           AgreesWithOdometry(found, middle, archive_.size() - 1);
       // Where the robot was carried the right place need not be among those
@@ -819,8 +828,8 @@ void OdometryRefiner::Tie(bool last) {
     const std::size_t end = open_->keys.size();
     const std::size_t begin = end > kGlobalKeys ? end - kGlobalKeys : 0;
     middle = (begin + end) / 2;
-    if (FindInArchive(open_->keys, where, begin, end, open_->seen_through,
-                      &found)) {
+    if (FindInArchive(open_->keys, ViewOfArchive(where), begin, end,
+                      open_->seen_through, nullptr, &found)) {
       const std::size_t nearest = NearestOf(found, where);
       const ArchivedKey& key = archive_[nearest];
       if (!open_->odometry_holds ||
@@ -1054,19 +1063,29 @@ std::vector<std::size_t> OdometryRefiner::Thinned(
   return thinned;
 }
 
-bool OdometryRefiner::FindInArchive(const std::vector<KeyScan>& keys,
-                                    const std::vector<std::size_t>& where,
-                                    std::size_t begin, std::size_t end,
-                                    double seen_through, Hypothesis* found) {
+OdometryRefiner::ArchiveView OdometryRefiner::ViewOfArchive(
+    const std::vector<std::size_t>& where) const {
   Eigen::Vector2d low = archive_[where.front()].pose.head<2>();
   Eigen::Vector2d high = low;
   for (const std::size_t k : where) {
     low = low.cwiseMin(archive_[k].pose.head<2>());
     high = high.cwiseMax(archive_[k].pose.head<2>());
   }
-  ScanMatcher matcher(options_.matcher);
+  const Eigen::Vector2d center = 0.5 * (low + high);
+  ArchiveView view{where, ScanMatcher(options_.matcher),
+                   Pose2(center.x(), center.y(), 0.0),
+                   0.5 * (high - low).maxCoeff() + 1.0};
   const std::vector<std::size_t> thinned = Thinned(where);
-  SetArchive(thinned, 0, thinned.size(), &matcher);
+  SetArchive(thinned, 0, thinned.size(), &view.matcher);
+  return view;
+}
+
+bool OdometryRefiner::FindInArchive(const std::vector<KeyScan>& keys,
+                                    const ArchiveView& archive,
+                                    std::size_t begin, std::size_t end,
+                                    double seen_through, std::int64_t* nodes,
+                                    Hypothesis* found) {
+  const std::vector<std::size_t>& where = archive.where;
   std::deque<ScanMatcher> around;
   const auto visits = [&](const Pose2& pose) {
     std::vector<std::pair<std::size_t, std::size_t>> all;
@@ -1096,10 +1115,8 @@ bool OdometryRefiner::FindInArchive(const std::vector<KeyScan>& keys,
     }
     return result;
   };
-  const Eigen::Vector2d center = 0.5 * (low + high);
-  const double window = 0.5 * (high - low).maxCoeff() + 1.0;
-  return FindTie(keys, matcher, visits, Pose2(center.x(), center.y(), 0.0),
-                 window, begin, end, seen_through, true, found);
+  return FindTie(keys, archive.matcher, visits, archive.center, archive.window,
+                 begin, end, seen_through, true, nodes, found);
 }
 
 std::size_t OdometryRefiner::NearestOf(
@@ -1143,6 +1160,8 @@ std::vector<std::vector<std::size_t>> OdometryRefiner::Parts() const {
 void OdometryRefiner::JoinParts() {
   // The largest part takes in others, largest first, until none is found.
   const std::vector<LooseTrack> loose = loose_;
+  // Key scans that a part was looked for in, by part.
+  std::vector<std::size_t> tried(static_cast<std::size_t>(num_parts_), 0);
   bool is_joined = num_parts_ > 1;
   int looked_for = 0;
   while (is_joined) {
@@ -1152,6 +1171,14 @@ void OdometryRefiner::JoinParts() {
         parts.begin(), parts.end(),
         [](const auto& a, const auto& b) { return a.size() > b.size(); });
     for (std::size_t p = 1; p < parts.size() && !is_joined; ++p) {
+      if (parts[p].empty()) break;
+      std::size_t& before =
+          tried[static_cast<std::size_t>(archive_[parts[p].front()].part)];
+      const std::size_t rest = parts[0].size();
+      if (static_cast<double>(rest) < kMoreRest * static_cast<double>(before)) {
+        continue;
+      }
+      before = rest;
       // A log of many parts comes to an end, too.
       if (++looked_for > kMostLateParts) break;
       if (stop_ && stop_()) break;
@@ -1180,50 +1207,109 @@ bool OdometryRefiner::JoinPart(const std::vector<std::size_t>& rest,
     }
   }
   const std::size_t size = std::min(kGlobalKeys, part.size());
-  const std::size_t room = part.size() - size;
-  const std::size_t windows =
-      std::min(static_cast<std::size_t>(options_.tracking.max_late_windows),
-               1 + 2 * room / size);
+  const ArchiveView view = ViewOfArchive(rest);
+  const std::vector<std::size_t> windows = WindowsOf(keys, size, view);
   // What a window says stands when another one says the same, or there is none.
-  struct Vote {
-    std::size_t middle;
-    Hypothesis found;
+  std::vector<LateVote> votes;
+  LateVote best_vote;
+  std::optional<LateTie> best;
+  const auto variance = [](const LateTie& tie) {
+    const Eigen::Matrix3d& covariance = tie.since_key.covariance;
+    return std::max({covariance(0, 0) / Square(kLateSigma),
+                     covariance(1, 1) / Square(kLateSigma),
+                     covariance(2, 2) / Square(kLateAngle)});
   };
-  std::vector<Vote> votes;
-  for (std::size_t w = 0; w < windows; ++w) {
+  std::int64_t nodes = kLateNodes;
+  for (const std::size_t begin : windows) {
     if (stop_ && stop_()) return false;
-    const std::size_t begin = windows > 1 ? w * room / (windows - 1) : 0;
+    if (nodes <= 0) break;
     // A jump within a window is none of the track's: parts are whole.
-    Vote vote{begin + size / 2, {}};
-    if (!FindInArchive(keys, rest, begin, begin + size, 0.0, &vote.found)) {
+    LateVote vote{begin + size / 2, {}};
+    if (!FindInArchive(keys, view, begin, begin + size, 0.0, &nodes,
+                       &vote.found)) {
       continue;
     }
     if (trace_) trace_("LATE window found");
-    bool is_confirmed = windows == 1;
-    for (const Vote& other : votes) {
+    const auto confirms = [&](const LateVote& other) {
       const Pose2 expected =
           Compose(other.found.pose,
                   Between(keys[other.middle].pose, keys[vote.middle].pose));
       const Pose2 apart = Between(expected, vote.found.pose);
-      is_confirmed = is_confirmed || (apart.head<2>().norm() < kVisitDistance &&
-                                      std::abs(apart[2]) < kVisitRotation);
+      return apart.head<2>().norm() < kVisitDistance &&
+             std::abs(apart[2]) < kVisitRotation;
+    };
+    std::vector<const LateVote*> agreeing;
+    for (const LateVote& other : votes) {
+      if (confirms(other)) agreeing.push_back(&other);
+    }
+    if (!agreeing.empty() || windows.size() == 1) {
+      agreeing.push_back(&vote);
+      for (const LateVote* other : agreeing) {
+        const LateTie tie = LateTieOf(rest, part, *other);
+        const bool is_narrow = variance(tie) <= 1.0;
+        const bool is_better =
+            !best || (is_narrow && variance(*best) <= 1.0
+                          ? other->found.quality > best_vote.found.quality
+                          : variance(tie) < variance(*best));
+        if (is_better) {
+          best = tie;
+          best_vote = *other;
+        }
+      }
+      if (variance(*best) <= 1.0) break;
     }
     votes.push_back(vote);
-    if (is_confirmed && AddLateTie(rest, part, NearestOf(vote.found, rest),
-                                   part[vote.middle], vote.found)) {
-      return true;
-    }
   }
-  return false;
+  if (!best ||
+      best->since_key.covariance.diagonal().head<2>().maxCoeff() >
+          Square(kLooseSigma) ||
+      best->since_key.covariance(2, 2) > Square(kLooseAngle)) {
+    return false;
+  }
+  AddLateTie(rest, part, best_vote, *best, variance(*best) > 1.0);
+  return true;
 }
 
-bool OdometryRefiner::AddLateTie(const std::vector<std::size_t>& rest,
-                                 const std::vector<std::size_t>& part,
-                                 std::size_t at_rest, std::size_t at_part,
-                                 const Hypothesis& found) {
+std::vector<std::size_t> OdometryRefiner::WindowsOf(
+    const std::vector<KeyScan>& keys, std::size_t size,
+    const ArchiveView& rest) const {
+  const std::size_t room = keys.size() - size;
+  const std::size_t windows =
+      std::min(static_cast<std::size_t>(options_.tracking.max_late_windows),
+               1 + 2 * room / size);
+  std::vector<std::pair<double, std::size_t>> scored;
+  for (std::size_t w = 0; w < windows; ++w) {
+    if (stop_ && stop_()) return {};
+    const std::size_t begin = windows > 1 ? w * room / (windows - 1) : 0;
+    const std::vector<Eigen::Vector2d> all =
+        ViewOf(keys, begin, begin + size).sparse;
+    std::vector<Eigen::Vector2d> few;
+    const std::size_t step = (all.size() + kClearPoints - 1) / kClearPoints;
+    for (std::size_t i = 0; i < all.size(); i += step) few.push_back(all[i]);
+    scored.emplace_back(
+        windows > 1 ? rest.matcher.ClearestScore(few, rest.center, rest.window,
+                                                 kPi, kNearArchive, stop_)
+                    : 1.0,
+        begin);
+  }
+  std::stable_sort(
+      scored.begin(), scored.end(),
+      [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::size_t> begins;
+  for (const auto& [score, begin] : scored) {
+    if (score >= options_.tracking.min_tie_score) begins.push_back(begin);
+  }
+  return begins;
+}
+
+LateTie OdometryRefiner::LateTieOf(const std::vector<std::size_t>& rest,
+                                   const std::vector<std::size_t>& part,
+                                   const LateVote& vote) const {
   // The match says where the part's key scan is among the rest. The one of the
   // two that begins later hangs on what was seen before it began.
-  const Pose2 match = Between(archive_[at_rest].pose, found.pose);
+  const std::size_t at_rest = NearestOf(vote.found, rest);
+  const std::size_t at_part = part[vote.middle];
+  const Pose2 match = Between(archive_[at_rest].pose, vote.found.pose);
   const bool is_later = part.front() > rest.front();
   const std::vector<std::size_t>& later = is_later ? part : rest;
   const std::vector<std::size_t>& earlier = is_later ? rest : part;
@@ -1243,37 +1329,46 @@ bool OdometryRefiner::AddLateTie(const std::vector<std::size_t>& rest,
     if (to < from) std::reverse(poses.begin(), poses.end());
     return Along(poses);
   };
-  UncertainPose2 tie{match, TieCovariance(found, archive_[at_rest].pose)};
+  UncertainPose2 tie{match, TieCovariance(vote.found, archive_[at_rest].pose)};
   if (!is_later) tie = Inverse(tie);
   LateTie late;
   late.scan = archive_[later.front()].scan;
   late.since = archive_[since].scan;
   late.since_key = Compose(Compose(along(earlier, since, at_earlier), tie),
                            along(later, at_later, later.front()));
-  const Eigen::Matrix3d& covariance = late.since_key.covariance;
-  if (std::max(covariance(0, 0), covariance(1, 1)) > kLateSigma * kLateSigma ||
-      covariance(2, 2) > kLateAngle * kLateAngle) {
-    return false;
-  }
-  late_ties_.push_back(late);
+  return late;
+}
+
+void OdometryRefiner::AddLateTie(const std::vector<std::size_t>& rest,
+                                 const std::vector<std::size_t>& part,
+                                 const LateVote& vote, const LateTie& tie,
+                                 bool is_rough) {
+  late_ties_.push_back(tie);
   if (trace_) {
-    trace_("JOINED scan " + std::to_string(late.scan) + " since " +
-           std::to_string(late.since));
+    trace_("JOINED scan " + std::to_string(tie.scan) + " since " +
+           std::to_string(tie.since) + (is_rough ? " roughly" : ""));
   }
+  const bool is_later = part.front() > rest.front();
+  const std::vector<std::size_t>& later = is_later ? part : rest;
+  const std::vector<std::size_t>& earlier = is_later ? rest : part;
   // Parts are numbered in the order in which they began.
   const int number = archive_[later.front()].part;
   LooseTrack& loose = loose_[loose_of_[static_cast<std::size_t>(number) - 1]];
-  loose.found = true;
-  loose.end = late.scan;
   loose.why = loose.why.substr(0, loose.why.find(';')) +
               "; found again on what was seen later";
-  const Pose2 shift = Compose(found.pose, Inverse(archive_[at_part].pose));
+  if (is_rough) {
+    loose.why += ", roughly";
+  } else {
+    loose.found = true;
+    loose.end = tie.scan;
+  }
+  const Pose2 shift =
+      Compose(vote.found.pose, Inverse(archive_[part[vote.middle]].pose));
   const int into = archive_[earlier.front()].part;
   for (const std::size_t k : part) {
     archive_[k].pose = Compose(shift, archive_[k].pose);
   }
   for (const std::size_t k : later) archive_[k].part = into;
-  return true;
 }
 
 bool OdometryRefiner::TakeSettled(SettledScan* settled) {

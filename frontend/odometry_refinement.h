@@ -463,12 +463,22 @@ class OdometryRefiner {
                const std::function<std::vector<Visit>(const Pose2&)>& visits,
                const Pose2& center, double translation_window,
                std::size_t begin, std::size_t end, double seen_through,
-               bool is_global, Hypothesis* found);
-  // FindTie in what was seen from these key scans of the archive, ascending.
-  // The visits of `found` are positions in `where`.
+               bool is_global, std::int64_t* nodes, Hypothesis* found);
+  // What was seen from some key scans of the archive, ascending, to be searched
+  // in: around its middle, m each way.
+  struct ArchiveView {
+    const std::vector<std::size_t>& where;
+    ScanMatcher matcher;
+    Pose2 center;
+    double window;
+  };
+  ArchiveView ViewOfArchive(const std::vector<std::size_t>& where) const;
+  // FindTie in it. The visits of `found` are positions in its `where`. `nodes`:
+  // as ScanMatcher::Peaks has it.
   bool FindInArchive(const std::vector<KeyScan>& keys,
-                     const std::vector<std::size_t>& where, std::size_t begin,
-                     std::size_t end, double seen_through, Hypothesis* found);
+                     const ArchiveView& archive, std::size_t begin,
+                     std::size_t end, double seen_through, std::int64_t* nodes,
+                     Hypothesis* found);
   // Takes note of how odometry's motion since the last key scan agrees with the
   // match of this one, and begins anew.
   void CompareOdometry(const Scan& scan, const RefinedScan& refined);
@@ -504,10 +514,23 @@ class OdometryRefiner {
   // Where the second part lies in the first.
   bool JoinPart(const std::vector<std::size_t>& rest,
                 const std::vector<std::size_t>& part);
-  // False when the way to the match is too long to say where the part begins.
-  bool AddLateTie(const std::vector<std::size_t>& rest,
-                  const std::vector<std::size_t>& part, std::size_t at_rest,
-                  std::size_t at_part, const Hypothesis& found);
+  // Where a window of a part's key scans lies in the rest: its middle one.
+  struct LateVote {
+    std::size_t middle;
+    Hypothesis found;
+  };
+  // Starts of the windows of a part, those that fit somewhere best first.
+  std::vector<std::size_t> WindowsOf(const std::vector<KeyScan>& keys,
+                                     std::size_t size,
+                                     const ArchiveView& rest) const;
+  // The tie that follows from a match.
+  LateTie LateTieOf(const std::vector<std::size_t>& rest,
+                    const std::vector<std::size_t>& part,
+                    const LateVote& vote) const;
+  // `is_rough`: it says little more than where to look.
+  void AddLateTie(const std::vector<std::size_t>& rest,
+                  const std::vector<std::size_t>& part, const LateVote& vote,
+                  const LateTie& tie, bool is_rough);
   void Settle(const Pose2& shift, const RefinedScan& first);
   void Archive(const KeyScan& key);
 

@@ -144,8 +144,10 @@ class PeakSearch {
   // surfaces would have; `share`: of the best one's score.
   PeakSearch(const PeakGrid& grid, const std::vector<Eigen::Vector2d>& points,
              const Pose2& center, double translation_window,
-             double rotation_window, double minimum_score, double share)
-      : grid_(grid),
+             double rotation_window, double minimum_score, double share,
+             std::int64_t max_nodes)
+      : max_nodes_(std::min<std::int64_t>(max_nodes, kMaxNodes)),
+        grid_(grid),
         coarsest_(grid.levels.back(), grid.columns, grid.rows),
         center_(center),
         window_(
@@ -174,8 +176,8 @@ class PeakSearch {
     std::int64_t count = 0;
     for (const NodeRun& run : runs) count += run.count;
     count *= static_cast<std::int64_t>(cells_.size());
-    nodes_ = std::min<std::int64_t>(count / kTogether, kMaxNodes);
-    if (nodes_ >= kMaxNodes) return;
+    nodes_ = std::min(count / kTogether, max_nodes_);
+    if (nodes_ >= max_nodes_) return;
     // What some rotations lead to leaves little to open at the others.
     for (const int step : {kFewTurns, 1}) {
       open_.clear();
@@ -201,7 +203,7 @@ class PeakSearch {
     std::vector<ScoredPose> peaks;
     std::int64_t asked_at = nodes_;
     while (!open_.empty() && static_cast<int>(peaks.size()) < max_peaks &&
-           nodes_ < kMaxNodes) {
+           nodes_ < max_nodes_) {
       if (stop && nodes_ - asked_at >= kNodesAtOnce) {
         if (stop()) return {};
         asked_at = nodes_;
@@ -220,6 +222,10 @@ class PeakSearch {
     }
     return peaks;
   }
+
+  // Of some pose, once all are open.
+  double clearest() const { return clearest_ / unit_; }
+  std::int64_t nodes() const { return nodes_; }
 
  private:
   // Of the coarsest nodes, cells.
@@ -312,6 +318,7 @@ class PeakSearch {
     }
     while (best.bound > 0 && best.level > 0) best = BestPart(best);
     Raise(best.bound);
+    clearest_ = std::max(clearest_, best.bound);
   }
 
   // Calls `visit(part)` with the four parts of a node that are in the window
@@ -495,6 +502,7 @@ class PeakSearch {
     });
   }
 
+  const std::int64_t max_nodes_;
   const PeakGrid& grid_;
   const StridedScores coarsest_;
   const Pose2 center_;
@@ -505,6 +513,7 @@ class PeakSearch {
   const double unit_;
   const double share_;
   double least_;
+  int clearest_ = 0;
   // Each way.
   int rotations_ = 0;
   // By rotation.
@@ -551,10 +560,27 @@ std::vector<ScoredPose> FindPeaks(
     const PeakGrid& grid, const std::vector<Eigen::Vector2d>& points,
     const Pose2& center, double translation_window, double rotation_window,
     const PeakOptions& options, const std::function<bool()>& stop) {
+  const std::int64_t most = options.nodes != nullptr
+                                ? std::max<std::int64_t>(0, *options.nodes)
+                                : kMaxNodes;
   PeakSearch search(grid, points, center, translation_window, rotation_window,
-                    options.minimum_score, options.share);
+                    options.minimum_score, options.share, most);
   search.OpenAll(options.reach, stop);
-  return search.Run(options.max_peaks, stop);
+  std::vector<ScoredPose> peaks = search.Run(options.max_peaks, stop);
+  if (options.nodes != nullptr) *options.nodes -= search.nodes();
+  return peaks;
+}
+
+double ClearestScore(const PeakGrid& grid,
+                     const std::vector<Eigen::Vector2d>& points,
+                     const Pose2& center, double translation_window,
+                     double rotation_window, double reach,
+                     const std::function<bool()>& stop) {
+  // Nothing is left open but what is as good as the best so far.
+  PeakSearch search(grid, points, center, translation_window, rotation_window,
+                    0.0, 1.0, kMaxNodes);
+  search.OpenAll(reach, stop);
+  return search.clearest();
 }
 
 }  // namespace plumbline

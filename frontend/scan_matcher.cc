@@ -527,14 +527,28 @@ std::vector<ScoredPose> ScanMatcher::Peaks(
     const std::vector<Eigen::Vector2d>& points, const Pose2& center,
     double translation_window, double rotation_window, double minimum_score,
     double share, int max_peaks, double reach,
-    const std::function<bool()>& stop) const {
+    const std::function<bool()>& stop, std::int64_t* nodes) const {
   if (reference_.empty() || points.empty()) return {};
+  return FindPeaks(GridOfPeaks(), points, center, translation_window,
+                   rotation_window,
+                   {minimum_score, share, max_peaks, reach, nodes}, stop);
+}
+
+double ScanMatcher::ClearestScore(const std::vector<Eigen::Vector2d>& points,
+                                  const Pose2& center,
+                                  double translation_window,
+                                  double rotation_window, double reach,
+                                  const std::function<bool()>& stop) const {
+  if (reference_.empty() || points.empty()) return 0.0;
+  return plumbline::ClearestScore(GridOfPeaks(), points, center,
+                                  translation_window, rotation_window, reach,
+                                  stop);
+}
+
+PeakGrid ScanMatcher::GridOfPeaks() const {
   if (levels_.empty()) BuildLevels();
-  const PeakGrid grid{
-      levels_, field_columns_ + kPeakPad, field_rows_ + kPeakPad,
-      origin_, options_.grid_resolution,  viewpoints_};
-  return FindPeaks(grid, points, center, translation_window, rotation_window,
-                   {minimum_score, share, max_peaks, reach}, stop);
+  return {levels_, field_columns_ + kPeakPad, field_rows_ + kPeakPad,
+          origin_, options_.grid_resolution,  viewpoints_};
 }
 
 ScanAgreement ScanMatcher::Compare(const std::vector<ScanPoint>& scan,

@@ -91,6 +91,8 @@ struct ScoredPose {
   double score = 0.0;
 };
 
+struct PeakGrid;
+
 /// Matches a scan to a set of reference points: a correlative search over
 /// rotation and translation for the neighbourhood of the right pose, then
 /// robust point to line least squares. Not thread safe.
@@ -130,12 +132,22 @@ class ScanMatcher {
   /// looked through. Positions farther than `reach`, m, from all viewpoints
   /// are left out. Branch and bound: exact on its lattice. `stop` (may be null)
   /// is asked now and then; once it has returned true there are no peaks.
+  /// `nodes` (may be null): how many nodes may be looked at, less those that
+  /// were; the search ends with what it has when there are none left.
   std::vector<ScoredPose> Peaks(
       const std::vector<Eigen::Vector2d>& points, const Pose2& center,
       double translation_window, double rotation_window, double minimum_score,
       double share, int max_peaks,
       double reach = std::numeric_limits<double>::infinity(),
-      const std::function<bool()>& stop = nullptr) const;
+      const std::function<bool()>& stop = nullptr,
+      std::int64_t* nodes = nullptr) const;
+
+  /// A score that some of the poses of Peaks has, close to the best one's
+  /// mostly, at a fraction of the cost.
+  double ClearestScore(const std::vector<Eigen::Vector2d>& points,
+                       const Pose2& center, double translation_window,
+                       double rotation_window, double reach,
+                       const std::function<bool()>& stop) const;
 
   /// Least distance of two peaks, m, and rad.
   static constexpr double kPeakDistance = 0.6;
@@ -236,6 +248,7 @@ class ScanMatcher {
   // on; kLevelPad cells are added before the first.
   mutable std::vector<std::vector<std::int16_t>> levels_;
   void BuildLevels() const;
+  PeakGrid GridOfPeaks() const;
 };
 
 }  // namespace plumbline

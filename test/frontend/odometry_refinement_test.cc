@@ -811,6 +811,9 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
   OdometryRefiner refiner(options);
   // Is interrupted while it looks for the part.
   OdometryRefiner stopped(options);
+  // Knows little after the way to where the part was seen.
+  options.drift.rotation_per_root_metre = DegToRad(1.5);
+  OdometryRefiner drifting(options);
   constexpr int kCarried = 70;
   std::vector<Pose2> truths;
   std::vector<RefinedScan> refined;
@@ -828,6 +831,7 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
     scan.odometry = odometry;
     refiner.Process(scan);
     stopped.Process(scan);
+    drifting.Process(scan);
     refined = TakeAll(&refiner, std::move(refined));
   }
   int asked = 0;
@@ -859,6 +863,17 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
   ASSERT_EQ(refiner.loose().size(), 1u);
   EXPECT_TRUE(refiner.loose()[0].found);
   EXPECT_EQ(refiner.loose()[0].end, kCarried);
+
+  // A rough tie is taken, and the part stays loose.
+  drifting.Finish();
+  ASSERT_EQ(drifting.late_ties().size(), 1u);
+  const UncertainPose2& rough = drifting.late_ties()[0].since_key;
+  EXPECT_GT(rough.covariance(2, 2), DegToRad(5.0) * DegToRad(5.0));
+  EXPECT_LT(rough.covariance(2, 2), DegToRad(20.0) * DegToRad(20.0));
+  EXPECT_LT((rough.mean - late.since_key.mean).head<2>().norm(), 0.5);
+  ASSERT_EQ(drifting.loose().size(), 1u);
+  EXPECT_FALSE(drifting.loose()[0].found);
+  EXPECT_NE(drifting.loose()[0].why.find("roughly"), std::string::npos);
 }
 
 // A pause in the log is no reason to be lost.

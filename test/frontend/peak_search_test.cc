@@ -97,5 +97,36 @@ TEST_F(FindPeaksTest, LimitsOfPeaks) {
   EXPECT_TRUE(Find({0.5, 0.8, 4, 10.0}, [] { return true; }).empty());
 }
 
+TEST_F(FindPeaksTest, NodesAreLimited) {
+  PeakOptions options{0.5, 0.8, 4, 10.0};
+  std::int64_t enough = 1000000;
+  options.nodes = &enough;
+  const std::vector<ScoredPose> peaks = Find(options);
+  ASSERT_GE(peaks.size(), 2u);
+  const std::int64_t used = 1000000 - enough;
+  EXPECT_GT(used, 0);
+  std::int64_t none = 0;
+  options.nodes = &none;
+  EXPECT_TRUE(Find(options).empty());
+  EXPECT_EQ(none, 0);
+  std::int64_t just = used;
+  options.nodes = &just;
+  EXPECT_EQ(Find(options).size(), peaks.size());
+}
+
+TEST_F(FindPeaksTest, ClearestScoreIsThatOfSomePose) {
+  const PeakGrid grid{levels_, kColumns, kRows, {0.0, 0.0}, 0.1, viewpoints_};
+  const auto clearest = [&](const Pose2& center, double reach,
+                            const std::function<bool()>& stop = nullptr) {
+    return ClearestScore(grid, points_, center, 3.0, DegToRad(20.0), reach,
+                         stop);
+  };
+  const double score = clearest(Pose2(2.3, 3.4, 0.0), 10.0);
+  EXPECT_LE(score, 1.0);
+  EXPECT_GT(score, 0.9);
+  EXPECT_EQ(clearest(Pose2(200.0, 3.4, 0.0), 10.0), 0.0);
+  EXPECT_EQ(clearest(Pose2(2.3, 3.4, 0.0), 10.0, [] { return true; }), 0.0);
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -198,6 +198,11 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
   const Stopwatch watch;
   outcome->summary.partial = InterruptRequested();
   CountGraph(*outcome->graph, &outcome->summary);
+  for (const PlacedClosure& closure : outcome->closures) {
+    Summary::Closures& counts = outcome->summary.closures;
+    ++counts.proposed;
+    ++(closure.holds ? counts.live : counts.broken);
+  }
   // What the report says; the summary, written last, has the whole.
   clock->Read(&outcome->summary);
   outcome->summary.peak_memory_bytes = PeakMemoryBytes();
@@ -917,6 +922,12 @@ void TakeMap(const std::string& name, const std::vector<Scan>& scans,
                                         [] { return InterruptRequested(); }));
   };
   outcome->breaks = result.breaks;
+  for (const LoopClosure& closure : result.closures) {
+    const auto scan = static_cast<std::size_t>(closure.scan);
+    outcome->closures.push_back(
+        {Compose(outcome->trajectory[scan].pose, closure.place), closure.holds,
+         closure.delta});
+  }
   outcome->trace = solver.trace();
   outcome->occupancy = OccupancyOptionsFromFlags();
   outcome->title = TitleOf(name) + (FLAGS_structure ? ", with structure"

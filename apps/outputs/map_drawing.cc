@@ -3,7 +3,7 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/registry.h>
-#include <plumbline/core/wall.h>
+#include <plumbline/core/wall_pair.h>
 #include <plumbline/core/xml_text.h>
 #include <plumbline/detectors/merged_walls.h>
 #include <plumbline/outputs/map_drawing.h>
@@ -817,17 +817,6 @@ FeatureId OrientationOf(const Graph& graph, FeatureId wall) {
   return by_rectangle;
 }
 
-// On the first segment, with its direction: the middle of the part where the
-// second lies beside it, or of the gap between them.
-Pose2 MiddleOfCommonPart(const Feature& first, const Feature& second) {
-  const Wall wall = *WallOf(first);
-  const Interval other = wall.IntervalOf(*WallOf(second));
-  const Eigen::Vector2d point =
-      wall.At(0.5 * (std::max(wall.begin, other.first) +
-                     std::min(wall.end, other.second)));
-  return Pose2(point.x(), point.y(), wall.angle);
-}
-
 }  // namespace
 
 MapDrawing DrawingFromGraph(const Graph& graph,
@@ -854,9 +843,9 @@ MapDrawing DrawingFromGraph(const Graph& graph,
   for (const Constraint* constraint : graph.Constraints()) {
     if (constraint->state == ConstraintState::kLive &&
         constraint->type->Is(RelationRole::kSameWall)) {
-      drawing.closures.push_back(
-          MiddleOfCommonPart(graph.GetFeature(constraint->features[0]),
-                             graph.GetFeature(constraint->features[1])));
+      drawing.closures.push_back(MiddleOfCommonPart(
+          *WallOf(graph.GetFeature(constraint->features[0])),
+          *WallOf(graph.GetFeature(constraint->features[1]))));
     }
   }
   for (const Feature* feature : graph.Features()) {

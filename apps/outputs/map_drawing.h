@@ -53,6 +53,16 @@ struct DrawnEllipse {
   FeatureId id = kNoId;
 };
 
+/// Walls of different visits that were supposed to be one, where neither is in
+/// the map any more (LoopClosure).
+struct PlacedClosure {
+  /// Middle of what they have in common, and their direction; map frame.
+  Pose2 place = Pose2::Zero();
+  bool holds = false;
+  /// p-value of the hypothesis.
+  double delta = 0.0;
+};
+
 /// Content of a picture of a map. Whatever has a number that is not finite, or
 /// lies more than 10,000 km from the origin, is passed over.
 struct MapDrawing {

@@ -345,6 +345,17 @@ Json ClosuresToJson(const Graph& graph) {
   return places;
 }
 
+// x, y, direction, whether it holds, delta.
+Json PlacedClosuresToJson(const std::vector<PlacedClosure>& closures) {
+  Json array = Json::array();
+  for (const PlacedClosure& closure : closures) {
+    array.push_back({Rounded(closure.place[0]), Rounded(closure.place[1]),
+                     Rounded(closure.place[2]), closure.holds ? 1 : 0,
+                     Digits(closure.delta)});
+  }
+  return array;
+}
+
 // The grid as a picture, unknown cells clear; coarser where it is large: a
 // pixel is then occupied where one of its cells is.
 Json GridToJson(const OccupancyGrid* grid) {
@@ -441,6 +452,7 @@ Json DataToJson(const Report& report) {
   json["features"] = FeaturesToJson(report, clusters, &types, &sources);
   json["structure"] = StructureToJson(report, &relations, &sources);
   json["closures"] = ClosuresToJson(*report.graph);
+  json["placed_closures"] = PlacedClosuresToJson(report.closures);
   json["grid"] = GridToJson(report.grid);
   json["live"] = report.reload_seconds > 0
                      ? Json{{"stage", report.stage},

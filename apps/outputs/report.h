@@ -7,6 +7,7 @@
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/map_without_structure.h>
 #include <plumbline/outputs/em_trace.h>
+#include <plumbline/outputs/map_drawing.h>
 #include <plumbline/outputs/occupancy_grid.h>
 #include <plumbline/outputs/summary.h>
 #include <plumbline/plan/building_plan.h>
@@ -38,6 +39,8 @@ struct Report {
   /// A layer under the walls: what is free and occupied; null where there is
   /// none.
   const OccupancyGrid* grid = nullptr;
+  /// Those of a first map that another one stands for.
+  std::vector<PlacedClosure> closures;
   /// How what is broken was broken, as far as it is known.
   BreakRecords breaks;
   /// Of a run that is still under way: what it is at, and after how many

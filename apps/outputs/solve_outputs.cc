@@ -135,6 +135,9 @@ namespace {
 MapDrawing Drawing(const SolveOutcome& outcome) {
   MapDrawing drawing = DrawingFromGraph(*outcome.graph, Poses(outcome));
   drawing.title = outcome.title;
+  for (const PlacedClosure& closure : outcome.closures) {
+    if (closure.holds) drawing.closures.push_back(closure.place);
+  }
   if (outcome.ellipse_sigmas > 0.0) {
     drawing.ellipses =
         EllipsesOf(*outcome.graph, outcome.covariances, outcome.ellipse_sigmas);
@@ -163,6 +166,7 @@ Report MakeReport(const SolveOutcome& outcome) {
   report.delta_threshold = outcome.delta_threshold;
   report.title = outcome.title;
   report.breaks = outcome.breaks;
+  report.closures = outcome.closures;
   if (outcome.scans != nullptr && !outcome.trajectory.empty()) {
     std::string reason;
     report.grid = outcome.parts->Grid(outcome, &reason);

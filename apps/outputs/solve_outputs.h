@@ -7,6 +7,7 @@
 #include <plumbline/frontend/key_scan_archive.h>
 #include <plumbline/frontend/map_without_structure.h>
 #include <plumbline/frontend/output_writer.h>
+#include <plumbline/outputs/map_drawing.h>
 #include <plumbline/outputs/occupancy_grid.h>
 #include <plumbline/outputs/summary.h>
 #include <plumbline/plan/building_plan.h>
@@ -49,6 +50,8 @@ struct SolveOutcome : SolvedRun {
   double ellipse_sigmas = 0.0;
   /// Makes the map without structure, for the report; may be null.
   std::function<MapWithoutStructure()> without_structure;
+  /// Those of a first map that another one stands for.
+  std::vector<PlacedClosure> closures;
   /// How constraints were broken, as far as it is known: for the report.
   BreakRecords breaks;
   /// Makes the key scans that map.json keeps; null for a graph.

@@ -74,7 +74,8 @@ struct Summary {
   /// By relation name.
   std::map<std::string, ConstraintCounts> constraints;
 
-  /// Closures: hypotheses that walls of different visits are one, all that
+  /// Closures: hypotheses that walls of different visits are one, in the map
+  /// and in a first map that it stands for, all that
   /// were taken up, those that still hold, and those that were broken.
   struct Closures {
     std::int64_t proposed = 0;

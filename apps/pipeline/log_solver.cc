@@ -3,6 +3,7 @@
 #include <plumbline/core/read_ahead.h>
 #include <plumbline/core/sight_lines.h>
 #include <plumbline/core/stopwatch.h>
+#include <plumbline/core/wall_pair.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/detectors/visibility.h>
 #include <plumbline/frontend/looks.h>
@@ -435,7 +436,9 @@ LogSolverResult LogSolver::Run(const Log& log, const RunControl& control) {
 LogSolverResult LogSolver::RunFirst(const Log& log, const RunControl& control) {
   RequireFresh();
   TakeScans(log.scans, control);
-  return FinishWith(log.scans, Stage::kAdjustPoses, control);
+  LogSolverResult result = FinishWith(log.scans, Stage::kAdjustPoses, control);
+  result.closures = ClosuresOf(result);
+  return result;
 }
 
 LogSolverResult LogSolver::GoOn(const std::vector<Scan>& scans,
@@ -783,6 +786,8 @@ void LogSolver::AdjustPoses(Context* context) {
   if (context->first_length == 0.0) {
     context->first_length = LengthOfWalls(*graph_);
   }
+  // RunFirst has kept them, perhaps those of several maps.
+  if (result.closures.empty()) result.closures = ClosuresOf(result);
   ClearGraph();
   context->adjustment = std::make_unique<JointAdjustment>(
       graph_.get(), session_.get(), registry_, context->scans, result.refined,
@@ -798,6 +803,35 @@ void LogSolver::AdjustPoses(Context* context) {
   if (context->IsStopped()) return ReturnToFirstMap(context);
   adjustment.EstimateVariances();
   TakeTrajectory(context);
+}
+
+std::vector<LoopClosure> LogSolver::ClosuresOf(
+    const LogSolverResult& result) const {
+  std::vector<LoopClosure> closures;
+  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
+    if (!constraint->type->Is(RelationRole::kSameWall)) continue;
+    const std::optional<Wall> first =
+        WallOf(graph_->GetFeature(constraint->features[0]));
+    const std::optional<Wall> second =
+        WallOf(graph_->GetFeature(constraint->features[1]));
+    if (!first || !second) continue;
+    const Pose2 middle = MiddleOfCommonPart(*first, *second);
+    LoopClosure closure;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const KeyScanRecord& record : result.records) {
+      const Pose2& pose =
+          result.trajectory[static_cast<std::size_t>(record.scan)];
+      const double distance = (pose - middle).head<2>().squaredNorm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      closure.scan = record.scan;
+      closure.place = Between(pose, middle);
+    }
+    closure.holds = constraint->state == ConstraintState::kLive;
+    closure.delta = constraint->delta;
+    closures.push_back(closure);
+  }
+  return closures;
 }
 
 void LogSolver::MakeWalls(Context* context) {
@@ -844,6 +878,8 @@ void LogSolver::ReturnToFirstMap(Context* context) {
   result.trajectory = std::move(context->first_trajectory);
   context->first_trajectory.clear();
   context->first_map.clear();
+  // They stand in the map.
+  result.closures.clear();
   result.scan_relations = result.wall_votes = 0;
   if (!result.second_map_refused ||
       options_.features != RawFeatures::kSegments) {

@@ -101,6 +101,19 @@ struct LogSolverOptions {
   int small_map = 150;
 };
 
+/// Two walls of the first map that were supposed to be one, seen on different
+/// visits, while loops were closed. A second map, whose walls are made anew
+/// from all visits, has none of them any more.
+struct LoopClosure {
+  /// A scan made near the middle of what both walls have in common, and this
+  /// middle, with the wall's direction, in the robot's frame there.
+  int scan = 0;
+  Pose2 place = Pose2::Zero();
+  bool holds = false;
+  /// p-value of the hypothesis as it was judged last.
+  double delta = 0.0;
+};
+
 /// Result of solving a log; the map itself is the solver's graph.
 struct LogSolverResult {
   /// One pose per scan of the log, map frame.
@@ -150,6 +163,8 @@ struct LogSolverResult {
   double noise_scale = 1.0;
   /// What became of LogSolverOptions::known, for people.
   std::vector<std::string> notes;
+  /// Of the first map, where a second one stands for it.
+  std::vector<LoopClosure> closures;
 };
 
 /// Whether poses are recovered once all scans are in (pose_recovery.h): the map
@@ -236,6 +251,9 @@ class LogSolver {
   const std::vector<EmPhase>& trace() const { return trace_; }
 
  private:
+  // The closures of the map as it stands, by scans near them.
+  std::vector<LoopClosure> ClosuresOf(const LogSolverResult& result) const;
+
   // A stage, by what it does.
   enum class Stage : int {
     kTakeScans,

@@ -45,6 +45,12 @@ void Exchange(Archive& archive, BreakRecord& record) {
 }
 
 template <typename Archive>
+void Exchange(Archive& archive, LoopClosure& closure) {
+  auto& [scan, place, holds, delta] = closure;
+  ExchangeAll(archive, scan, place, holds, delta);
+}
+
+template <typename Archive>
 void Exchange(Archive& archive, LogSolverResult& result) {
   auto& [trajectory, em, initial_cost, final_cost, frontend_seconds,
          detect_seconds, solve_seconds, relocalization_seconds,
@@ -52,14 +58,14 @@ void Exchange(Archive& archive, LogSolverResult& result) {
          wall_votes, scan_seconds, key_scans, wide_searches, refused_matches,
          lost_tracks, loose, feature_matches, features_created,
          second_map_refused, interrupted, refined, records, breaks, range_sigma,
-         noise_scale, notes] = result;
+         noise_scale, notes, closures] = result;
   ExchangeAll(
       archive, trajectory, em, initial_cost, final_cost, frontend_seconds,
       detect_seconds, solve_seconds, relocalization_seconds, completion_seconds,
       adjustment_seconds, glimpsed_walls, scan_relations, wall_votes,
       scan_seconds, key_scans, wide_searches, refused_matches, lost_tracks,
       loose, feature_matches, features_created, second_map_refused, interrupted,
-      refined, records, breaks, range_sigma, noise_scale, notes);
+      refined, records, breaks, range_sigma, noise_scale, notes, closures);
 }
 
 // Types go by their registered names.

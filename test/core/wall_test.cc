@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/registry.h>
-#include <plumbline/core/wall.h>
+#include <plumbline/core/wall_pair.h>
 #include <plumbline/factors/angle.h>
 
 #include <cmath>
@@ -29,6 +29,18 @@ TEST(WallTest, LeftOfItIsPositive) {
   EXPECT_NEAR(wall.Across(left), 3.0, 1e-12);
   EXPECT_NEAR(wall.Along(left), 4.0, 1e-12);
   EXPECT_NEAR(wall.Across(Vector2d(1.5, 2.0)), -0.5, 1e-12);
+}
+
+TEST(WallTest, MiddleOfWhatTwoWallsHaveInCommon) {
+  const Wall wall = MakeWall(Eigen::Vector2d(1.0, 2.0), kPi / 2, 0.0, 4.0);
+  // Beside its upper half, the other way round.
+  const Wall beside = MakeWall(Eigen::Vector2d(1.1, 8.0), -kPi / 2, 0.0, 4.0);
+  EXPECT_TRUE(MiddleOfCommonPart(wall, beside)
+                  .isApprox(Pose2(1.0, 5.0, kPi / 2), 1e-12));
+  // Of two that have nothing in common the middle of the gap.
+  const Wall above = MakeWall(Eigen::Vector2d(1.0, 8.0), kPi / 2, 0.0, 1.0);
+  EXPECT_TRUE(MiddleOfCommonPart(wall, above)
+                  .isApprox(Pose2(1.0, 7.0, kPi / 2), 1e-12));
 }
 
 TEST(WallTest, IntervalOfAnotherWall) {

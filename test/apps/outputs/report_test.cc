@@ -400,6 +400,13 @@ TEST_F(ReportTest, GridAndClosures) {
             "iVBORw0KGgo");
   // The fourth of the structure constraints.
   EXPECT_EQ(data["closures"], nlohmann::json::parse("[3]"));
+  EXPECT_TRUE(data["placed_closures"].empty());
+  report.closures = {{Pose2(1.0, 2.0, 0.5), true, 0.75},
+                     {Pose2(3.0, -1.0, 0.0), false, 0.001}};
+  data = Script(Text(report), "data");
+  EXPECT_EQ(
+      data["placed_closures"],
+      nlohmann::json::parse("[[1.0,2.0,0.5,1,0.75],[3.0,-1.0,0.0,0,0.001]]"));
   EXPECT_EQ(data["live"]["stage"], "closing of loops");
 }
 

@@ -3,8 +3,10 @@
 #include <plumbline/core/detector.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/same_wall.h>
+#include <plumbline/factors/angle.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/pipeline/log_solver.h>
 
@@ -13,6 +15,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -441,6 +444,43 @@ TEST_F(LogSolverTest, LoopsAreClosed) {
     EXPECT_GE(phase.iteration, last);
     last = phase.iteration;
   }
+}
+
+// The walls that they joined are gone with the first map: they are where walls
+// of the second one are.
+TEST_F(LogSolverTest, ClosuresOfTheFirstMapAreKept) {
+  const Log log = Office(100000);
+  LogSolver solver(registry_, {});
+  const LogSolverResult result = solver.Run(log);
+  ASSERT_FALSE(result.second_map_refused);
+  EXPECT_TRUE(Closures(solver.graph()).empty());
+  std::vector<Wall> walls;
+  for (const Feature* feature : solver.graph().Features()) {
+    if (const std::optional<Wall> wall = WallOf(*feature)) {
+      walls.push_back(*wall);
+    }
+  }
+  int holding = 0;
+  int on_walls = 0;
+  for (const LoopClosure& closure : result.closures) {
+    ASSERT_GE(closure.scan, 0);
+    ASSERT_LT(static_cast<std::size_t>(closure.scan), result.trajectory.size());
+    EXPECT_GE(closure.delta, 0.0);
+    EXPECT_LE(closure.delta, 1.0);
+    if (!closure.holds) continue;
+    ++holding;
+    const Pose2 place =
+        Compose(result.trajectory[static_cast<std::size_t>(closure.scan)],
+                closure.place);
+    on_walls += std::any_of(walls.begin(), walls.end(), [&](const Wall& wall) {
+      const double along = wall.Along(place.head<2>());
+      return std::abs(wall.Across(place.head<2>())) < 0.2 &&
+             along > wall.begin - 0.5 && along < wall.end + 0.5 &&
+             std::abs(NormalizeAngle(wall.angle - place[2])) < 0.1;
+    });
+  }
+  EXPECT_GT(holding, 5);
+  EXPECT_GE(10 * on_walls, 9 * holding);
 }
 
 // Says, once loops are being closed, that the two walls farthest apart that

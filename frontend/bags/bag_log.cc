@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <utility>
 
 namespace plumbline {
@@ -179,11 +180,12 @@ class ScanPlacer {
     const std::vector<Mount> mounts = FindMounts();
     period_ = TimeBetweenScans();
     const BagScan* before = nullptr;
+    std::vector<float> ranges_before;
     std::int64_t far = 0;
     log_->scans.reserve(scans_.size());
     for (BagScan& raw : scans_) {
       if (before != nullptr && raw.stamp == before->stamp &&
-          !log_->scans.empty() && SameReadings(raw, log_->scans.back())) {
+          SameReadings(raw.message.ranges, ranges_before)) {
         skips_.Add("scan that was recorded twice", raw.position);
         continue;
       }
@@ -196,8 +198,8 @@ class ScanPlacer {
         ++far;
       }
       log_->scans.push_back(std::move(scan));
-      // Free what was taken over.
-      raw.message.ranges = {};
+      // Frees what was taken over before.
+      ranges_before = std::move(raw.message.ranges);
     }
     if (far > 0) {
       log_->notes.push_back(
@@ -238,12 +240,11 @@ class ScanPlacer {
     }
   }
 
-  static bool SameReadings(const BagScan& raw, const Scan& scan) {
-    // What is no return was made zero.
-    return raw.message.ranges.size() == scan.ranges.size() &&
-           std::equal(raw.message.ranges.begin(), raw.message.ranges.end(),
-                      scan.ranges.begin(),
-                      [](float a, float b) { return a == b || b == 0.0f; });
+  // As bytes: what is not a number is no other than itself.
+  static bool SameReadings(const std::vector<float>& a,
+                           const std::vector<float>& b) {
+    return a.size() == b.size() &&
+           std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
   }
 
   Scan MakeScan(const BagScan& raw, const Mount& mount) {

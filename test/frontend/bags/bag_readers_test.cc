@@ -503,6 +503,28 @@ TEST(BagLogTest, OrdersScansWithinASecond) {
   EXPECT_THAT(log.notes, Contains(HasSubstr("out of order")));
 }
 
+// A recorder that listens twice. Readings are compared as they were sent: the
+// motion during the first one is undone by then.
+TEST(BagLogTest, ScansThatWereRecordedTwiceCountOnce) {
+  std::vector<BagRecord> records;
+  for (int i = 0; i < 10; ++i) {
+    const std::int64_t time = kBagStart + i * kSecond / 10;
+    records.push_back(
+        OdometryRecord(time, Pose2(0.1 * i, 0.0, 0.3 * i), kRos1));
+    LaserScanMessage scan = PlainScan(time);
+    scan.time_increment = 0.02;
+    scan.ranges[2] = std::nanf("");
+    records.push_back(Record(scan, kRos1));
+    if (i % 2 == 0) records.push_back(Record(scan, kRos1));
+    // Another scan that claims the same time is one.
+    scan.ranges[0] += 0.01f;
+    if (i == 4) records.push_back(Record(scan, kRos1));
+  }
+  const Log log = ReadBytes(MakeRosbag1(records));
+  EXPECT_EQ(log.scans.size(), 11u);
+  EXPECT_EQ(SkippedInBag(log, "scan that was recorded twice"), 5);
+}
+
 TEST(BagLogTest, ClocksThatDifferAreAligned) {
   std::vector<BagRecord> records = SmallDrive(kRos1);
   // The robot's clock is an hour behind that of the laser's computer; messages

@@ -43,8 +43,10 @@ struct FirstMap {
   LogSolverResult result;
   double wall_length = 0.0;
   std::size_t num_scans = 0;
-  // By record of a key scan, frame of this map.
+  // By record of a key scan, frame of this map; whether their poses were
+  // adjusted.
   std::vector<KeyView> views;
+  bool is_straight = false;
   // Of its frame in that of the first log of its group, and its first key scan
   // in that of the one that it hangs on there.
   Pose2 pose = Pose2::Zero();
@@ -54,8 +56,9 @@ struct FirstMap {
 // Logs that were placed in each other's building.
 struct Group {
   std::vector<std::size_t> logs;
-  // Of all of them, frame of the first.
+  // Of all of them, frame of the first; whether their poses were adjusted.
   std::vector<KeyView> views;
+  bool is_straight = false;
   // The largest of theirs.
   double noise_scale = 1.0;
 };
@@ -113,6 +116,7 @@ void Append(int from_record, FirstMap* log, LogSolverResult* whole) {
     loose.begin += scans;
     loose.end += scans;
   }
+  for (LoopClosure& closure : part.closures) closure.scan += scans;
   for (Pose2& pose : part.trajectory) pose = Compose(log->pose, pose);
   const auto append = [](auto& to, const auto& from) {
     to.insert(to.end(), from.begin(), from.end());
@@ -121,6 +125,7 @@ void Append(int from_record, FirstMap* log, LogSolverResult* whole) {
   append(whole->refined, part.refined);
   append(whole->records, part.records);
   append(whole->loose, part.loose);
+  append(whole->closures, part.closures);
   append(whole->scan_seconds, part.scan_seconds);
   whole->frontend_seconds += part.frontend_seconds;
   whole->relocalization_seconds += part.relocalization_seconds;
@@ -169,6 +174,7 @@ class Merger {
       Group group;
       group.logs.push_back(left.front());
       group.views = maps_[left.front()].views;
+      group.is_straight = maps_[left.front()].is_straight;
       group.noise_scale = maps_[left.front()].result.noise_scale;
       left.erase(left.begin());
       Gather(&left, &group);
@@ -301,11 +307,23 @@ class Merger {
     const double noise_scale =
         std::max(group->noise_scale, log.result.noise_scale);
     // The start is given in the first log's frame.
-    const TrackPlacement placement = PlaceTrack(
-        group->views, log.views,
-        options_.earlier != nullptr || group->logs.front() == 0 ? StartOf(i)
-                                                                : std::nullopt,
-        PlacementWith(noise_scale), control_.run.stop);
+    const auto place = [&] {
+      return PlaceTrack(group->views, log.views,
+                        options_.earlier != nullptr || group->logs.front() == 0
+                            ? StartOf(i)
+                            : std::nullopt,
+                        PlacementWith(noise_scale), control_.run.stop);
+    };
+    TrackPlacement placement = place();
+    // First maps are bent: what nearly fits may do so when they are not.
+    if (!placement.found &&
+        placement.agreeing >= options_.placement.min_agreeing && !IsStopped() &&
+        Straighten(i, group)) {
+      const TrackPlacement again = place();
+      if (again.found || again.agreeing >= placement.agreeing) {
+        placement = again;
+      }
+    }
     // What came nearest to being its place is what there is to say of it.
     TrackPlacement& told = result_.logs[i].placement;
     if (placement.found || placement.agreeing >= told.agreeing) {
@@ -320,7 +338,62 @@ class Merger {
       view.pose = Compose(log.pose, view.pose);
       group->views.push_back(std::move(view));
     }
+    group->is_straight = false;
     return true;
+  }
+
+  // Adjusts the poses that the views of the group and of a log are seen from,
+  // which takes the time of a few scans; false when nothing is left to adjust.
+  bool Straighten(std::size_t i, Group* group) {
+    FirstMap& log = maps_[i];
+    bool any = false;
+    if (!log.is_straight) {
+      StraightenViews({i}, &log.views);
+      log.is_straight = any = true;
+    }
+    // An earlier map was adjusted.
+    if (!group->is_straight && options_.earlier == nullptr) {
+      if (group->logs.size() == 1 && maps_[group->logs.front()].is_straight) {
+        group->views = maps_[group->logs.front()].views;
+      } else {
+        StraightenViews(group->logs, &group->views);
+      }
+      group->is_straight = any = true;
+    }
+    return any && !IsStopped();
+  }
+
+  // `views` are those of these logs, one after the other.
+  void StraightenViews(const std::vector<std::size_t>& logs,
+                       std::vector<KeyView>* views) {
+    LogSolverResult whole;
+    std::vector<Scan> scans;
+    for (const std::size_t i : logs) {
+      FirstMap copy;
+      copy.result = maps_[i].result;
+      copy.pose = maps_[i].pose;
+      copy.tie = maps_[i].tie;
+      Append(result_.logs[i].placement.from, &copy, &whole);
+      scans.insert(scans.end(), logs_[i].scans.begin(), logs_[i].scans.end());
+    }
+    std::vector<Pose2> poses;
+    for (const KeyScanRecord& record : whole.records) {
+      poses.push_back(whole.trajectory[static_cast<std::size_t>(record.scan)]);
+    }
+    Graph graph;
+    SolverSession session(&graph, registry_, options_.solver.session);
+    JointAdjustmentOptions adjustment_options = options_.solver.adjustment;
+    adjustment_options.ScaleToNoise(whole.noise_scale);
+    JointAdjustment adjustment(&graph, &session, registry_, scans,
+                               whole.refined, whole.records, poses, kNoId,
+                               adjustment_options, control_.run.stop);
+    adjustment.Adjust();
+    if (IsStopped()) return;
+    adjustment.MatchAnew();
+    adjustment.Adjust();
+    if (IsStopped()) return;
+    poses = adjustment.KeyPoses();
+    for (std::size_t k = 0; k < views->size(); ++k) (*views)[k].pose = poses[k];
   }
 
   void Finish(const Group& group) {

@@ -136,6 +136,28 @@ TEST_F(SeveralLogsTest, PiecesOfADriveBecomeOneMapInAnyOrder) {
   }
 }
 
+// First maps are bent. Where that alone speaks against a place, their poses are
+// adjusted before it is looked for again.
+TEST_F(SeveralLogsTest, BentFirstMapsAreStraightened) {
+  const Log office = Office();
+  const std::size_t n = office.scans.size();
+  const auto solve = [&](const SeveralLogsOptions& options) {
+    return SolveSeveralLogs(
+        registry_, {Piece(office, 0, n / 2), Piece(office, n / 2, n)}, options);
+  };
+  SeveralLogsOptions options;
+  const SeveralLogsResult bent = solve(options);
+  ASSERT_EQ(bent.maps.size(), 1u);
+  const double misfit = bent.logs[1].placement.misfit;
+  ASSERT_GT(misfit, 0.0);
+  options.placement.max_misfit = 0.9 * misfit;
+  options.placement.max_misfit_per_metre = 0.0;
+  const SeveralLogsResult straight = solve(options);
+  ASSERT_EQ(straight.maps.size(), 1u);
+  EXPECT_LT(straight.logs[1].placement.misfit, 0.9 * misfit);
+  EXPECT_LT(LargestError(straight.maps.front()), 0.25);
+}
+
 TEST_F(SeveralLogsTest, DifferentBuildingsAreKeptApart) {
   const Log office = Office();
   Log other = Enlarged(Piece(office, 0, 500));

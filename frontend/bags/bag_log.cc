@@ -383,6 +383,18 @@ void AppendReports(const std::vector<SkipReport>& reports, Log* log) {
   log->skipped.insert(log->skipped.end(), reports.begin(), reports.end());
 }
 
+void NoteEnds(const BagMessages& messages, Log* log) {
+  if (messages.other_ends == 0) return;
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "%lld scans end at another angle than they say, the first at "
+                "%.2f degrees by angle_increment and at %.2f by angle_max: "
+                "angle_increment is believed (--laser_step says another)",
+                static_cast<long long>(messages.other_ends),
+                RadToDeg(messages.end_by_step), RadToDeg(messages.stated_end));
+  log->notes.push_back(text);
+}
+
 void TellTopics(const BagMessages& messages, const LaserOptions& options,
                 Log* log) {
   for (const BagStream& stream : messages.streams) {
@@ -404,6 +416,7 @@ Log ReadBag(BagSource* source, const std::string& name,
   AppendReports(messages.skipped_by_source, &log);
   AppendReports(messages.skipped, &log);
   log.notes = source->notes();
+  NoteEnds(messages, &log);
   try {
     ScanPlacer placer(options, ChooseBagSources(name, options, &messages, &log),
                       &messages, &log);

@@ -11,6 +11,8 @@ namespace {
 constexpr double kNanoseconds = 1e9;  // in a second
 constexpr std::size_t kFewestReadings = 2;
 constexpr std::size_t kMostFrames = 100;
+// Steps by which the last beam may lie beside angle_max.
+constexpr double kOtherEnd = 1.5;
 
 // LaserScan has its angles as floats. Of all angles that this float may stand
 // for the round one is meant, in parts of 1/1200 degree, where there is one.
@@ -173,6 +175,7 @@ class Collector {
     LaserScanMessage scan;
     if (!DecodeLaserScan(message.data, encoding, &scan, why)) return false;
     if (!CheckAngles(&scan, why)) return false;
+    CompareEnds(scan);
     if (messages_.scans.empty()) messages_.scan_topic = topic;
     if (messages_.scan_topic != topic) {
       // Two topics could be meant: nothing is to be kept but the counts.
@@ -199,6 +202,22 @@ class Collector {
     raw.message = std::move(scan);
     messages_.scans.push_back(std::move(raw));
     return true;
+  }
+
+  // Steps that are rounded, or of another laser, bend a scan into a spiral.
+  // Many drivers count a beam too many or too few: that is no matter.
+  void CompareEnds(const LaserScanMessage& scan) {
+    if (options_.laser_start_angle || options_.laser_step) return;
+    const double end =
+        scan.angle_min +
+        scan.angle_increment * static_cast<double>(scan.ranges.size() - 1);
+    if (!(std::abs(end - scan.angle_max) >
+          kOtherEnd * std::abs(scan.angle_increment))) {
+      return;
+    }
+    if (messages_.other_ends++ > 0) return;
+    messages_.end_by_step = end;
+    messages_.stated_end = scan.angle_max;
   }
 
   bool CheckAngles(LaserScanMessage* scan, std::string* why) const {

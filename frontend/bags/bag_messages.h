@@ -93,6 +93,11 @@ struct BagMessages {
   std::vector<std::string> frames;
   /// Index of the topic of the scans.
   std::size_t scan_topic = 0;
+  /// Scans whose last direction is not that of their angle_max, and the first
+  /// one's two, rad: by angle_increment, which is believed, and by angle_max.
+  std::int64_t other_ends = 0;
+  double end_by_step = 0.0;
+  double stated_end = 0.0;
   /// Several topics have scans and no option chooses one: `scans` is empty.
   bool is_ambiguous = false;
   /// Transforms between frames, in the order of time.

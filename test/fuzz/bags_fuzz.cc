@@ -3,6 +3,7 @@
 // Error.
 
 #include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/log_reader.h>
@@ -52,6 +53,8 @@ const plumbline::Registry& Readers() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
                                       std::size_t size) {
   const std::string bytes(reinterpret_cast<const char*>(data), size);
+  // With several threads chunks are unpacked ahead.
+  const plumbline::ThreadsScope threads(size % 2 == 0 ? 1 : 3);
   try {
     plumbline::InputStream input("fuzz", bytes);
     const plumbline::LogReaderType* const reader =

@@ -353,6 +353,26 @@ TEST(BagLogTest, TimesOfTransforms) {
   }
 }
 
+// A step that was rounded bends a scan: that is said.
+TEST(BagLogTest, StepsThatDoNotLeadToTheStatedEndAreSaid) {
+  const auto notes_of = [](double step) {
+    LaserScanMessage scan = PlainScan(kBagStart);
+    scan.angle_min = 0.0;
+    scan.ranges.assign(360, 2.0f);
+    scan.angle_increment = step;
+    scan.angle_max = DegToRad(359.0);
+    return ReadBytes(MakeRosbag1({Record(scan, kRos1)})).notes;
+  };
+  EXPECT_THAT(notes_of(0.017),
+              Contains(AllOf(HasSubstr("1 scans end at another angle"),
+                             HasSubstr("349.6"), HasSubstr("359.00"),
+                             HasSubstr("--laser_step"))));
+  // One beam more or less is no matter, nor is what a float leaves.
+  for (const double step : {DegToRad(1.0), DegToRad(359.0) / 360.0}) {
+    EXPECT_THAT(notes_of(step), Not(Contains(HasSubstr("another angle"))));
+  }
+}
+
 // Drivers that put the time of a whole scan, or anything, into time_increment.
 TEST(BagLogTest, SweepsThatTakeLongerThanThereIsTimeAreNotBelieved) {
   std::vector<BagRecord> records;

@@ -92,7 +92,7 @@ constexpr double kMoreRest = 1.25;
 // Points at most that tell how clearly a window of a part fits somewhere, and
 // nodes of the searches for all windows of a part.
 constexpr std::size_t kClearPoints = 128;
-constexpr std::int64_t kLateNodes = 6000000;
+constexpr std::int64_t kLateNodes = 12000000;
 // A tie that is known worse than this is a rough one: the part is still loose,
 // m and rad.
 constexpr double kLateSigma = 0.5;

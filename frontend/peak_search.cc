@@ -36,12 +36,23 @@ constexpr std::size_t kMostInLane = 32767 / static_cast<int>(kMostScore);
 // whether one of them can still be good enough.
 constexpr std::size_t kPointsAtOnce = 16;
 
+// Nodes whose scores are added up together: few enough that what they are added
+// from stays at hand from one point to the next.
+constexpr std::size_t kNodesTogether = 4096;
+
+// Coarsest nodes of a row: [column, column + count).
+struct NodeRun {
+  int column;
+  int row;
+  int count;
+};
+
 // The coarsest scores in the order in which PeakSearch adds them up: those of
 // cells that are a node apart lie beside each other.
 class StridedScores {
  public:
   static constexpr int kStride = kPeakPad;
-  // Nodes whose scores are added up together.
+  // Nodes that are added to at a time.
   static constexpr int kLanes = 16;
 
   // Where the scores of a point lie that the nodes give it.
@@ -75,15 +86,26 @@ class StridedScores {
     return {Begin(x - kStride * column, y - kStride * row), row, column};
   }
 
-  // Sums of the scores of the cells (x + kStride * (column + k), y + kStride *
-  // row) for k in [0, kLanes), over the places of cells (x, y).
-  void Sum(const std::vector<Place>& places, int column, int row,
-           std::int32_t* sums) const {
-    std::fill(sums, sums + kLanes, 0);
-    for (std::size_t i = 0; i < places.size(); i += kMostInLane) {
-      AddSome(&places[i], std::min(places.size() - i, kMostInLane), column, row,
-              sums);
+  // For each node of the runs, kLanes at a time, the sum of the scores that it
+  // gives to the points at the places; `sums` is as long as LanesOf says.
+  void Sum(const std::vector<Place>& places, const NodeRun* runs,
+           std::size_t num_runs, std::vector<std::int16_t>* lanes,
+           std::vector<std::int32_t>* sums) const {
+    std::size_t size = 0;
+    for (std::size_t r = 0; r < num_runs; ++r) size += LanesOf(runs[r]);
+    sums->assign(size, 0);
+    for (std::size_t begin = 0; begin < places.size(); begin += kMostInLane) {
+      const std::size_t end = std::min(places.size(), begin + kMostInLane);
+      lanes->assign(size, 0);
+      for (std::size_t i = begin; i < end; ++i) {
+        Add(places[i], runs, num_runs, lanes->data());
+      }
+      for (std::size_t k = 0; k < size; ++k) (*sums)[k] += (*lanes)[k];
     }
+  }
+
+  static std::size_t LanesOf(const NodeRun& run) {
+    return static_cast<std::size_t>((run.count + kLanes - 1) / kLanes * kLanes);
   }
 
  private:
@@ -103,31 +125,31 @@ class StridedScores {
            kLanes;
   }
 
-  void AddSome(const Place* places, std::size_t count, int column, int row,
-               std::int32_t* sums) const {
-    Lanes low{};
-    Lanes high{};
-    for (const Place* place = places; place != places + count; ++place) {
-      const int first = place->column + column;
-      const int line = place->row + row;
-      if (static_cast<unsigned>(line) >= static_cast<unsigned>(rows_) ||
-          static_cast<unsigned>(first + kLanes) >=
-              static_cast<unsigned>(columns_ + kLanes)) {
-        continue;
+  void Add(const Place& place, const NodeRun* runs, std::size_t num_runs,
+           std::int16_t* lanes) const {
+    for (const NodeRun* run = runs; run != runs + num_runs; ++run) {
+      const int row = place.row + run->row;
+      const int column = place.column + run->column;
+      std::int16_t* const first = lanes;
+      lanes += LanesOf(*run);
+      if (static_cast<unsigned>(row) >= static_cast<unsigned>(rows_)) continue;
+      const std::int16_t* const scores =
+          scores_.data() + place.begin + pitch_ * static_cast<std::size_t>(row);
+      for (int k = 0; k < run->count; k += kLanes) {
+        const int at = column + k;
+        if (at <= -kLanes || at >= columns_) continue;
+        AddLanes(scores + at, first + k);
+        AddLanes(scores + at + kLanes / 2, first + k + kLanes / 2);
       }
-      const std::int16_t* scores = scores_.data() + place->begin +
-                                   pitch_ * static_cast<std::size_t>(line) +
-                                   first;
-      Lanes part;
-      std::memcpy(&part, scores, sizeof(part));
-      low += part;
-      std::memcpy(&part, scores + kLanes / 2, sizeof(part));
-      high += part;
     }
-    for (int k = 0; k < kLanes / 2; ++k) {
-      sums[k] += low[k];
-      sums[k + kLanes / 2] += high[k];
-    }
+  }
+
+  static void AddLanes(const std::int16_t* scores, std::int16_t* to) {
+    Lanes part, sum;
+    std::memcpy(&part, scores, sizeof(part));
+    std::memcpy(&sum, to, sizeof(sum));
+    sum += part;
+    std::memcpy(to, &sum, sizeof(sum));
   }
 
   int columns_;
@@ -282,13 +304,6 @@ class PeakSearch {
   // No peak has less than its share of what some pose has.
   void Raise(int score) { least_ = std::max(least_, share_ * score); }
 
-  // Coarsest nodes of a row: [column, column + count).
-  struct NodeRun {
-    int column;
-    int row;
-    int count;
-  };
-
   // First cell of a coarsest node along an axis.
   int FirstOf(int node) const { return node * kStride - window_; }
 
@@ -301,19 +316,30 @@ class PeakSearch {
       places_.push_back(
           coarsest_.PlaceOf(cell.x + FirstOf(0), cell.y + FirstOf(0)));
     }
-    std::array<std::int32_t, StridedScores::kLanes> sums;
-    for (const NodeRun& run : runs) {
-      for (int j = 0; j < run.count; j += StridedScores::kLanes) {
-        coarsest_.Sum(places_, run.column + j, run.row, sums.data());
-        const int count = std::min(run.count - j, StridedScores::kLanes);
-        for (int k = 0; k < count; ++k) {
-          const int bound = sums[static_cast<std::size_t>(k)];
-          if (bound < least_ || bound <= 0) continue;
-          const Node node{bound, kLevels - 1, rotation,
-                          FirstOf(run.column + j + k), FirstOf(run.row)};
+    // Neighbours look at the same scores.
+    std::sort(places_.begin(), places_.end(), [](const auto& a, const auto& b) {
+      return std::tie(a.begin, a.row, a.column) <
+             std::tie(b.begin, b.row, b.column);
+    });
+    std::size_t begin = 0;
+    while (begin < runs.size()) {
+      std::size_t end = begin;
+      std::size_t size = 0;
+      while (end < runs.size() && size < kNodesTogether) {
+        size += StridedScores::LanesOf(runs[end++]);
+      }
+      coarsest_.Sum(places_, &runs[begin], end - begin, &lanes_, &sums_);
+      const std::int32_t* bounds = sums_.data();
+      for (; begin < end; ++begin) {
+        const NodeRun& run = runs[begin];
+        for (int k = 0; k < run.count; ++k) {
+          if (bounds[k] < least_ || bounds[k] <= 0) continue;
+          const Node node{bounds[k], kLevels - 1, rotation,
+                          FirstOf(run.column + k), FirstOf(run.row)};
           open_.push_back(node);
           if (best < node) best = node;
         }
+        bounds += StridedScores::LanesOf(run);
       }
     }
     while (best.bound > 0 && best.level > 0) best = BestPart(best);
@@ -523,6 +549,8 @@ class PeakSearch {
   std::int64_t nodes_ = 0;
   // Of OpenRotation, kept for its memory.
   std::vector<StridedScores::Place> places_;
+  std::vector<std::int16_t> lanes_;
+  std::vector<std::int32_t> sums_;
 };
 
 }  // namespace

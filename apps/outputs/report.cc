@@ -29,6 +29,8 @@ using Json = nlohmann::ordered_json;
 constexpr double kLeastWay = 0.1;  // m, between poses of the path
 // Of the grid's picture.
 constexpr double kMostPixels = 4e6;
+// Of a run that was interrupted: somebody waits for it.
+constexpr double kMostPixelsOfAPart = 1e6;
 // Opaque, red, green, blue.
 constexpr std::uint32_t kOccupiedPixel = 0xff6b7682;
 constexpr std::uint32_t kFreePixel = 0xffeef1f4;
@@ -358,12 +360,12 @@ Json PlacedClosuresToJson(const std::vector<PlacedClosure>& closures) {
 
 // The grid as a picture, unknown cells clear; coarser where it is large: a
 // pixel is then occupied where one of its cells is.
-Json GridToJson(const OccupancyGrid* grid) {
+Json GridToJson(const OccupancyGrid* grid, double most_pixels) {
   if (grid == nullptr) return nullptr;
   int cells = 1;
   while (static_cast<double>(grid->width()) * grid->height() /
              (static_cast<double>(cells) * cells) >
-         kMostPixels) {
+         most_pixels) {
     ++cells;
   }
   ReportPicture picture;
@@ -453,7 +455,8 @@ Json DataToJson(const Report& report) {
   json["structure"] = StructureToJson(report, &relations, &sources);
   json["closures"] = ClosuresToJson(*report.graph);
   json["placed_closures"] = PlacedClosuresToJson(report.closures);
-  json["grid"] = GridToJson(report.grid);
+  json["grid"] = GridToJson(report.grid,
+                            summary.partial ? kMostPixelsOfAPart : kMostPixels);
   json["live"] = report.reload_seconds > 0
                      ? Json{{"stage", report.stage},
                             {"seconds", report.reload_seconds},

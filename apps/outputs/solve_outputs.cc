@@ -34,9 +34,11 @@ constexpr double kPlanResolution = 0.05;
 constexpr double kCoarsestPlanResolution = 0.1;
 // Scans whose rays the grid of a run that was interrupted has, and its finest
 // cells, m: whoever pressed Ctrl-C is waiting, and half of the time that
-// writing takes goes by the number of cells.
+// writing takes goes by the number of cells. A fifth is that of pictures: this
+// is the longer side of map.png then, px.
 constexpr std::size_t kMostScansOfAPart = 4000;
 constexpr double kFinestResolutionOfAPart = kCoarsestPlanResolution;
+constexpr int kLongSideOfAPart = 1200;
 
 std::vector<Pose2> Poses(const SolveOutcome& outcome) {
   std::vector<Pose2> poses;
@@ -283,7 +285,9 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
   };
   add("map.png", "the map as a picture", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {
-        WriteMapPng(Drawing(outcome), folder / "map.png");
+        MapDrawingOptions options;
+        if (outcome.summary.partial) options.long_side = kLongSideOfAPart;
+        WriteMapPng(Drawing(outcome), folder / "map.png", options);
       }));
   add("report.html", "all of it as one page for a browser", true, false,
       Always([](const SolveOutcome& outcome, const path& folder) {

@@ -217,7 +217,7 @@ TEST_F(TerminalTest, BarWithTimeLeft) {
   const std::string simulate =
       std::string(PLUMBLINE_BIN_DIR) + "/plumbline_simulate";
   Process process(simulate,
-                  {"--world=killian_like", "--size=4",
+                  {"--world=office", "--speed=0.05", "--scan_rate=50",
                    "--output=" + (folder_ / "log.clf").string()},
                   /*on_terminal=*/true);
   const bool has_come = process.WaitFor(" left");
@@ -242,7 +242,7 @@ TEST_F(TerminalTest, AnInterruptedSimulationLeavesWhatWasThere) {
       std::ofstream(folder_ / name) << "of yesterday";
     }
     Process process(simulate,
-                    {"--world=killian_like", "--size=4", "--verbose",
+                    {"--world=office", "--speed=0.05", "--scan_rate=50",
                      "--output=" + (folder_ / "log").string(),
                      "--truth=" + (folder_ / "truth.json").string(),
                      "--relations=" + (folder_ / "relations").string(),
@@ -373,6 +373,15 @@ TEST_P(InterruptTest, WritesWhatThereIs) {
   std::ifstream grid(folder_ / "occupancy.yaml");
   const std::string yaml{std::istreambuf_iterator<char>(grid), {}};
   EXPECT_THAT(yaml, HasSubstr("resolution: 0.1\n"));
+  // Width and height of a picture stand behind its first 16 bytes.
+  std::ifstream picture(folder_ / "map.png", std::ios::binary);
+  const std::string png{std::istreambuf_iterator<char>(picture), {}};
+  ASSERT_GT(png.size(), 24u);
+  for (const std::size_t place : {16u, 20u}) {
+    EXPECT_LE(256 * static_cast<unsigned char>(png[place + 2]) +
+                  static_cast<unsigned char>(png[place + 3]),
+              1200);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Signals, InterruptTest,

@@ -621,8 +621,9 @@ def interrupted_binaries(solve, count, rng, datasets, slower):
         file.write(office(250))
     output = os.path.join(folder, "output")
     commands = {
-        "simulate": [binary("simulate"), "--world=killian_like", "--size=8",
-                     "--output=" + output, "--truth=" + output + ".json"],
+        "simulate": [binary("simulate"), "--world=office", "--speed=0.2",
+                     "--scan_rate=50", "--output=" + output,
+                     "--truth=" + output + ".json"],
         "inspect": [binary("inspect"), log],
         "evaluate": [binary("evaluate"), "--trajectory=" + path,
                      "--reference=" + path, "--output=" + output,

@@ -49,6 +49,9 @@ constexpr double kSameStretch = 0.7;
 // what is left of a piece in the end has at least this length, m.
 constexpr double kThroughWall = 0.15;
 constexpr double kLeastPiece = 0.1;
+// Doors of a mirror image that were seen in passing speak one way only: of all
+// places that changed so many are openings, and so many walls.
+constexpr int kLeastEachWay = 2;
 // Position and direction of a window, m and rad, in the fit of the track.
 constexpr double kWindowDistance = 0.1;
 constexpr double kWindowTurn = DegToRad(1.0);
@@ -663,10 +666,12 @@ class Search {
              " of it would fit, one of both has " + ShortText(longest) +
              " m of wall where the other has none";
     }
-    const int both_ways =
-        std::min(placement->walls_through_map, placement->walls_through_track);
-    if (both_ways >= options_.min_exchanged &&
-        both_ways > options_.max_exchanged_share * best.agreeing) {
+    const int exchanged =
+        placement->walls_through_map + placement->walls_through_track;
+    if (std::min(placement->walls_through_map,
+                 placement->walls_through_track) >= kLeastEachWay &&
+        exchanged >= 2 * options_.min_exchanged &&
+        exchanged > 2.0 * options_.max_exchanged_share * best.agreeing) {
       return "where " + parts(best.agreeing) +
              " of it would fit, it has wall at " +
              std::to_string(placement->walls_through_map) +

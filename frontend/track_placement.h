@@ -86,8 +86,9 @@ struct TrackPlacementOptions {
   double max_contradicting_stretch = 1.1;
   /// Shorter pieces are doors that were opened or shut, but where walls stand
   /// in openings of the map and the map's walls in openings of the track, it is
-  /// another building, as its own mirror image is: both happen at this many
-  /// places at least, and at more than this share of the agreeing windows.
+  /// another building, as its own mirror image is: either happens at two places
+  /// at least, and on the average of both it does at this many, and at more
+  /// than this share of the agreeing windows.
   int min_exchanged = 3;
   double max_exchanged_share = 0.15;
   /// With a start that somebody gave: windows that have to agree, and how far

@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
+#include <set>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -191,29 +192,39 @@ TEST_F(SeveralLogsTest, AMirrorImageIsKeptApart) {
 }
 
 // Rooms along both sides of a corridor. Those of one side are the mirror images
-// of those of the other, but for the doors of the last ones, which stand 1.5 m
-// farther on in the rooms below.
-Log RowsOfRooms(int moved_doors, std::uint64_t seed) {
-  const double ends[] = {0.0, 5.0, 12.0, 18.0, 23.5, 30.0, 36.0};
+// of those of the other, but for some doors, which stand 1.5 m farther on in
+// the rooms below.
+struct Rows {
+  std::vector<double> ends = {0.0, 5.0, 12.0, 18.0, 23.5, 30.0, 36.0};
+  std::vector<double> doors = {1.6, 6.9, 14.2, 20.5, 26.3, 33.1};
+  // Distance from the corridor's middle, and length.
+  std::vector<std::pair<double, double>> shelves = {
+      {5.5, 1.0}, {5.4, 1.2}, {5.3, 1.4}, {5.2, 1.6}, {5.1, 1.8}, {5.0, 2.0}};
+  std::set<std::size_t> moved;
+};
+
+Log Drive(const Rows& rows, std::uint64_t seed) {
+  const std::vector<double>& ends = rows.ends;
   std::ostringstream walls;
   const auto wall = [&walls](double x1, double y1, double x2, double y2) {
     walls << "wall " << x1 << ' ' << y1 << ' ' << x2 << ' ' << y2 << " 0.12\n";
   };
   wall(0.0, -6.1, 0.0, 6.1);
-  wall(36.0, -6.1, 36.0, 6.1);
+  wall(ends.back(), -6.1, ends.back(), 6.1);
   std::ostringstream path;
   path << "path 1 0";
   double from[] = {0.0, 0.0};
-  for (int room = 0; room < 6; ++room) {
+  for (std::size_t room = 0; room + 1 < ends.size(); ++room) {
     for (const int row : {0, 1}) {
       const double side = row == 0 ? 1.0 : -1.0;
-      const double moved = row == 1 && room >= 6 - moved_doors ? 1.5 : 0.0;
-      const double door = ends[room] + 1.6 + 0.3 * room + moved;
+      const double moved = row == 1 && rows.moved.count(room) > 0 ? 1.5 : 0.0;
+      const double door = rows.doors[room] + moved;
       wall(from[row], 1.1 * side, door - 0.45, 1.1 * side);
       from[row] = door + 0.45;
       if (room > 0) wall(ends[room], 1.1 * side, ends[room], 6.1 * side);
-      const double shelf = (5.5 - 0.1 * room) * side;
-      wall(ends[room] + 0.5, shelf, ends[room] + 1.5 + 0.2 * room, shelf);
+      const double shelf = rows.shelves[room].first * side;
+      wall(ends[room] + 0.5, shelf,
+           ends[room] + 0.5 + rows.shelves[room].second, shelf);
       if (room % 2 != 0) continue;
       // Into the room and back.
       const double middle = 0.5 * (ends[room] + ends[room + 1]);
@@ -226,16 +237,26 @@ Log RowsOfRooms(int moved_doors, std::uint64_t seed) {
   }
   for (const int row : {0, 1}) {
     const double side = row == 0 ? 1.0 : -1.0;
-    wall(from[row], 1.1 * side, 36.0, 1.1 * side);
-    wall(0.0, 6.1 * side, 36.0, 6.1 * side);
+    wall(from[row], 1.1 * side, ends.back(), 1.1 * side);
+    wall(0.0, 6.1 * side, ends.back(), 6.1 * side);
   }
-  std::istringstream world(walls.str() + path.str() + " 35 0\n");
+  path << ' ' << ends.back() - 1.0 << " 0\n";
+  std::istringstream world(walls.str() + path.str());
   const SimulatorOptions options;
   std::ostringstream log;
   WriteCarmenLog(Simulate(ReadWorld(world, "rows"), options, seed),
                  options.laser, {}, log);
   InputStream input("rows", log.str());
   return ReadCarmenLog(&input, {});
+}
+
+// The doors of the last rooms are those that moved.
+Log RowsOfRooms(int moved_doors, std::uint64_t seed) {
+  Rows rows;
+  for (int i = 0; i < moved_doors; ++i) {
+    rows.moved.insert(static_cast<std::size_t>(5 - i));
+  }
+  return Drive(rows, seed);
 }
 
 // What differs is nowhere wider than a door.
@@ -245,6 +266,36 @@ TEST_F(SeveralLogsTest, AMirrorImageWithOtherDoorsIsKeptApart) {
   EXPECT_EQ(result.maps.size(), 2u);
   EXPECT_THAT(result.logs[1].placement.why_not,
               ::testing::HasSubstr("mirror image"));
+}
+
+// The same in two more buildings, of whose doors some are seen in passing only:
+// one way fewer of them speak than the other way.
+TEST_F(SeveralLogsTest, MirrorImagesOfOtherRowsAreKeptApart) {
+  Rows six;
+  six.ends = {0.0, 4.53, 9.95, 16.66, 23.69, 30.88, 38.3};
+  six.doors = {1.42, 6.04, 11.78, 18.64, 25.12, 32.97};
+  six.shelves = {{4.87, 1.95}, {5.24, 1.43}, {5.02, 1.96},
+                 {5.15, 1.42}, {5.54, 1.48}, {4.92, 1.14}};
+  six.moved = {1, 3, 5};
+  Rows eight;
+  eight.ends = {0.0, 5.34, 12.18, 16.85, 23.74, 29.0, 35.2};
+  eight.doors = {2.19, 6.85, 14.2, 19.21, 25.7, 30.61};
+  eight.shelves = {{4.78, 2.4},  {4.9, 2.2},   {5.15, 1.21},
+                   {4.99, 1.53}, {5.21, 1.32}, {5.14, 1.77}};
+  eight.moved = {0, 1, 3};
+  std::uint64_t seed = 6;
+  for (const Rows& rows : {six, eight}) {
+    SCOPED_TRACE(seed);
+    const Log log = Drive(rows, seed);
+    EXPECT_EQ(
+        SolveSeveralLogs(registry_, {log, Mirrored(Drive(rows, seed + 1))}, {})
+            .maps.size(),
+        2u);
+    EXPECT_EQ(SolveSeveralLogs(registry_, {log, Drive(rows, seed + 1)}, {})
+                  .maps.size(),
+              1u);
+    seed += 2;
+  }
 }
 
 // One door may as well have been shut and another one opened: that is told.

@@ -97,6 +97,9 @@ constexpr std::int64_t kLateNodes = 12000000;
 // m and rad.
 constexpr double kLateSigma = 0.5;
 constexpr double kLateAngle = DegToRad(5.0);
+// A rough one that is known worse than this is not taken: a guess is as good.
+constexpr double kRoughSigma = 10.0;
+constexpr double kRoughAngle = DegToRad(20.0);
 
 Eigen::Matrix3d Diagonal(double translation, double rotation) {
   return Eigen::Vector3d(translation * translation, translation * translation,
@@ -1262,8 +1265,8 @@ bool OdometryRefiner::JoinPart(const std::vector<std::size_t>& rest,
   }
   if (!best ||
       best->since_key.covariance.diagonal().head<2>().maxCoeff() >
-          Square(kLooseSigma) ||
-      best->since_key.covariance(2, 2) > Square(kLooseAngle)) {
+          Square(kRoughSigma) ||
+      best->since_key.covariance(2, 2) > Square(kRoughAngle)) {
     return false;
   }
   AddLateTie(rest, part, best_vote, *best, variance(*best) > 1.0);

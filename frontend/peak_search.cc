@@ -167,8 +167,8 @@ class PeakSearch {
   PeakSearch(const PeakGrid& grid, const std::vector<Eigen::Vector2d>& points,
              const Pose2& center, double translation_window,
              double rotation_window, double minimum_score, double share,
-             std::int64_t max_nodes)
-      : max_nodes_(std::min<std::int64_t>(max_nodes, kMaxNodes)),
+             std::int64_t max_parts)
+      : max_parts_(max_parts),
         grid_(grid),
         coarsest_(grid.levels.back(), grid.columns, grid.rows),
         center_(center),
@@ -198,8 +198,9 @@ class PeakSearch {
     std::int64_t count = 0;
     for (const NodeRun& run : runs) count += run.count;
     count *= static_cast<std::int64_t>(cells_.size());
-    nodes_ = std::min(count / kTogether, max_nodes_);
-    if (nodes_ >= max_nodes_) return;
+    nodes_ = std::min<std::int64_t>(count / kTogether, kMaxNodes);
+    opened_ = nodes_;
+    if (nodes_ >= kMaxNodes) return;
     // What some rotations lead to leaves little to open at the others.
     for (const int step : {kFewTurns, 1}) {
       open_.clear();
@@ -225,7 +226,7 @@ class PeakSearch {
     std::vector<ScoredPose> peaks;
     std::int64_t asked_at = nodes_;
     while (!open_.empty() && static_cast<int>(peaks.size()) < max_peaks &&
-           nodes_ < max_nodes_) {
+           nodes_ < kMaxNodes && parts() < max_parts_) {
       if (stop && nodes_ - asked_at >= kNodesAtOnce) {
         if (stop()) return {};
         asked_at = nodes_;
@@ -247,7 +248,8 @@ class PeakSearch {
 
   // Of some pose, once all are open.
   double clearest() const { return clearest_ / unit_; }
-  std::int64_t nodes() const { return nodes_; }
+  // Parts of nodes that were looked at.
+  std::int64_t parts() const { return nodes_ - opened_; }
 
  private:
   // Of the coarsest nodes, cells.
@@ -528,7 +530,7 @@ class PeakSearch {
     });
   }
 
-  const std::int64_t max_nodes_;
+  const std::int64_t max_parts_;
   const PeakGrid& grid_;
   const StridedScores coarsest_;
   const Pose2 center_;
@@ -547,6 +549,8 @@ class PeakSearch {
   // A heap once all are open.
   std::vector<Node> open_;
   std::int64_t nodes_ = 0;
+  // Of these, those that were opened at first.
+  std::int64_t opened_ = 0;
   // Of OpenRotation, kept for its memory.
   std::vector<StridedScores::Place> places_;
   std::vector<std::int16_t> lanes_;
@@ -595,7 +599,7 @@ std::vector<ScoredPose> FindPeaks(
                     options.minimum_score, options.share, most);
   search.OpenAll(options.reach, stop);
   std::vector<ScoredPose> peaks = search.Run(options.max_peaks, stop);
-  if (options.nodes != nullptr) *options.nodes -= search.nodes();
+  if (options.nodes != nullptr) *options.nodes -= search.parts();
   return peaks;
 }
 

@@ -44,8 +44,9 @@ struct PeakOptions {
   int max_peaks = 1;
   /// Farthest from a viewpoint, m.
   double reach = 0.0;
-  /// If not null: nodes of the search that may be looked at, less those that
-  /// were. A search ends with what it has when there are none left.
+  /// If not null: nodes of the search below the coarsest ones that may be
+  /// looked at, less those that were. A search ends with what it has when there
+  /// are none left.
   std::int64_t* nodes = nullptr;
 };
 

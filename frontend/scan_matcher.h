@@ -132,8 +132,9 @@ class ScanMatcher {
   /// looked through. Positions farther than `reach`, m, from all viewpoints
   /// are left out. Branch and bound: exact on its lattice. `stop` (may be null)
   /// is asked now and then; once it has returned true there are no peaks.
-  /// `nodes` (may be null): how many nodes may be looked at, less those that
-  /// were; the search ends with what it has when there are none left.
+  /// `nodes` (may be null): how many nodes below the coarsest ones may be
+  /// looked at, less those that were; the search ends with what it has when
+  /// there are none left.
   std::vector<ScoredPose> Peaks(
       const std::vector<Eigen::Vector2d>& points, const Pose2& center,
       double translation_window, double rotation_window, double minimum_score,

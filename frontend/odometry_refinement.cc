@@ -1212,7 +1212,9 @@ bool OdometryRefiner::JoinPart(const std::vector<std::size_t>& rest,
   const std::size_t size = std::min(kGlobalKeys, part.size());
   const ArchiveView view = ViewOfArchive(rest);
   const std::vector<std::size_t> windows = WindowsOf(keys, size, view);
-  // What a window says stands when another one says the same, or there is none.
+  // What a window says stands when another one says the same, or the part is
+  // too short for another: one that fits nowhere is no reason to believe it.
+  const bool is_short = NumLateWindows(part.size(), size) == 1;
   std::vector<LateVote> votes;
   LateVote best_vote;
   std::optional<LateTie> best;
@@ -1245,7 +1247,7 @@ bool OdometryRefiner::JoinPart(const std::vector<std::size_t>& rest,
     for (const LateVote& other : votes) {
       if (confirms(other)) agreeing.push_back(&other);
     }
-    if (!agreeing.empty() || windows.size() == 1) {
+    if (!agreeing.empty() || is_short) {
       agreeing.push_back(&vote);
       for (const LateVote* other : agreeing) {
         const LateTie tie = LateTieOf(rest, part, *other);
@@ -1273,13 +1275,17 @@ bool OdometryRefiner::JoinPart(const std::vector<std::size_t>& rest,
   return true;
 }
 
+std::size_t OdometryRefiner::NumLateWindows(std::size_t keys,
+                                            std::size_t size) const {
+  return std::min(static_cast<std::size_t>(options_.tracking.max_late_windows),
+                  1 + 2 * (keys - size) / size);
+}
+
 std::vector<std::size_t> OdometryRefiner::WindowsOf(
     const std::vector<KeyScan>& keys, std::size_t size,
     const ArchiveView& rest) const {
   const std::size_t room = keys.size() - size;
-  const std::size_t windows =
-      std::min(static_cast<std::size_t>(options_.tracking.max_late_windows),
-               1 + 2 * room / size);
+  const std::size_t windows = NumLateWindows(keys.size(), size);
   std::vector<std::pair<double, std::size_t>> scored;
   for (std::size_t w = 0; w < windows; ++w) {
     if (stop_ && stop_()) return {};

@@ -519,7 +519,10 @@ class OdometryRefiner {
     std::size_t middle;
     Hypothesis found;
   };
-  // Starts of the windows of a part, those that fit somewhere best first.
+  // How many windows of this size are looked for of so many key scans.
+  std::size_t NumLateWindows(std::size_t keys, std::size_t size) const;
+  // Starts of the windows of a part that fit somewhere at all, the clearest one
+  // first.
   std::vector<std::size_t> WindowsOf(const std::vector<KeyScan>& keys,
                                      std::size_t size,
                                      const ArchiveView& rest) const;

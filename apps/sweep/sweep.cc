@@ -41,6 +41,36 @@ constexpr double kMostRuns = 1e6;
 // Bytes.
 constexpr std::size_t kLargestDefinition = std::size_t{1} << 26;
 
+// A new file of a name that nobody knows beforehand: others may write to the
+// folder for temporary files, too. Gone with the object.
+class ScratchFile {
+ public:
+  ScratchFile() {
+    std::error_code failure;
+    path_ = (fs::temp_directory_path(failure) / "plumbline_sweep_XXXXXX");
+    const int descriptor = failure ? -1 : mkstemp(path_.data());
+    if (descriptor < 0) {
+      throw Error(
+          failure ? "TMPDIR" : path_, 0,
+          "a temporary file cannot be made: " +
+              (failure ? failure.message() : std::string(std::strerror(errno))),
+          "a writable folder for temporary files");
+    }
+    close(descriptor);
+  }
+  ~ScratchFile() {
+    std::error_code ignored;
+    fs::remove(path_, ignored);
+  }
+  ScratchFile(const ScratchFile&) = delete;
+  ScratchFile& operator=(const ScratchFile&) = delete;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
 bool ReadText(const std::string& path, std::string* text) {
   // Opening a pipe would wait for who writes to it, and a device has no end.
   std::error_code error;
@@ -483,27 +513,15 @@ void CheckFlagsOfRuns(const SweepDefinition& definition) {
       return;
     }
     command.push_back("--check_flags");
-    // A new file of a name that nobody knows beforehand: others may write to
-    // the folder, too.
-    std::string log =
-        (fs::temp_directory_path() / "plumbline_sweep_XXXXXX").string();
-    const int descriptor = mkstemp(log.data());
-    if (descriptor < 0) {
-      throw Error(log, 0,
-                  std::string("cannot be made: ") + std::strerror(errno),
-                  "a writable folder for temporary files");
-    }
-    close(descriptor);
+    const ScratchFile log;
     ChildOptions child;
     child.command = command;
     child.working_directory = definition.working_directory;
     child.environment = definition.environment;
-    child.log = log;
+    child.log = log.path();
     const ChildResult result = RunChild(child);
     std::string said;
-    ReadText(log, &said);
-    std::error_code ignored;
-    fs::remove(log, ignored);
+    ReadText(log.path(), &said);
     if (result.succeeded) return;
     const std::string first = said.substr(0, said.find('\n'));
     throw Error(place, 0,

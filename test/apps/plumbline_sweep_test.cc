@@ -245,6 +245,14 @@ TEST_F(SweepBinaryTest, WhatCannotComeOutIsRefusedAtOnce) {
   EXPECT_EQ(Run("--grid=x=0.05:0.3" + out + " -- " + program_, &output), 2);
   EXPECT_THAT(output, HasSubstr("the range '0.05:0.3' has no step"));
   EXPECT_EQ(Notes().size(), 0u);
+  // The folder for temporary files is one of them.
+  ASSERT_EQ(setenv("TMPDIR", (folder_ + "/none").c_str(), 1), 0);
+  EXPECT_EQ(Run("--grid=delta_threshold=0.1" + out +
+                    " -- plumbline_solve --input=none",
+                &output),
+            2);
+  unsetenv("TMPDIR");
+  EXPECT_THAT(output, HasSubstr("TMPDIR: a temporary file cannot be made"));
   // What only a run can tell is told by the first.
   EXPECT_EQ(
       Run("--grid=x=1:1:9 --jobs=1 --minimize=z" + out + " -- " + program_,

@@ -876,6 +876,74 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
   EXPECT_NE(drifting.loose()[0].why.find("roughly"), std::string::npos);
 }
 
+// Carried into another building, the end of which looks like a piece of the
+// first one: of all that it sees there one window fits, and that is too little
+// for a part of many.
+TEST(OdometryRefinerTest, OneWindowThatFitsDoesNotPlaceALongPart) {
+  // A hall of 20 m by 6 m with pillars, none like another.
+  std::vector<WallEnds> hall = Room(20.0, 6.0);
+  std::vector<WallEnds> there;
+  Noise layout(3);
+  for (double x = -8.5; x < 9.0;
+       x += 1.8 + 0.6 * std::abs(layout.Normal(1.0))) {
+    const double y = layout.Normal(1.0) > 0.0 ? 1.7 : -1.7;
+    const Pose2 place(x, y + 0.2 * layout.Normal(1.0),
+                      0.5 * layout.Normal(1.0));
+    const double width = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
+    const double depth = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
+    for (const WallEnds& side : testing::Moved(Room(width, depth), place)) {
+      hall.push_back(side);
+      if (x > 0.0) there.push_back(side);
+    }
+  }
+  // The right half of the hall, at the end of a jagged corridor.
+  there.push_back({{0.0, 3.0}, {10.0, 3.0}});
+  there.push_back({{10.0, 3.0}, {10.0, -3.0}});
+  there.push_back({{10.0, -3.0}, {0.0, -3.0}});
+  for (const double side : {-1.0, 1.0}) {
+    Eigen::Vector2d before(0.0, 3.0 * side);
+    bool is_near = true;
+    for (double x = 0.0; x > -24.0; x -= 0.6) {
+      const Eigen::Vector2d next(x, side * (is_near ? 0.7 : 1.9));
+      there.push_back({before, next});
+      before = next;
+      is_near = !is_near;
+    }
+  }
+  Laser laser = FullCircle();
+  laser.beams = 240;
+  laser.angle_step = DegToRad(1.5);
+  laser.maximum_range = 5.0;
+  laser.sigma = 0.01;
+  Noise noise(4);
+  OdometryRefinementOptions options = RefinerOptions();
+  options.tracking.max_open_keys = 30;
+  // Of the jagged corridor half fits the hall's long walls.
+  options.tracking.min_tie_score = 0.65;
+  OdometryRefiner refiner(options);
+  constexpr int kCarried = 110;
+  Pose2 odometry(-8.5, 0.0, 0.0);
+  Pose2 last = odometry;
+  for (int i = 0; i < 290; ++i) {
+    const bool is_there = i >= kCarried;
+    const Pose2 truth = is_there
+                            ? Pose2(-19.0 + 0.15 * (i - kCarried), 0.05, 0.0)
+                            : Pose2(-8.5 + 0.15 * i, 0.0, 0.0);
+    if (i > 0 && i != kCarried) {
+      odometry = Compose(odometry, Between(last, truth));
+    }
+    last = truth;
+    Scan scan = MakeScan(is_there ? there : hall, truth, laser, &noise);
+    scan.timestamp = 100.0 + 0.2 * i + (is_there ? 40.0 : 0.0);
+    scan.odometry = odometry;
+    refiner.Process(scan);
+  }
+  refiner.Finish();
+  EXPECT_TRUE(refiner.late_ties().empty());
+  ASSERT_EQ(refiner.loose().size(), 1u);
+  EXPECT_FALSE(refiner.loose()[0].found);
+}
+
 // A pause in the log is no reason to be lost.
 TEST(OdometryRefinerTest, AGapWithoutMotion) {
   Laser laser;

@@ -1,0 +1,225 @@
+#include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/progress.h>
+#include <plumbline/apps/solve/log_input.h>
+#include <plumbline/apps/solve_flags.h>
+#include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/stopwatch.h>
+#include <plumbline/core/utf8.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/scan_odometry.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <string_view>
+
+namespace plumbline {
+namespace {
+
+Log ReadInput(const LogInput& input, RunClock* clock) {
+  LaserOptions options = LaserOptionsFromFlags();
+  if (input.stream != nullptr) {
+    const ReadingProgress progress(input.stream, clock);
+    return input.reader->read(input.stream, options);
+  }
+  options.stop = [] { return InterruptRequested(); };
+  options.progress = [clock](std::int64_t done, std::int64_t size) {
+    clock->bar().Update(ShareOf(done, size));
+  };
+  return input.reader->read_path(input.name, options);
+}
+
+// What was passed over and taken for granted.
+void TellOfLog(const std::string& name, const Log& log, Summary* summary) {
+  for (const SkipReport& skip : log.skipped) {
+    std::string places;
+    for (int place : skip.first_lines) places += " " + std::to_string(place);
+    Remark("%s: %lld skipped: %s; first at %s%s", name.c_str(),
+           static_cast<long long>(skip.count),
+           PrintableUtf8(skip.reason).c_str(), log.position_unit.c_str(),
+           places.c_str());
+  }
+  if (!log.skipped.empty() && !log.scans.empty()) {
+    Remark("%s: used are %zu scans, from %.1f s to %.1f s", name.c_str(),
+           log.scans.size(), log.scans.front().timestamp,
+           log.scans.back().timestamp);
+  }
+  for (const std::string& note : log.notes) {
+    Remark("%s: %s", name.c_str(), PrintableUtf8(note).c_str());
+  }
+  summary->skipped = log.skipped;
+  summary->log_format = log.format;
+  summary->scan_source = log.scan_message;
+  summary->odometry_source = log.odometry_source;
+  summary->notes = log.notes;
+}
+
+ScanOdometryOptions MatchingOptions(const LogSolverOptions& solver_options) {
+  ScanOdometryOptions options;
+  options.points = solver_options.odometry.points;
+  options.matcher = solver_options.odometry.matcher;
+  options.stop = [] { return InterruptRequested(); };
+  return options;
+}
+
+void TellSweeps(const std::string& name, Summary* summary) {
+  summary->notes.push_back(
+      "scans fit each other better as sweeps of a turning laser: the motion "
+      "during them is undone");
+  Remark("%s: %s", name.c_str(), summary->notes.back().c_str());
+}
+
+// Names what MatchScansAlone takes the time of.
+constexpr char kMatchingStep[] = "scan matching for want of odometry";
+
+// Scan matching alone carries a log without odometry.
+void MatchScansAlone(const std::string& name,
+                     const LogSolverOptions& solver_options, RunClock* clock,
+                     Log* log, Summary* summary) {
+  clock->Begin(kMatchingStep);
+  ScanOdometryOptions options = MatchingOptions(solver_options);
+  options.progress = [clock](std::size_t done, std::size_t total) {
+    clock->bar().Update(ShareOf(static_cast<std::int64_t>(done),
+                                static_cast<std::int64_t>(total)));
+  };
+  const Stopwatch watch;
+  const ScanOdometryReport report = AddScanOdometry(options, log);
+  char text[256];
+  summary->odometry_source = "scan matching";
+  if (report.used_yaw_rates) {
+    std::snprintf(text, sizeof text,
+                  " with turn rates of %s (scale %.4g, bias %.3g degrees/s)",
+                  log->yaw_rate_source.c_str(), report.yaw_scale,
+                  RadToDeg(report.yaw_bias));
+    summary->odometry_source += text;
+  } else if (!log->yaw_rates.empty()) {
+    std::snprintf(text, sizeof text,
+                  "turn rates of %s are not used: they explain %.0f %% of how "
+                  "the scans turn",
+                  log->yaw_rate_source.c_str(),
+                  100.0 * std::max(0.0, report.explained));
+    Remark("%s: %s", name.c_str(), text);
+    summary->notes.push_back(text);
+  }
+  Remark("%s: there is no odometry: %s carries it", name.c_str(),
+         summary->odometry_source.c_str());
+  if (report.sweep != 0) TellSweeps(name, summary);
+  if (report.unmatched > 0) {
+    std::snprintf(text, sizeof text,
+                  "%zu of %zu scans could not be matched: there the robot is "
+                  "taken to go on as before",
+                  report.unmatched, log->scans.size());
+    Remark("%s: %s", name.c_str(), text);
+    summary->notes.push_back(text);
+  }
+  Detail("matched scans for want of odometry in %.1f s", watch.Seconds());
+}
+
+// What a turning laser saw while the robot moved, where the log does not say
+// how long its sweeps take.
+void UndoSweeps(const std::string& name, const LogSolverOptions& solver_options,
+                RunClock* clock, Log* log, Summary* summary) {
+  if (!solver_options.odometry.match_scans) return;
+  clock->Begin("sweeps of the laser");
+  if (UndoSweepsByOdometry(MatchingOptions(solver_options), log) != 0) {
+    TellSweeps(name, summary);
+  }
+}
+
+}  // namespace
+
+ReadingProgress::ReadingProgress(InputStream* input, RunClock* clock)
+    : input_(input) {
+  input_->SetProgress([clock](std::int64_t done, std::int64_t size) {
+    clock->bar().Update(ShareOf(done, size));
+  });
+}
+
+std::unique_ptr<OpenInput> Open(const std::string& name,
+                                const Registry& registry,
+                                const LogReaderType* reader) {
+  auto input = std::make_unique<OpenInput>();
+  input->log.name = name;
+  if (name != "-") {
+    const bool takes_path = reader != nullptr && reader->read_path != nullptr &&
+                            reader->recognizes_path != nullptr &&
+                            reader->recognizes_path(name);
+    input->log.reader = takes_path          ? reader
+                        : reader == nullptr ? RecognizeLogPath(registry, name)
+                                            : nullptr;
+  }
+  if (input->log.reader != nullptr) return input;
+  input->stream.emplace(name, [] { return InterruptRequested(); });
+  const std::string_view prefix = input->stream->Peek(1 << 16);
+  if (prefix.empty() && InterruptRequested()) return nullptr;
+  if (reader == nullptr) reader = RecognizeLog(registry, prefix);
+  input->is_graph = reader == nullptr && LooksLikeG2o(prefix);
+  // What nobody recognizes is for the reader of the commonest format to
+  // refuse: it says what it found.
+  if (reader == nullptr) reader = &registry.Get<LogReaderType>("carmen");
+  input->log.reader = reader;
+  input->log.stream = &*input->stream;
+  input->log.name = input->stream->name();
+  return input;
+}
+
+Log ReadLog(const LogInput& input, RunClock* clock, Summary* summary) {
+  clock->Begin("reading");
+  const Stopwatch reading;
+  Log log = ReadInput(input, clock);
+  summary->parse_seconds = reading.Seconds();
+  TellOfLog(input.name, log, summary);
+  Detail("read %zu scans in %.1f s", log.scans.size(), summary->parse_seconds);
+  return log;
+}
+
+void CompleteOdometry(const std::string& name, const LogSolverOptions& options,
+                      RunClock* clock, Log* log, Summary* summary) {
+  if (!log->has_odometry) {
+    MatchScansAlone(name, options, clock, log, summary);
+  } else {
+    UndoSweeps(name, options, clock, log, summary);
+  }
+}
+
+// The scans of a log are counted on the way; what comes after the last one is
+// taken to be as much work for every scan as it is in the middle of logs with
+// 800 to 17,000 of them.
+std::vector<WorkStage> StagesOfLogs(const std::vector<double>& sizes,
+                                    const LogSolverOptions& options) {
+  double all = 0.0;
+  std::vector<WorkStage> stages;
+  for (const double size : sizes) {
+    all += size;
+    stages.push_back({"reading", 0.1 * size});
+  }
+  for (const double size : sizes) {
+    stages.push_back({"scans", size});
+    if (!options.structure) continue;
+    stages.push_back({"structure of the whole map", 0.02 * size});
+    stages.push_back({"closing of loops", 0.15 * size});
+  }
+  if (sizes.size() > 1) stages.push_back({"placing of logs", 0.5 * all});
+  if (RecoversPoses(options))
+    stages.push_back({"recovery of poses", 0.2 * all});
+  if (options.refine == Refinement::kFull) {
+    stages.push_back({"adjustment of poses", 0.5 * all});
+    stages.push_back({"walls from adjusted poses", 0.1 * all});
+    stages.push_back({"joint adjustment of poses and walls", 0.2 * all});
+    stages.push_back({"structure of the map from adjusted poses", 0.2 * all});
+  }
+  if (options.check_map) stages.push_back({"check of the map", 0.1 * all});
+  stages.push_back({"writing", 0.4 * all});
+  return stages;
+}
+
+std::vector<WorkStage> StagesWithMatching(const std::vector<double>& sizes,
+                                          const LogSolverOptions& options) {
+  std::vector<WorkStage> stages = StagesOfLogs(sizes, options);
+  stages.insert(stages.begin(), {kMatchingStep, 1.0});
+  return stages;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,171 @@
+#include <gflags/gflags.h>
+#include <plumbline/apps/cli/app.h>
+#include <plumbline/apps/cli/progress.h>
+#include <plumbline/apps/solve/flag_remarks.h>
+#include <plumbline/apps/solve/log_input.h>
+#include <plumbline/apps/solve/run_outputs.h>
+#include <plumbline/apps/solve/run_summary.h>
+#include <plumbline/apps/solve/solve_graph.h>
+#include <plumbline/apps/solve_flags.h>
+#include <plumbline/core/error.h>
+#include <plumbline/core/graph.h>
+#include <plumbline/core/graph_g2o.h>
+#include <plumbline/core/initial_guess.h>
+#include <plumbline/core/stopwatch.h>
+#include <plumbline/core/utf8.h>
+#include <plumbline/outputs/marginals_output.h>
+#include <plumbline/pipeline/graph_solver.h>
+#include <plumbline/pipeline/without_structure.h>
+
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace plumbline {
+namespace {
+
+// Reads a graph; nothing when that was interrupted.
+std::optional<G2oFile> ReadGraph(InputStream* input, const Registry& registry,
+                                 RunClock* clock, Graph* graph) {
+  const ReadingProgress progress(input, clock);
+  std::istringstream text(input->ReadRest());
+  if (InterruptRequested()) {
+    clock->bar().Finish();
+    std::fprintf(stderr, "interrupted: the graph is not read whole\n");
+    return std::nullopt;
+  }
+  if (!input->damage().empty()) {
+    throw Error(input->name(), 0, input->damage(), "a whole graph");
+  }
+  return ReadG2o(text, input->name(), registry, graph, G2oOptionsFromFlags());
+}
+
+// Places the features where --initial_guess says.
+void PlaceStart(const InputStream& input, const G2oFile& g2o, Graph* graph,
+                Summary::Solver* figures) {
+  InitialGuessOptions start = InitialGuessOptionsFromFlags();
+  if (!g2o.named_by_edges.empty() &&
+      start.method == InitialGuessMethod::kFile) {
+    if (!gflags::GetCommandLineFlagInfoOrDie("initial_guess").is_default) {
+      throw Error("--initial_guess", 0,
+                  "'file', but " + input.name() + " lists edges only",
+                  "odometry, spanning_tree or chordal");
+    }
+    start.method = InitialGuessMethod::kChordal;
+    Remark("%s: lists edges only: poses start by --initial_guess=chordal",
+           input.name().c_str());
+  }
+  if (start.method == InitialGuessMethod::kFile) return;
+  const Stopwatch watch;
+  const InitialGuessReport made = MakeInitialGuess(start, graph);
+  figures->start_poses = made.poses;
+  figures->start_landmarks = made.landmarks;
+  figures->start_kept = made.kept;
+  figures->start_seconds = watch.Seconds();
+  Detail("start: %lld poses in %d parts and %lld landmarks placed, %lld kept",
+         static_cast<long long>(made.poses), made.parts,
+         static_cast<long long>(made.landmarks),
+         static_cast<long long>(made.kept));
+}
+
+// What the summary says of the solves of a graph.
+void SummarizeSolves(const GraphSolverResult& result,
+                     Summary::Solver* figures) {
+  figures->solves = result.num_solves;
+  figures->converged = result.solves.converged;
+  figures->iterations = result.solves.iterations;
+  figures->evaluation_seconds = result.solves.evaluation_seconds;
+  figures->linear_solver_seconds = result.solves.linear_solver_seconds;
+  figures->setup_seconds = result.solves.setup_seconds;
+}
+
+}  // namespace
+
+int SolveGraph(InputStream* input, const RunContext& run) {
+  const Registry& registry = run.registry;
+  RunClock* const clock = run.clock;
+  SolveOutcome outcome;
+  Summary& summary = outcome.summary;
+  summary = BeginSummary();
+  const GraphSolverOptions options = GraphSolverOptionsFromFlags(registry);
+  RemarkOnFlags(input->name(), "graph", "logs", LogFlags());
+
+  clock->bar().Plan({{"reading", 0.5},
+                     {"first guess", 0.1},
+                     {"solving", 1.0},
+                     {"writing", 0.3}});
+  clock->Begin("reading");
+  const Stopwatch reading;
+  Graph graph;
+  const std::optional<G2oFile> g2o = ReadGraph(input, registry, clock, &graph);
+  if (!g2o) return kExitInterrupted;
+  summary.parse_seconds = reading.Seconds();
+  for (const auto& tag : g2o->unknown_tags) {
+    Remark("%s: %d lines with the unknown tag %s kept as they are",
+           input->name().c_str(), tag.second, PrintableUtf8(tag.first).c_str());
+  }
+
+  if (!FLAGS_marginals_hold_gauge) {
+    CheckGauge(graph, ParseMarginalsSelection(FLAGS_marginals, registry));
+  }
+  Summary::Solver figures;
+  clock->Begin("first guess");
+  PlaceStart(*input, *g2o, &graph, &figures);
+
+  ForFlag("hierarchy", [&] { MakeGraphHierarchy(options, graph, registry); });
+  GraphSolver solver(registry, options, &graph);
+  if (!std::isfinite(solver.initial_cost().total())) {
+    throw Error(input->name(), 0,
+                "the sum of squared residuals at the start is no finite number",
+                "smaller values, or less information");
+  }
+  GraphSolverResult result;
+  {
+    clock->Begin("solving");
+    std::vector<EmPhase> trace;
+    result = solver.Run(
+        [clock] {
+          clock->bar().Update();
+          return InterruptRequested();
+        },
+        [&](const EmPhase& phase) {
+          TellPhase(phase);
+          if (!run.live->is_on()) return;
+          trace.push_back(phase);
+          run.live->Show(
+              {graph, trace, [] { return std::vector<Pose2>(); }}, [&] {
+                return "solving, iteration " + std::to_string(phase.iteration) +
+                       ": " + phase.phase;
+              });
+        });
+  }
+  clock->Begin("figures");
+  Summarize(result.initial_cost, result.final_cost, result.em, &summary);
+  SummarizeSolves(result, &figures);
+  summary.solver = figures;
+  if (!figures.converged) {
+    const std::string& why = result.solves.message;
+    Remark(
+        "%s: the solver did not converge%s; --max_solver_iterations and "
+        "--initial_guess may help",
+        input->name().c_str(), why.empty() ? "" : (" (" + why + ")").c_str());
+  }
+  outcome.graph = &graph;
+  outcome.registry = &registry;
+  outcome.trace = std::move(result.trace);
+  if (!InterruptRequested()) TakeMarginals(&solver.session(), &outcome);
+  outcome.g2o = &*g2o;
+  outcome.without_structure = [&] {
+    if (InterruptRequested()) return MapWithoutStructure();
+    return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
+  };
+  outcome.title = TitleOf(input->name());
+  FinishRun(run, 1, &outcome);
+  return kExitSuccess;
+}
+
+}  // namespace plumbline

@@ -40,6 +40,9 @@ constexpr int kDimensionColor = 8;
 // m.
 constexpr double kTextHeight = 0.25;
 constexpr double kDimensionText = 0.15;
+constexpr double kDimensionGap = 0.045;
+// After the point.
+constexpr int kDimensionDigits = 2;
 constexpr double kTick = 0.1;
 
 // Writes groups (a code and a value, a line each) and hands out handles.
@@ -262,6 +265,27 @@ void WriteHeader(const Vector2d& low, const Vector2d& high, Writer* writer) {
   writer->Point(10, Vector2d::Zero());
   writer->Text(9, "$PLIMMAX");
   writer->Point(10, paper);
+  // How dimensions look. Programs that go by these and not by the table of
+  // styles take what is missing for millimetres: 7.50 m would read 0.01, in
+  // letters of 2.5 mm.
+  const auto number = [&](const char* name, double value) {
+    writer->Text(9, name);
+    writer->Real(40, value);
+  };
+  number("$DIMLFAC", 1.0);
+  number("$DIMSCALE", 1.0);
+  number("$DIMTXT", kDimensionText);
+  number("$DIMGAP", kDimensionGap);
+  number("$DIMASZ", kTick);
+  number("$DIMTSZ", 0.5 * kTick);
+  number("$DIMEXO", 0.0);
+  number("$DIMEXE", 0.0);
+  writer->Text(9, "$DIMDEC");
+  writer->Int(70, kDimensionDigits);
+  writer->Text(9, "$DIMZIN");
+  writer->Int(70, 0);  // 7.50, not 7.5
+  writer->Text(9, "$DIMTIH");
+  writer->Int(70, 0);  // along the line
   writer->Text(9, "$EXTMIN");
   writer->Point3(10, low);
   writer->Text(9, "$EXTMAX");
@@ -348,8 +372,9 @@ void WriteTables(const FloorPlan& plan, const Vector2d& low,
   writer->Int(70, 0);
   writer->Real(41, kTick);
   writer->Real(140, kDimensionText);
-  writer->Real(147, 0.3 * kDimensionText);
-  writer->Int(271, 2);  // digits after the point
+  writer->Real(144, 1.0);  // of what is measured
+  writer->Real(147, kDimensionGap);
+  writer->Int(271, kDimensionDigits);
   writer->EndTable();
 
   table = writer->BeginTable(

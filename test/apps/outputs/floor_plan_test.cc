@@ -525,6 +525,10 @@ class DxfReader : public DL_CreationAdapter {
     variables[key] = value;
   }
   using DL_CreationAdapter::setVariableInt;
+  void setVariableDouble(const std::string& key, double value, int) override {
+    numbers[key] = value;
+  }
+  using DL_CreationAdapter::setVariableDouble;
   void setVariableVector(const std::string& key, double x, double y, double,
                          int) override {
     vectors[key] = {x, y};
@@ -540,6 +544,7 @@ class DxfReader : public DL_CreationAdapter {
   std::map<std::string, int> polylines;
   int vertices = 0;
   std::map<std::string, int> variables;
+  std::map<std::string, double> numbers;
   std::map<std::string, std::vector<double>> vectors;
 };
 
@@ -592,6 +597,26 @@ TEST_F(FloorPlanTest, PassagesAndDimensionsOfABuilding) {
   ASSERT_TRUE(dxf.in(drawing, &reader));
   EXPECT_EQ(reader.arcs["DOORS"].size(), 1u);
   EXPECT_EQ(reader.lines["DOORS"].size(), 2u);
+}
+
+// LibreCAD takes what the header does not say for millimetres: it printed the
+// lengths of rooms as thousandths, too small to be read.
+TEST_F(FloorPlanTest, DimensionsOfTheDxfAreMetresAndLegible) {
+  std::istringstream text(Dxf(PlanWithRooms()));
+  DxfReader reader;
+  DL_Dxf dxf;
+  ASSERT_TRUE(dxf.in(text, &reader));
+  ASSERT_EQ(reader.numbers.count("$DIMLFAC"), 1u);
+  EXPECT_EQ(reader.numbers["$DIMLFAC"], 1.0);
+  EXPECT_EQ(reader.numbers["$DIMSCALE"], 1.0);
+  EXPECT_GE(reader.numbers["$DIMTXT"], 0.1);
+  EXPECT_LE(reader.numbers["$DIMTXT"], 0.3);
+  EXPECT_GT(reader.numbers["$DIMTSZ"], 0.0);
+  for (const char* name : {"$DIMGAP", "$DIMASZ", "$DIMEXO", "$DIMEXE"}) {
+    ASSERT_EQ(reader.numbers.count(name), 1u) << name;
+    EXPECT_LE(reader.numbers[name], 0.1) << name;
+  }
+  EXPECT_EQ(reader.variables["$DIMDEC"], 2);
 }
 
 TEST_F(FloorPlanTest, PaperOfTheDxfStandsAsThePlanDoes) {

@@ -705,10 +705,15 @@ def copies_of_a_log(solve, numbers):
             log = os.path.join(solve.root, "copies.log")
             repeated(copies, has_jump, log)
             folder = os.path.join(solve.root, "copies")
-            process = subprocess.Popen(
-                [solve.binary, "--input=" + log, "--output_dir=" + folder,
-                 "--num_threads=1", "--quiet"], stderr=subprocess.DEVNULL)
-            status, seconds, memory = finish(process)
+            # What all others are compared with is short: the middle of five.
+            runs = []
+            for _ in range(5 if one is None else 1):
+                process = subprocess.Popen(
+                    [solve.binary, "--input=" + log, "--output_dir=" + folder,
+                     "--num_threads=1", "--quiet"], stderr=subprocess.DEVNULL)
+                runs.append(finish(process))
+            runs.sort(key=lambda run: run[1])
+            status, seconds, memory = runs[len(runs) // 2]
             if status != 0:
                 finding("%d copies: status %d" % (copies, status))
                 continue

@@ -88,8 +88,9 @@ class StridedScores {
 
   // For each node of the runs, kLanes at a time, the sum of the scores that it
   // gives to the points at the places; `sums` is as long as LanesOf says.
-  void Sum(const std::vector<Place>& places, const NodeRun* runs,
-           std::size_t num_runs, std::vector<std::int16_t>* lanes,
+  // False, and not all are added up, when none of them can be `least`.
+  bool Sum(const std::vector<Place>& places, const NodeRun* runs,
+           std::size_t num_runs, double least, std::vector<std::int16_t>* lanes,
            std::vector<std::int32_t>* sums) const {
     std::size_t size = 0;
     for (std::size_t r = 0; r < num_runs; ++r) size += LanesOf(runs[r]);
@@ -100,8 +101,17 @@ class StridedScores {
       for (std::size_t i = begin; i < end; ++i) {
         Add(places[i], runs, num_runs, lanes->data());
       }
-      for (std::size_t k = 0; k < size; ++k) (*sums)[k] += (*lanes)[k];
+      std::int32_t most = std::numeric_limits<std::int32_t>::lowest();
+      for (std::size_t k = 0; k < size; ++k) {
+        (*sums)[k] += (*lanes)[k];
+        most = std::max(most, (*sums)[k]);
+      }
+      if (most + kMostScore * static_cast<double>(places.size() - end) <
+          least) {
+        return false;
+      }
     }
+    return true;
   }
 
   static std::size_t LanesOf(const NodeRun& run) {
@@ -330,7 +340,11 @@ class PeakSearch {
       while (end < runs.size() && size < kNodesTogether) {
         size += StridedScores::LanesOf(runs[end++]);
       }
-      coarsest_.Sum(places_, &runs[begin], end - begin, &lanes_, &sums_);
+      if (!coarsest_.Sum(places_, &runs[begin], end - begin, least_, &lanes_,
+                         &sums_)) {
+        begin = end;
+        continue;
+      }
       const std::int32_t* bounds = sums_.data();
       for (; begin < end; ++begin) {
         const NodeRun& run = runs[begin];

@@ -487,9 +487,12 @@ void ScanMatcher::BuildFree() const {
           std::min(length - kFreeMargin / resolution, kFreeReach / resolution);
       if (!(reach > 0.0)) continue;
       const Eigen::Vector2d step = ray / length;
+      // Numbers are converted to int in one instruction, to std::size_t in
+      // many.
       const auto mark = [&](const Eigen::Vector2d& cell) {
-        free_[static_cast<std::size_t>(cell.y()) * field_columns_ +
-              static_cast<std::size_t>(cell.x())] = 1;
+        free_[static_cast<std::size_t>(static_cast<int>(cell.y())) *
+                  field_columns_ +
+              static_cast<std::size_t>(static_cast<int>(cell.x()))] = 1;
       };
       const int count = static_cast<int>(std::ceil(reach));
       if (is_on_grid(origin) && is_on_grid(origin + (count - 1) * step)) {

@@ -1,18 +1,15 @@
 #include <plumbline/core/constraint_fault.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/g2o_lines.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/number_text.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/factors/angle.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
 #include <istream>
-#include <limits>
 #include <map>
-#include <ostream>
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
@@ -21,64 +18,7 @@
 namespace plumbline {
 namespace {
 
-constexpr char kFeatureTag[] = "PLUMBLINE_FEATURE";
-constexpr char kConstraintTag[] = "PLUMBLINE_CONSTRAINT";
-constexpr char kFixTag[] = "FIX";
 constexpr char kLaserTag[] = "ROBOTLASER1";
-constexpr char kDefaultSource[] = "g2o";
-// Room for new ids above it.
-constexpr std::int64_t kLargestFileId =
-    std::numeric_limits<std::int64_t>::max() / 2;
-
-// Splits at blanks, in place.
-void Split(std::string_view line, std::vector<std::string_view>* fields) {
-  constexpr std::string_view kBlanks = " \t\r\v\f";
-  fields->clear();
-  std::size_t begin = line.find_first_not_of(kBlanks);
-  while (begin != std::string_view::npos) {
-    std::size_t end = line.find_first_of(kBlanks, begin);
-    if (end == std::string_view::npos) end = line.size();
-    fields->push_back(line.substr(begin, end - begin));
-    begin = line.find_first_not_of(kBlanks, end);
-  }
-}
-
-// A source as one field.
-void AppendSource(const std::string& source, std::string* text) {
-  if (source.empty()) {
-    *text += '-';
-    return;
-  }
-  for (const char c : source) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte <= ' ' || byte == 0x7f || c == '%' || source == "-") {
-      constexpr char kDigits[] = "0123456789ABCDEF";
-      *text += {'%', kDigits[byte / 16], kDigits[byte % 16]};
-    } else {
-      *text += c;
-    }
-  }
-}
-
-bool ParseSource(std::string_view text, std::string* source) {
-  source->clear();
-  if (text == "-") return true;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '%') {
-      *source += text[i];
-      continue;
-    }
-    unsigned int byte = 0;
-    if (i + 2 >= text.size() ||
-        std::from_chars(&text[i + 1], &text[i + 1] + 2, byte, 16).ptr !=
-            &text[i + 1] + 2) {
-      return false;
-    }
-    *source += static_cast<char>(byte);
-    i += 2;
-  }
-  return true;
-}
 
 // A tag and how its line is written. Null formats: the type's own tag, in
 // order.
@@ -90,182 +30,6 @@ struct EdgeTag {
   const RelationType* type;
   const G2oEdgeFormat* format;
 };
-
-int FeaturePlace(const G2oEdgeFormat* format, int feature) {
-  return format == nullptr || format->feature_places.empty()
-             ? feature
-             : format->feature_places[feature];
-}
-
-int RowPlace(const G2oEdgeFormat* format, int row) {
-  return format == nullptr || format->row_places.empty()
-             ? row
-             : format->row_places[row];
-}
-
-// Rows and columns of the entries of an information matrix in the order of the
-// line.
-std::vector<std::pair<int, int>> InformationOrder(const G2oEdgeFormat* format,
-                                                  int size) {
-  if (format != nullptr && !format->information_order.empty()) {
-    return format->information_order;
-  }
-  std::vector<std::pair<int, int>> order;
-  for (int i = 0; i < size; ++i) {
-    for (int j = i; j < size; ++j) order.emplace_back(i, j);
-  }
-  return order;
-}
-
-// Information of a relative pose, turned by the angle.
-void TurnInformation(double angle, Eigen::MatrixXd* information) {
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  turn(0, 0) = turn(1, 1) = std::cos(angle);
-  turn(1, 0) = std::sin(angle);
-  turn(0, 1) = -turn(1, 0);
-  const Eigen::Matrix3d turned = turn * *information * turn.transpose();
-  *information = 0.5 * (turned + turned.transpose());
-}
-
-bool IsTurned(const G2oOptions& options, const Constraint& constraint) {
-  return options.information_at_second &&
-         constraint.type->Is(RelationRole::kPose) &&
-         constraint.type->feature_types.size() == 2;
-}
-
-// -- Writing elements ---------------------------------------------------------
-
-// What follows the parameters of a vertex in a file: "458 460".
-using ExtraText = std::string_view;
-
-void AppendVertex(const Feature& feature, const G2oVertexFormat* format,
-                  std::int64_t file_id, ExtraText extra, std::string* text) {
-  *text += format == nullptr ? feature.type->g2o_tag : format->tag;
-  *text += ' ';
-  AppendNumber(file_id, text);
-  std::array<double, kMaxFeatureSize> numbers = feature.parameters;
-  if (format != nullptr && format->write) format->write(numbers.data());
-  for (int i = 0; i < feature.type->size; ++i) {
-    *text += ' ';
-    AppendNumber(numbers[i], text);
-  }
-  if (!extra.empty()) {
-    *text += ' ';
-    *text += extra;
-  }
-}
-
-void AppendFix(std::int64_t file_id, std::string* text) {
-  *text += kFixTag;
-  *text += ' ';
-  AppendNumber(file_id, text);
-}
-
-bool IsPlain(const Feature& feature) {
-  return feature.level == 0 && !feature.is_virtual &&
-         std::all_of(feature.anchor.begin(), feature.anchor.end(),
-                     [](double coordinate) { return coordinate == 0.0; }) &&
-         feature.extent_begin == 0.0 && feature.extent_end == 0.0 &&
-         feature.observations == 0 && feature.source == kDefaultSource;
-}
-
-void AppendAttributes(const Feature& feature, std::int64_t file_id,
-                      std::string* text) {
-  *text += kFeatureTag;
-  *text += ' ';
-  AppendNumber(file_id, text);
-  *text += ' ';
-  AppendNumber(static_cast<std::int64_t>(feature.level), text);
-  *text += feature.is_virtual ? " 1" : " 0";
-  for (int i = 0; i < feature.type->written_anchor_size(); ++i) {
-    *text += ' ';
-    AppendNumber(feature.anchor[i], text);
-  }
-  for (const double number : {feature.extent_begin, feature.extent_end}) {
-    *text += ' ';
-    AppendNumber(number, text);
-  }
-  *text += ' ';
-  AppendNumber(static_cast<std::int64_t>(feature.observations), text);
-  *text += ' ';
-  AppendSource(feature.source, text);
-}
-
-void AppendEdge(const Constraint& constraint, const G2oEdgeFormat* format,
-                const G2oOptions& options,
-                const std::vector<std::int64_t>& file_ids, std::string* text) {
-  const int size = constraint.type->residual_size;
-  const int arity = static_cast<int>(constraint.features.size());
-  *text += format == nullptr ? constraint.type->g2o_tag : format->tag;
-  std::vector<std::int64_t> ids(constraint.features.size());
-  for (int i = 0; i < arity; ++i) {
-    ids[FeaturePlace(format, i)] = file_ids[constraint.features[i]];
-  }
-  for (const std::int64_t id : ids) {
-    *text += ' ';
-    AppendNumber(id, text);
-  }
-  Eigen::VectorXd expected = constraint.expected;
-  Eigen::MatrixXd information = constraint.information;
-  if (IsTurned(options, constraint)) {
-    TurnInformation(-expected[2], &information);
-  }
-  if (format != nullptr && format->write) format->write(expected.data());
-  Eigen::VectorXd values(size);
-  Eigen::MatrixXd entries(size, size);
-  for (int i = 0; i < size; ++i) {
-    values[RowPlace(format, i)] = expected[i];
-    for (int j = 0; j < size; ++j) {
-      entries(RowPlace(format, i), RowPlace(format, j)) = information(i, j);
-    }
-  }
-  for (int i = 0; i < size; ++i) {
-    *text += ' ';
-    AppendNumber(values[i], text);
-  }
-  for (const auto& [row, column] : InformationOrder(format, size)) {
-    *text += ' ';
-    AppendNumber(entries(row, column), text);
-  }
-}
-
-bool IsPlain(const Constraint& constraint) {
-  return constraint.kind == ConstraintClass::kMeasurement &&
-         constraint.state == ConstraintState::kLive &&
-         constraint.delta == 1.0 && constraint.source == kDefaultSource;
-}
-
-void AppendAttributes(const Constraint& constraint, std::string* text) {
-  *text += kConstraintTag;
-  *text += constraint.kind == ConstraintClass::kStructure ? " structure"
-                                                          : " measurement";
-  *text += constraint.state == ConstraintState::kBroken ? " broken " : " live ";
-  AppendNumber(constraint.delta, text);
-  *text += ' ';
-  AppendSource(constraint.source, text);
-}
-
-// What an element says, whatever its format.
-G2oFile::Fingerprint FingerprintOf(const Feature& feature) {
-  std::string element;
-  AppendVertex(feature, nullptr, 0, {}, &element);
-  std::string attributes;
-  AppendAttributes(feature, 0, &attributes);
-  return {std::hash<std::string>()(element),
-          std::hash<std::string>()(attributes)};
-}
-
-G2oFile::Fingerprint FingerprintOf(const Constraint& constraint,
-                                   const std::vector<std::int64_t>& file_ids) {
-  std::string element;
-  AppendEdge(constraint, nullptr, {}, file_ids, &element);
-  std::string attributes;
-  AppendAttributes(constraint, &attributes);
-  return {std::hash<std::string>()(element),
-          std::hash<std::string>()(attributes)};
-}
-
-// -- Reading ------------------------------------------------------------------
 
 // What stands on a PLUMBLINE_FEATURE line.
 struct FeatureLine {
@@ -316,7 +80,7 @@ class LineFields {
   // `text` must outlive the fields.
   void Set(int line, const std::string& text) {
     line_ = line;
-    Split(text, &fields_);
+    SplitG2oLine(text, &fields_);
   }
 
   int line() const { return line_; }
@@ -341,7 +105,7 @@ class LineFields {
   }
 
   std::int64_t Id(std::string_view field) const {
-    return Integer(field, "id", 0, kLargestFileId);
+    return Integer(field, "id", 0, kLargestG2oId);
   }
 
   double Number(std::string_view field) const {
@@ -354,7 +118,7 @@ class LineFields {
 
   std::string Source(std::string_view field) const {
     std::string source;
-    if (!ParseSource(field, &source)) {
+    if (!ParseG2oSource(field, &source)) {
       Fail("source \"" + std::string(field) + "\"",
            "two hexadecimal digits after each %");
     }
@@ -419,7 +183,7 @@ class LineReader {
     const std::string tag(fields_[0]);
     const Above above = above_;
     above_ = Above::kNothing;
-    if (tag == kConstraintTag) {
+    if (tag == kG2oConstraintTag) {
       if (above == Above::kEdge) {
         ReadConstraintLine();
       } else if (above != Above::kUnknown) {
@@ -427,7 +191,7 @@ class LineReader {
       }
       return;
     }
-    if (tag == kFixTag) {
+    if (tag == kG2oFixTag) {
       if (fields_.size() < 2) {
         fields_.Fail("FIX without an id", "ids of vertices");
       }
@@ -437,7 +201,7 @@ class LineReader {
       }
       return;
     }
-    if (tag == kFeatureTag) {
+    if (tag == kG2oFeatureTag) {
       ReadFeatureLine();
       return;
     }
@@ -496,7 +260,7 @@ class LineReader {
     }
     Feature feature;
     feature.type = &type;
-    feature.source = kDefaultSource;
+    feature.source = kG2oSource;
     for (int i = 0; i < type.size; ++i) {
       feature.parameters[i] = fields_.Number(fields_[i + 2]);
     }
@@ -510,7 +274,7 @@ class LineReader {
             fields_[static_cast<std::size_t>(type.size) + 2 + i];
         if (tag.format->extra_fields_are_ids) {
           fields.numbers.push_back(fields_.Integer(
-              field, tag.format->extra_fields[i], -1, kLargestFileId));
+              field, tag.format->extra_fields[i], -1, kLargestG2oId));
         } else {
           fields_.Number(field);
         }
@@ -600,7 +364,7 @@ class LineReader {
     }
     Constraint& constraint = edge.constraint;
     constraint.type = &type;
-    constraint.source = kDefaultSource;
+    constraint.source = kG2oSource;
     constraint.expected.resize(size);
     for (int i = 0; i < size; ++i) {
       constraint.expected[i] =
@@ -743,7 +507,7 @@ class GraphAssembler {
       records_->index.emplace(file_id, records_->features.size());
       Feature feature;
       feature.type = &registry_.GetFeature(names[0]);
-      feature.source = kDefaultSource;
+      feature.source = kG2oSource;
       file_->named_by_edges.push_back(
           first_feature_ + static_cast<FeatureId>(records_->features.size()));
       file_->file_ids.push_back(file_id);
@@ -783,7 +547,7 @@ class GraphAssembler {
     for (const FeatureLine& own : records_->feature_lines) {
       if (!seen.insert(own.file_id).second) {
         Fail(name_, own.line,
-             "a second " + std::string(kFeatureTag) + " of vertex " +
+             "a second " + std::string(kG2oFeatureTag) + " of vertex " +
                  std::to_string(own.file_id),
              "one a vertex");
       }
@@ -796,7 +560,7 @@ class GraphAssembler {
       const int anchor_size = feature.type->written_anchor_size();
       if (own.anchor_size != anchor_size) {
         Fail(name_, own.line,
-             std::string(kFeatureTag) + " has an anchor of " +
+             std::string(kG2oFeatureTag) + " has an anchor of " +
                  std::to_string(own.anchor_size) + " coordinates",
              std::to_string(anchor_size) + " for a " + feature.type->name);
       }
@@ -856,14 +620,14 @@ class GraphAssembler {
     file_->was_fixed.resize(file_->feature_fingerprints.size());
     for (const Feature* feature : graph.Features()) {
       const auto id = static_cast<std::size_t>(feature->id);
-      file_->feature_fingerprints[id] = FingerprintOf(*feature);
+      file_->feature_fingerprints[id] = G2oFingerprintOf(*feature);
       file_->was_fixed[id] = feature->fixed;
     }
     file_->constraint_fingerprints.resize(
         static_cast<std::size_t>(graph.constraint_id_end()));
     for (const Constraint* constraint : graph.Constraints()) {
       file_->constraint_fingerprints[static_cast<std::size_t>(constraint->id)] =
-          FingerprintOf(*constraint, file_->file_ids);
+          G2oFingerprintOf(*constraint, file_->file_ids);
     }
   }
 
@@ -876,9 +640,11 @@ class GraphAssembler {
   Graph* const graph_;
 };
 
-G2oFile ReadG2oFile(std::istream& input, const std::string& name,
-                    const Registry& registry, const G2oOptions& options,
-                    Graph* graph) {
+}  // namespace
+
+G2oFile ReadG2o(std::istream& input, const std::string& name,
+                const Registry& registry, Graph* graph,
+                const G2oOptions& options) {
   if (graph->num_features() > 0 || graph->num_constraints() > 0) {
     throw PLUMBLINE_ERROR("the graph holds features already", "an empty graph");
   }
@@ -901,300 +667,6 @@ G2oFile ReadG2oFile(std::istream& input, const std::string& name,
   if (input.bad()) throw Error(name, number, "cannot read on", "");
   GraphAssembler(name, registry, &file, &records, graph).Assemble();
   return file;
-}
-
-// -- Writing ------------------------------------------------------------------
-
-// Ids in the file for all features of the graph, by feature id.
-std::vector<std::int64_t> FileIds(const Graph& graph, const G2oFile* file) {
-  std::vector<std::int64_t> ids;
-  std::int64_t next = 0;
-  if (file != nullptr) {
-    ids = file->file_ids;
-    for (const std::int64_t id : ids) next = std::max(next, id + 1);
-    std::vector<std::string_view> fields;
-    for (const G2oLine& line : file->lines) {
-      if (line.kind != G2oLine::Kind::kText) continue;
-      std::int64_t id = 0;
-      Split(line.text, &fields);
-      if (fields.size() > 1 && ParseNumber(fields[1], &id) &&
-          id <= kLargestFileId) {
-        next = std::max(next, id + 1);
-      }
-    }
-  }
-  ids.resize(static_cast<std::size_t>(graph.feature_id_end()), kNoId);
-  for (const Feature* feature : graph.Features()) {
-    if (ids[feature->id] == kNoId) ids[feature->id] = next++;
-  }
-  return ids;
-}
-
-class Writer {
- public:
-  Writer(const Graph& graph, const G2oFile* file)
-      : graph_(graph), file_(file), file_ids_(FileIds(graph, file)) {}
-
-  std::string Write() {
-    if (file_ != nullptr) {
-      MarkAttributes();
-      AppendNamedVertices();
-      for (const G2oLine& line : file_->lines) AppendLine(line);
-      if (!file_->ends_with_line_feed && !text_.empty()) text_.pop_back();
-    }
-    const bool is_open = !text_.empty() && text_.back() != '\n';
-    const std::size_t end = text_.size();
-    for (const Feature* feature : graph_.Features()) {
-      if (IsOfFile(*feature)) continue;
-      AppendVertex(*feature, nullptr, file_ids_[feature->id], {}, &text_);
-      EndLine();
-      if (feature->fixed) {
-        AppendFix(file_ids_[feature->id], &text_);
-        EndLine();
-      }
-      if (!IsPlain(*feature)) AppendAttributeLine(*feature);
-    }
-    for (const Constraint* constraint : graph_.Constraints()) {
-      if (IsOfFile(*constraint)) continue;
-      AppendEdge(*constraint, nullptr, Options(), file_ids_, &text_);
-      EndLine();
-      if (!IsPlain(*constraint)) AppendAttributeLine(*constraint);
-    }
-    if (is_open && text_.size() > end) text_.insert(end, "\n");
-    return std::move(text_);
-  }
-
- private:
-  G2oOptions Options() const {
-    return file_ == nullptr ? G2oOptions() : file_->options;
-  }
-
-  bool IsOfFile(const Feature& feature) const {
-    return file_ != nullptr && static_cast<std::size_t>(feature.id) <
-                                   file_->feature_fingerprints.size();
-  }
-  bool IsOfFile(const Constraint& constraint) const {
-    return file_ != nullptr && static_cast<std::size_t>(constraint.id) <
-                                   file_->constraint_fingerprints.size();
-  }
-
-  // Which elements have a line of attributes in the file.
-  void MarkAttributes() {
-    feature_has_attributes_.resize(file_->feature_fingerprints.size());
-    constraint_has_attributes_.resize(file_->constraint_fingerprints.size());
-    for (const G2oLine& line : file_->lines) {
-      if (line.kind == G2oLine::Kind::kFeatureAttributes) {
-        feature_has_attributes_[static_cast<std::size_t>(line.id)] = true;
-      } else if (line.kind == G2oLine::Kind::kConstraintAttributes) {
-        constraint_has_attributes_[static_cast<std::size_t>(line.id)] = true;
-      }
-    }
-  }
-
-  // All or none, so that readers which want a vertex above its edges get it.
-  void AppendNamedVertices() {
-    bool has_changed = false;
-    for (const FeatureId id : file_->named_by_edges) {
-      const Feature* feature = graph_.FindFeature(id);
-      if (feature == nullptr) continue;
-      const G2oFile::Fingerprint now = FingerprintOf(*feature);
-      const G2oFile::Fingerprint& before = FingerprintInFile(*feature);
-      has_changed = has_changed || now.element != before.element ||
-                    now.attributes != before.attributes;
-    }
-    if (!has_changed) return;
-    for (const FeatureId id : file_->named_by_edges) {
-      const Feature* feature = graph_.FindFeature(id);
-      if (feature == nullptr) continue;
-      AppendVertex(*feature, nullptr, file_ids_[id], {}, &text_);
-      EndLine();
-      if (feature->fixed && !file_->was_fixed[static_cast<std::size_t>(id)]) {
-        AppendFix(file_ids_[id], &text_);
-        EndLine();
-      }
-      if (!IsPlain(*feature)) AppendAttributeLine(*feature);
-    }
-  }
-
-  void EndLine() { text_ += '\n'; }
-
-  void AppendAttributeLine(const Feature& feature) {
-    AppendAttributes(feature, file_ids_[feature.id], &text_);
-    EndLine();
-  }
-  void AppendAttributeLine(const Constraint& constraint) {
-    AppendAttributes(constraint, &text_);
-    EndLine();
-  }
-
-  void AppendText(const G2oLine& line) {
-    text_ += line.text;
-    EndLine();
-  }
-
-  void AppendLine(const G2oLine& line) {
-    switch (line.kind) {
-      case G2oLine::Kind::kText:
-        AppendText(line);
-        break;
-      case G2oLine::Kind::kVertex:
-        AppendVertexLine(line);
-        break;
-      case G2oLine::Kind::kFix:
-        AppendFixLine(line);
-        break;
-      case G2oLine::Kind::kEdge:
-        AppendEdgeLine(line);
-        break;
-      case G2oLine::Kind::kFeatureAttributes: {
-        const Feature* feature = graph_.FindFeature(line.id);
-        if (feature == nullptr) break;
-        if (FingerprintOf(*feature).attributes ==
-            FingerprintInFile(*feature).attributes) {
-          AppendText(line);
-        } else {
-          AppendAttributeLine(*feature);
-        }
-        break;
-      }
-      case G2oLine::Kind::kConstraintAttributes: {
-        const Constraint* constraint = graph_.FindConstraint(line.id);
-        if (constraint == nullptr) break;
-        if (FingerprintOf(*constraint, file_ids_).attributes ==
-            FingerprintInFile(*constraint).attributes) {
-          AppendText(line);
-        } else {
-          AppendAttributeLine(*constraint);
-        }
-        break;
-      }
-    }
-  }
-
-  const G2oFile::Fingerprint& FingerprintInFile(const Feature& feature) const {
-    return file_->feature_fingerprints[static_cast<std::size_t>(feature.id)];
-  }
-  const G2oFile::Fingerprint& FingerprintInFile(
-      const Constraint& constraint) const {
-    return file_
-        ->constraint_fingerprints[static_cast<std::size_t>(constraint.id)];
-  }
-
-  void AppendVertexLine(const G2oLine& line) {
-    const Feature* feature = graph_.FindFeature(line.id);
-    if (feature == nullptr) return;
-    const auto index = static_cast<std::size_t>(line.id);
-    const G2oFile::Fingerprint fingerprint = FingerprintOf(*feature);
-    if (fingerprint.element == FingerprintInFile(*feature).element) {
-      AppendText(line);
-    } else {
-      Split(line.text, &fields_);
-      const G2oVertexFormat* format = nullptr;
-      for (const G2oVertexFormat& other : feature->type->other_g2o_formats) {
-        if (other.tag == fields_[0]) format = &other;
-      }
-      // The extra fields as they stand there.
-      const std::size_t extra =
-          format == nullptr ? 0 : format->extra_fields.size();
-      ExtraText extra_text;
-      if (extra > 0) {
-        const char* begin = fields_[fields_.size() - extra].begin();
-        extra_text = ExtraText(
-            begin, static_cast<std::size_t>(fields_.back().end() - begin));
-      }
-      AppendVertex(*feature, format, file_ids_[feature->id], extra_text,
-                   &text_);
-      EndLine();
-    }
-    if (feature->fixed && !file_->was_fixed[index]) {
-      AppendFix(file_ids_[feature->id], &text_);
-      EndLine();
-    }
-    if (!feature_has_attributes_[index] &&
-        fingerprint.attributes != FingerprintInFile(*feature).attributes) {
-      AppendAttributeLine(*feature);
-    }
-  }
-
-  void AppendFixLine(const G2oLine& line) {
-    if (feature_of_id_.empty()) {
-      for (std::size_t id = 0; id < file_->file_ids.size(); ++id) {
-        if (file_->file_ids[id] != kNoId) {
-          feature_of_id_[file_->file_ids[id]] = static_cast<FeatureId>(id);
-        }
-      }
-    }
-    Split(line.text, &fields_);
-    std::string kept;
-    bool is_changed = false;
-    for (std::size_t i = 1; i < fields_.size(); ++i) {
-      std::int64_t file_id = 0;
-      ParseNumber(fields_[i], &file_id);
-      const auto found = feature_of_id_.find(file_id);
-      // Vertices with unknown tags stay fixed.
-      bool is_fixed = true;
-      if (found != feature_of_id_.end()) {
-        const Feature* feature = graph_.FindFeature(found->second);
-        is_fixed = feature != nullptr && feature->fixed;
-      }
-      if (is_fixed) {
-        kept += ' ';
-        kept += fields_[i];
-      } else {
-        is_changed = true;
-      }
-    }
-    if (!is_changed) {
-      AppendText(line);
-    } else if (!kept.empty()) {
-      text_ += kFixTag + kept;
-      EndLine();
-    }
-  }
-
-  void AppendEdgeLine(const G2oLine& line) {
-    const Constraint* constraint = graph_.FindConstraint(line.id);
-    if (constraint == nullptr) return;
-    const G2oFile::Fingerprint fingerprint =
-        FingerprintOf(*constraint, file_ids_);
-    if (fingerprint.element == FingerprintInFile(*constraint).element) {
-      AppendText(line);
-    } else {
-      Split(line.text, &fields_);
-      const G2oEdgeFormat* format = nullptr;
-      for (const G2oEdgeFormat& other : constraint->type->other_g2o_formats) {
-        if (other.tag == fields_[0]) format = &other;
-      }
-      AppendEdge(*constraint, format, Options(), file_ids_, &text_);
-      EndLine();
-    }
-    if (!constraint_has_attributes_[static_cast<std::size_t>(line.id)] &&
-        fingerprint.attributes != FingerprintInFile(*constraint).attributes) {
-      AppendAttributeLine(*constraint);
-    }
-  }
-
-  const Graph& graph_;
-  const G2oFile* file_;
-  std::vector<std::int64_t> file_ids_;
-  std::vector<bool> feature_has_attributes_;
-  std::vector<bool> constraint_has_attributes_;
-  std::unordered_map<std::int64_t, FeatureId> feature_of_id_;
-  std::vector<std::string_view> fields_;
-  std::string text_;
-};
-
-}  // namespace
-
-G2oFile ReadG2o(std::istream& input, const std::string& name,
-                const Registry& registry, Graph* graph,
-                const G2oOptions& options) {
-  return ReadG2oFile(input, name, registry, options, graph);
-}
-
-void WriteG2o(const Graph& graph, const G2oFile* file, std::ostream& output) {
-  const std::string text = Writer(graph, file).Write();
-  output.write(text.data(), static_cast<std::streamsize>(text.size()));
 }
 
 }  // namespace plumbline

@@ -40,6 +40,11 @@ constexpr double kWallThere = 0.6;
 constexpr double kStraightOn = 1.5;
 // What stands before a wall in a corridor is no deeper than this, m.
 constexpr double kDeepestFurniture = 0.8;
+// What stands between openings is a column up to this, m; and a screen up to
+// that, where so many stand in a row.
+constexpr double kWidestColumn = 0.6;
+constexpr double kLongestScreen = 1.5;
+constexpr std::size_t kLeastScreens = 2;
 // A wall that is crossed this far within another's end is met there, m.
 constexpr double kAtTheEnd = 0.4;
 // Share of a partition that may look open: laser points go astray.
@@ -271,11 +276,31 @@ double WallShare(const WallProfile& profile, double t, double reach) {
 // Where walls cross a line, along it.
 struct Crossings {
   std::vector<double> all;
+  // Also where walls that are drawn on would cross it.
+  std::vector<double> drawn;
   // Those of walls that go on on both sides of the line.
   std::vector<double> straight_on;
 };
 
-Crossings WallCrossings(const std::vector<DrawnLine>& drawn, std::size_t line) {
+// Openings up to a door's width in a wall are wall.
+WallProfile WithDoorsShut(WallProfile profile, double narrow) {
+  const auto count = profile.size();
+  int after = -1;
+  for (int i = 0; i < count; ++i) {
+    if (profile.At(i) != Mark::kWall) continue;
+    if (after >= 0 && (i - after) * kStep <= narrow) {
+      std::fill(profile.marks.begin() + after, profile.marks.begin() + i,
+                Mark::kWall);
+    }
+    after = i + 1;
+  }
+  return profile;
+}
+
+// `shut`: profiles of the lines with their doors shut.
+Crossings WallCrossings(const std::vector<DrawnLine>& drawn,
+                        const std::vector<WallProfile>& shut,
+                        std::size_t line) {
   Crossings crossings;
   for (std::size_t j = 0; j < drawn.size(); ++j) {
     double t, t_other;
@@ -285,14 +310,16 @@ Crossings WallCrossings(const std::vector<DrawnLine>& drawn, std::size_t line) {
         t_other > drawn[j].to) {
       continue;
     }
-    const auto share = [&](double beside) {
-      return WallShare(drawn[j].profile, t_other + beside, std::abs(beside));
+    crossings.drawn.push_back(t);
+    const auto share = [&](const WallProfile& profile, double beside) {
+      return WallShare(profile, t_other + beside, std::abs(beside));
     };
-    if (std::max(share(-kBesideCrossing), share(kBesideCrossing)) >=
-        kWallThere) {
+    if (std::max(share(drawn[j].profile, -kBesideCrossing),
+                 share(drawn[j].profile, kBesideCrossing)) >= kWallThere) {
       crossings.all.push_back(t);
     }
-    if (std::min(share(-kStraightOn), share(kStraightOn)) >= kWallThere) {
+    if (std::min(share(shut[j], -kStraightOn), share(shut[j], kStraightOn)) >=
+        kWallThere) {
       crossings.straight_on.push_back(t);
     }
   }
@@ -315,9 +342,64 @@ void DropSpecks(const std::vector<double>& crossings, WallProfile* profile) {
   }
 }
 
+// Openings that belong together, in samples; `last` is not included.
+struct Passage {
+  int first = 0;
+  int last = 0;
+};
+
+// For every sample the passage it lies in, an empty one for wall. Openings with
+// nothing but short pieces of wall between them, at which no other wall ends,
+// are one: what stands there is furniture or columns. Two of them may be two
+// doors of one room, though.
+std::vector<Passage> PassagesOf(const std::vector<Mark>& marks, double begin,
+                                const std::vector<double>& crossings) {
+  const auto count = static_cast<int>(marks.size());
+  const auto mark = [&](int i) { return marks[static_cast<std::size_t>(i)]; };
+  std::vector<Passage> runs;
+  std::vector<bool> is_open;
+  for (int i = 0; i < count;) {
+    int j = i;
+    int open = 0;
+    while (j < count && mark(j) != Mark::kWall) {
+      open += mark(j) == Mark::kOpen;
+      ++j;
+    }
+    if (j > i) {
+      runs.push_back({i, j});
+      is_open.push_back(2 * open >= j - i);
+    }
+    i = std::max(j, i + 1);
+  }
+  // The last opening that is one with another.
+  const auto last_of = [&](std::size_t i, double longest) {
+    for (; i + 1 < runs.size() && is_open[i] && is_open[i + 1]; ++i) {
+      const double from = begin + runs[i].last * kStep;
+      const double to = begin + runs[i + 1].first * kStep;
+      if (to - from > longest ||
+          std::any_of(crossings.begin(), crossings.end(), [&](double t) {
+            return t >= from - kBesideCrossing && t <= to + kBesideCrossing;
+          })) {
+        break;
+      }
+    }
+    return i;
+  };
+  std::vector<Passage> passages(marks.size());
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    std::size_t last = last_of(i, kLongestScreen);
+    if (last < i + kLeastScreens) last = last_of(i, kWidestColumn);
+    const Passage whole{runs[i].first, runs[last].last};
+    std::fill(passages.begin() + whole.first, passages.begin() + whole.last,
+              whole);
+    i = last;
+  }
+  return passages;
+}
+
 // Finds doors, openings with wall on both sides, and what each place holds.
-void Weigh(const DoorOptions& options, bool is_wall,
-           const std::vector<double>& straight_on, WallProfile* profile) {
+void Weigh(const DoorOptions& options, bool is_wall, const Crossings& crossings,
+           WallProfile* profile) {
   std::vector<Mark>& marks = profile->marks;
   const int count = profile->size();
   profile->holds.assign(marks.size(), -1.0);
@@ -330,15 +412,18 @@ void Weigh(const DoorOptions& options, bool is_wall,
     return walls_before[static_cast<std::size_t>(std::min(last, count))] -
            walls_before[static_cast<std::size_t>(std::max(first, 0))];
   };
-  const auto meets = [](double t, const std::vector<double>& crossings) {
-    return std::any_of(crossings.begin(), crossings.end(),
-                       [&](double crossing) {
-                         return std::abs(crossing - t) <= kDeepestFurniture;
+  const auto goes_straight_on = [&](int i) {
+    return std::any_of(crossings.straight_on.begin(),
+                       crossings.straight_on.end(), [&](double crossing) {
+                         return std::abs(crossing - profile->begin -
+                                         i * kStep) <= kDeepestFurniture;
                        });
   };
+  const std::vector<Passage> passages =
+      PassagesOf(marks, profile->begin, crossings.drawn);
   for (int i = 0; i < count;) {
-    const bool is_here = marks[static_cast<std::size_t>(i)] == Mark::kWall;
-    if (is_here) {
+    const Passage whole = passages[static_cast<std::size_t>(i)];
+    if (whole.last <= i) {
       const double near = walls(i - around, i + around + 1) * kStep;
       profile->holds[static_cast<std::size_t>(i)] =
           is_wall ? kLeastWallHolds + (1.0 - kLeastWallHolds) *
@@ -347,43 +432,47 @@ void Weigh(const DoorOptions& options, bool is_wall,
       ++i;
       continue;
     }
-    int j = i;
-    int open = 0;
-    while (j < count && marks[static_cast<std::size_t>(j)] != Mark::kWall) {
-      open += marks[static_cast<std::size_t>(j)] == Mark::kOpen;
-      ++j;
-    }
-    const double width = (j - i) * kStep;
-    const int first = std::max(0, i - around);
-    const int last = std::min(count, j + around);
-    const int length = std::max(1, last - first - (j - i));
-    const double covered = static_cast<double>(walls(first, last)) / length;
-    bool is_between = is_wall && i > 0 && j < count;
-    if (width > options.narrow &&
-        meets(profile->begin + i * kStep, straight_on) &&
-        meets(profile->begin + j * kStep, straight_on)) {
-      is_between = false;
-    }
+    const int size = whole.last - whole.first;
+    const double width = size * kStep;
+    const int first = std::max(0, whole.first - around);
+    const int last = std::min(count, whole.last + around);
+    const int length = std::max(1, last - first - size);
+    const int beside = walls(first, last) - walls(whole.first, whole.last);
+    const double covered = static_cast<double>(beside) / length;
+    const bool is_between =
+        is_wall && whole.first > 0 && whole.last < count &&
+        !(width > options.narrow && goes_straight_on(whole.first) &&
+          goes_straight_on(whole.last));
     const double wider = std::clamp(
         (width - options.narrow) / (options.wide - options.narrow), 0.0, 1.0);
     const double narrow = 1.0 - wider * wider;
     const double flanked = std::clamp(
         (covered - kBareFlanks) / (kFullFlanks - kBareFlanks), 0.0, 1.0);
-    const double important =
-        std::min(1.0, walls(first, last) * kStep / kFullWall);
+    const double important = std::min(1.0, beside * kStep / kFullWall);
     const double as_door = is_between ? narrow * flanked : 0.0;
-    for (int k = i; k < j; ++k) {
-      const bool is_open = marks[static_cast<std::size_t>(k)] == Mark::kOpen;
+    const double holds =
+        -1.0 + as_door * (1.0 - kDoorHolds + kImportantDoor * important);
+    for (int k = whole.first; k < whole.last; ++k) {
+      const bool is_unknown =
+          marks[static_cast<std::size_t>(k)] == Mark::kUnknown;
       profile->holds[static_cast<std::size_t>(k)] =
-          is_open
-              ? -1.0 + as_door * (1.0 - kDoorHolds + kImportantDoor * important)
-              : (is_wall ? kUnknownHolds : 0.0);
+          is_unknown ? (is_wall ? kUnknownHolds : 0.0) : holds;
     }
-    if (is_between && width <= options.wide && open * 2 >= j - i &&
-        covered >= 0.4) {
-      std::fill(marks.begin() + i, marks.begin() + j, Mark::kDoor);
+    // Each opening is a door of its own.
+    while (i < whole.last) {
+      int j = i;
+      int open = 0;
+      while (j < whole.last &&
+             marks[static_cast<std::size_t>(j)] != Mark::kWall) {
+        open += marks[static_cast<std::size_t>(j)] == Mark::kOpen;
+        ++j;
+      }
+      if (is_between && width <= options.wide && open * 2 >= j - i &&
+          covered >= 0.4) {
+        std::fill(marks.begin() + i, marks.begin() + j, Mark::kDoor);
+      }
+      i = std::max(j, i + 1);
     }
-    i = j;
   }
 }
 
@@ -459,13 +548,17 @@ std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
 void MeasureLines(const SpaceGrid& space, const DoorOptions& options,
                   std::vector<DrawnLine>* drawn) {
   for (DrawnLine& line : *drawn) Measure(space, &line);
+  std::vector<WallProfile> shut;
+  for (const DrawnLine& line : *drawn) {
+    shut.push_back(WithDoorsShut(line.profile, options.narrow));
+  }
   std::vector<Crossings> crossings(drawn->size());
   for (std::size_t i = 0; i < drawn->size(); ++i) {
-    crossings[i] = WallCrossings(*drawn, i);
+    crossings[i] = WallCrossings(*drawn, shut, i);
   }
   for (std::size_t i = 0; i < drawn->size(); ++i) {
     DropSpecks(crossings[i].all, &(*drawn)[i].profile);
-    Weigh(options, (*drawn)[i].line.is_wall, crossings[i].straight_on,
+    Weigh(options, (*drawn)[i].line.is_wall, crossings[i],
           &(*drawn)[i].profile);
   }
 }

@@ -209,6 +209,35 @@ TEST(BuildingPlanTest, AWideOpeningJoins) {
 
 // The space between the jambs of a thick wall belongs to one side: the other
 // must not take its door for the end of a corridor.
+// Screens that stand free in line between two walls leave one way around all of
+// their ends, and no doors; columns as well.
+TEST(BuildingPlanTest, ScreensAndColumnsDivideNoRoom) {
+  const auto rooms = [](const std::vector<double>& walls) {
+    Drawing drawing = TwoRooms();
+    for (std::size_t i = 0; i < walls.size(); i += 2) {
+      drawing.Fill(9.5, walls[i], 9.6, walls[i + 1], Space::kOccupied);
+    }
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms({3.2, 3.9, 4.6, 5.4, 6.0, 6.6, 7.3, 8.0}), 3u);
+  EXPECT_EQ(rooms({3.2, 4.0, 5.0, 5.5, 6.5, 8.0}), 3u);
+  // Two pieces of wall with one door between them do.
+  EXPECT_EQ(rooms({3.2, 4.0, 4.9, 8.0}), 4u);
+}
+
+TEST(BuildingPlanTest, WallBetweenTwoDoorsKeepsRoomsApart) {
+  // Two doors of one room.
+  Drawing two = TwoRooms();
+  two.Free(10.2, 2.9, 11.1, 3.3);
+  EXPECT_EQ(PlanOf(two).rooms.size(), 3u);
+  EXPECT_EQ(PlanOf(two).doors.size(), 3u);
+  // A wall ends between the doors of two rooms.
+  Drawing next = TwoRooms();
+  next.Free(4.9, 2.9, 5.8, 3.3).Free(6.4, 2.9, 7.3, 3.3);
+  EXPECT_EQ(PlanOf(next).rooms.size(), 3u);
+  EXPECT_EQ(PlanOf(next).doors.size(), 4u);
+}
+
 TEST(BuildingPlanTest, DoorsInThickWallsKeepRoomsApart) {
   for (const double thickness : {0.1, 0.3, 0.4, 0.5}) {
     Drawing drawing(14.0, 12.0);
@@ -373,6 +402,19 @@ TEST(BuildingPlanTest, CupboardsDoNotDivideACorridor) {
   const BuildingPlan plan = PlanOf(drawing);
   EXPECT_EQ(plan.rooms.size(), 3u);
   EXPECT_EQ(plan.doors.size(), 2u);
+}
+
+// Doors in the corridor's wall make it no less straight.
+TEST(BuildingPlanTest, CupboardsBesideDoorsDoNotDivideACorridor) {
+  Drawing drawing(20.0, 12.0);
+  drawing.Room(1.0, 1.0, 19.0, 3.0);
+  drawing.Room(1.0, 3.2, 9.8, 8.0).Room(10.0, 3.2, 19.0, 8.0);
+  drawing.Free(7.1, 2.9, 8.0, 3.3).Free(8.6, 2.9, 9.5, 3.3);
+  drawing.Free(10.3, 2.9, 11.2, 3.3).Free(11.9, 2.9, 12.8, 3.3);
+  drawing.Fill(9.9, 1.0, 10.6, 1.4, Space::kOccupied);
+  const BuildingPlan plan = PlanOf(drawing);
+  EXPECT_EQ(plan.rooms.size(), 3u);
+  EXPECT_EQ(plan.doors.size(), 4u);
 }
 
 // The end of a room at the side of a corridor: open for 2 of its 2.8 m.

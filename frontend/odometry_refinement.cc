@@ -191,6 +191,8 @@ struct OdometryRefiner::Outcome {
   enum class Verdict { kBelieved, kOdometry, kContradicted };
   Verdict verdict = Verdict::kOdometry;
   RefinedScan refined;
+  // Of the returns alone, in the last key scan's frame.
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   std::string why;
   // Share of the reference that the scan before looked through.
   double seen_through = 0.0;
@@ -437,10 +439,9 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   // What the returns leave open is as uncertain as all the odometry since
   // the key scan, not as that of the last step alone.
   const Eigen::Matrix3d rotation = RotationInto(key_pose);
+  outcome.information = rotation * match.information * rotation.transpose();
   result.since_key.covariance =
-      (rotation * match.information * rotation.transpose() +
-       result.since_key.covariance.inverse())
-          .inverse();
+      (outcome.information + result.since_key.covariance.inverse()).inverse();
   result.since_key.covariance += DriftCovariance(result.since_key.mean);
   return outcome;
 }
@@ -563,12 +564,15 @@ void OdometryRefiner::BeginTrack(const Scan& scan, SettledScan* first) {
   track_.last_pose = refined.pose;
   track_.last_points = points_;
   key_odometry_ = scan.odometry;
+  odometry_scale_.Break();
   track_.keys.push_back(
       {first->index, refined.pose, points_, scan.laser_offset.head<2>()});
   RebuildReference(&track_);
 }
 
-void OdometryRefiner::ContinueTrack(const Scan& scan, SettledScan* next) {
+void OdometryRefiner::ContinueTrack(const Scan& scan,
+                                    const Eigen::Matrix3d& information,
+                                    SettledScan* next) {
   RefinedScan& refined = next->refined;
   track_.since_key = refined.since_key;
   track_.last_pose = refined.pose;
@@ -579,7 +583,7 @@ void OdometryRefiner::ContinueTrack(const Scan& scan, SettledScan* next) {
   // A scan that was refused anchors nothing.
   if (!moved || (refined.odometry_only && options_.match_scans)) return;
   refined.is_key = true;
-  CompareOdometry(scan, refined);
+  CompareOdometry(scan, refined, information);
   next->points = points_;
   // Where things move, what may move enters no reference.
   if (track_.moving > 0) {
@@ -600,8 +604,10 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
   ExtractScanPoints(scan, options_.points, &points_);
   SettledScan done;
   done.index = count_++;
-  const Pose2 motion =
+  const Pose2 by_wheels =
       started_ ? Between(last_odometry_, scan.odometry) : Pose2::Zero();
+  const Pose2 motion =
+      options_.match_scans ? odometry_scale_.Scaled(by_wheels) : by_wheels;
   const double seconds = started_ ? scan.timestamp - last_time_ : 0.0;
   last_odometry_ = scan.odometry;
   last_time_ = scan.timestamp;
@@ -633,7 +639,7 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
     Lose(done.index, seconds, outcome);
     BeginTrack(scan, &done);
   } else {
-    ContinueTrack(scan, &done);
+    ContinueTrack(scan, outcome.information, &done);
   }
   if (open_ == nullptr) {
     if (done.refined.is_key) Archive(track_.keys.back());
@@ -881,10 +887,15 @@ void OdometryRefiner::Tie(bool last) {
 }
 
 void OdometryRefiner::CompareOdometry(const Scan& scan,
-                                      const RefinedScan& refined) {
-  const Pose2 motion = Between(key_odometry_, scan.odometry);
+                                      const RefinedScan& refined,
+                                      const Eigen::Matrix3d& information) {
+  const Pose2 by_wheels = Between(key_odometry_, scan.odometry);
   key_odometry_ = scan.odometry;
   if (refined.odometry_only || track_.keys.empty()) return;
+  const Pose2 motion = odometry_scale_.Scaled(by_wheels);
+  odometry_scale_.Compare(by_wheels,
+                          OdometryCovariance(by_wheels, options_.noise),
+                          refined.since_key.mean, information);
   Pose2 left = refined.since_key.mean - motion;
   left[2] = NormalizeAngle(left[2]);
   const double innovation =
@@ -1404,7 +1415,7 @@ void OdometryRefiner::ExchangeState(StateArchive& archive) {
               last_time_, usual_step_, archive_, part_, num_parts_, loose_of_,
               wide_searches_, refusals_, losses_, loose_, guessed_, noise_,
               noise_scale_, key_odometry_, squared_innovations_,
-              compared_motions_);
+              compared_motions_, odometry_scale_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

@@ -3,6 +3,7 @@
 
 #include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/odometry_scale.h>
 #include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/scan_matcher.h>
@@ -295,6 +296,8 @@ class OdometryRefiner {
   /// Noise of the laser's ranges (standard deviation, m): what the options say,
   /// or what the scans so far show, 0 while they are too few.
   double range_sigma() const;
+  /// What a metre of odometry is presently taken for, m.
+  double odometry_scale() const { return odometry_scale_.scale(); }
   /// Factor by which the laser is noisier than usual, as presently allowed for.
   double noise_scale() const { return noise_scale_; }
 
@@ -420,7 +423,8 @@ class OdometryRefiner {
   void Lose(int scan, double seconds, const Outcome& outcome);
   // The first scan of a track, and the ones after it.
   void BeginTrack(const Scan& scan, SettledScan* first);
-  void ContinueTrack(const Scan& scan, SettledScan* next);
+  void ContinueTrack(const Scan& scan, const Eigen::Matrix3d& information,
+                     SettledScan* next);
   // Looks for the tie; settles the track when it is found or `last`.
   void Tie(bool last);
   // Scans that a tie is judged by, and where it would hang.
@@ -481,7 +485,9 @@ class OdometryRefiner {
                      Hypothesis* found);
   // Takes note of how odometry's motion since the last key scan agrees with the
   // match of this one, and begins anew.
-  void CompareOdometry(const Scan& scan, const RefinedScan& refined);
+  // `information`: of the returns alone, in that key scan's frame.
+  void CompareOdometry(const Scan& scan, const RefinedScan& refined,
+                       const Eigen::Matrix3d& information);
   // Odometry's variances on this log, of those in the options.
   double OdometryVarianceScale() const;
   // From the last sure key scan to the first of the open track, by odometry.
@@ -584,6 +590,7 @@ class OdometryRefiner {
   Pose2 key_odometry_ = Pose2::Zero();
   double squared_innovations_ = 0.0;
   int compared_motions_ = 0;
+  OdometryScale odometry_scale_;
   int wide_searches_ = 0;
   int refusals_ = 0;
   int losses_ = 0;

@@ -480,7 +480,8 @@ TEST_F(LogSolverTest, ClosuresOfTheFirstMapAreKept) {
     });
   }
   EXPECT_GT(holding, 5);
-  EXPECT_GE(10 * on_walls, 9 * holding);
+  // Walls end where they were seen: one may have lost the part that it closed.
+  EXPECT_GE(on_walls, holding - 1);
 }
 
 // Says, once loops are being closed, that the two walls farthest apart that

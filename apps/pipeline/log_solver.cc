@@ -9,6 +9,7 @@
 #include <plumbline/frontend/looks.h>
 #include <plumbline/frontend/place_chain.h>
 #include <plumbline/frontend/wall_views.h>
+#include <plumbline/frontend/way_lengths.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/log_solver_state.h>
 
@@ -33,6 +34,14 @@ constexpr std::size_t kScansAhead = 64;
 // A second map with less than this share of the first one's length of walls has
 // lost what the scans show, and is no better.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
+
+// Poses of a first map that turn otherwise than refined odometry (or than the
+// poses adjusted by scans alone) on most ways of this length, m, by more than
+// this, rad, are bent: what was taken for one wall was many, as in a round
+// corridor. Over such a way refined odometry is good to a degree or less.
+constexpr double kBentWay = 10.0;
+constexpr double kBent = DegToRad(3.0);
+constexpr double kLongestStep = 1.0;
 
 // Rounds of binding walls to a plan, with EM after each.
 constexpr int kPlanRounds = 6;
@@ -60,6 +69,39 @@ std::vector<BlockedWay> Innermost(const std::vector<BlockedWay>& ways) {
     if (!encloses) left.push_back(way);
   }
   return left;
+}
+
+// Poses of the records by refined odometry alone.
+std::vector<Pose2> PosesByMotions(const std::vector<KeyScanRecord>& records,
+                                  const Pose2& first) {
+  std::vector<Pose2> poses;
+  for (std::size_t k = 0; k < records.size(); ++k) {
+    const std::size_t from =
+        records[k].from < 0 ? k - 1 : static_cast<std::size_t>(records[k].from);
+    poses.push_back(k == 0 ? first
+                           : Compose(poses[from], records[k].motion.mean));
+  }
+  return poses;
+}
+
+// Whether the first poses turn otherwise than the second ones on most ways of
+// kBentWay.
+bool IsBent(const std::vector<Pose2>& first, const std::vector<Pose2>& second) {
+  const std::vector<double> way = WayLengths(second, kLongestStep);
+  std::vector<double> turns;
+  std::size_t begin = 0;
+  for (std::size_t end = 0; end < second.size(); ++end) {
+    if (way[end] - way[begin] < kBentWay) continue;
+    while (way[end] - way[begin + 1] >= kBentWay) ++begin;
+    turns.push_back(
+        std::abs(NormalizeAngle(Between(first[begin], first[end])[2] -
+                                Between(second[begin], second[end])[2])));
+  }
+  if (turns.empty()) return false;
+  const auto middle =
+      turns.begin() + static_cast<std::ptrdiff_t>(turns.size() / 2);
+  std::nth_element(turns.begin(), middle, turns.end());
+  return *middle > kBent;
 }
 
 void AddLoose(int begin, int end, std::string why, LogSolverResult* result) {
@@ -788,11 +830,15 @@ void LogSolver::AdjustPoses(Context* context) {
   }
   // RunFirst has kept them, perhaps those of several maps.
   if (result.closures.empty()) result.closures = ClosuresOf(result);
+  // What was taken for walls must not make odometry worse.
+  const std::vector<Pose2> by_odometry =
+      PosesByMotions(result.records, context->keys.front());
+  const bool is_bent = IsBent(context->keys, by_odometry);
   ClearGraph();
   context->adjustment = std::make_unique<JointAdjustment>(
       graph_.get(), session_.get(), registry_, context->scans, result.refined,
-      result.records, context->keys, kNoId, options_.adjustment,
-      context->control.stop);
+      result.records, is_bent ? by_odometry : context->keys, kNoId,
+      options_.adjustment, context->control.stop);
   JointAdjustment& adjustment = *context->adjustment;
   context->places = adjustment.places();
   adjustment.Adjust();
@@ -859,7 +905,8 @@ void LogSolver::AdjustWalls(Context* context) {
   result.wall_votes = adjustment.num_votes();
   context->vote_excess = adjustment.vote_variance_excess();
   result.second_map_refused =
-      LengthOfWalls(*graph_) < kLeastSecondShare * context->first_length;
+      LengthOfWalls(*graph_) < kLeastSecondShare * context->first_length &&
+      !IsBent(context->first_trajectory, result.trajectory);
   if (result.second_map_refused) return ReturnToFirstMap(context);
   context->adjustment.reset();
   context->first_map.clear();

@@ -4,6 +4,7 @@
 #include <plumbline/detectors/builtins.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <set>
 #include <sstream>
@@ -33,6 +34,31 @@ TEST(BuildingTrialTest, ObliqueWingsDiffer) {
   ASSERT_EQ(a.orientations_deg.size(), 4u);
   ASSERT_EQ(b.orientations_deg.size(), 4u);
   EXPECT_NE(a.orientations_deg, b.orientations_deg);
+}
+
+// A round corridor 2 m wide of walls that turn by 4 degrees each, with a niche
+// to its side every third of the way, driven round once and a quarter.
+World RoundCorridor(double radius) {
+  constexpr int kSides = 90;
+  World world;
+  const auto at = [](double distance, int side) {
+    const double angle = 2.0 * kPi * side / kSides;
+    return Eigen::Vector2d(distance * std::cos(angle),
+                           distance * std::sin(angle));
+  };
+  for (int k = 0; k < kSides; ++k) {
+    world.walls.push_back({at(radius - 1.0, k), at(radius - 1.0, k + 1), 0.1});
+    const double outside = k % 30 == 15 ? radius + 3.0 : radius + 1.0;
+    world.walls.push_back({at(outside, k), at(outside, k + 1), 0.1});
+    if (k % 30 == 15) {
+      world.walls.push_back({at(radius + 1.0, k), at(outside, k), 0.1});
+      world.walls.push_back({at(radius + 1.0, k + 1), at(outside, k + 1), 0.1});
+    }
+  }
+  for (int k = 0; k <= kSides + kSides / 4; ++k) {
+    world.path.push_back(at(radius, k));
+  }
+  return world;
 }
 
 // A square ring of corridors, 10 m by 8 m, driven round one and a half times.
@@ -71,6 +97,17 @@ TEST(BuildingTrialTest, ABentBuildingStaysBent) {
           << bend << " degrees, niches: " << has_niches;
     }
   }
+}
+
+// Walls that turn by a few degrees each were taken for one another, so that the
+// map turned 15 % too little: 9 m off, without a word, though refined odometry
+// was right to a degree.
+TEST(BuildingTrialTest, ARoundCorridorStaysRound) {
+  Registry registry;
+  RegisterBuiltins(&registry);
+  const BuildingTrial trial = RunBuildingTrial(
+      RoundCorridor(15.0), SimulatorOptions(), 1, registry, {});
+  EXPECT_LT(trial.mean_position_error, 0.15);
 }
 
 // Distances made for a laser of 1 cm took the returns of one that is four times

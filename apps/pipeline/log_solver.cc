@@ -36,9 +36,11 @@ constexpr std::size_t kScansAhead = 64;
 constexpr double kLeastSecondShare = 1.0 / 3.0;
 
 // Poses of a first map that turn otherwise than refined odometry (or than the
-// poses adjusted by scans alone) on most ways of this length, m, by more than
-// this, rad, are bent: what was taken for one wall was many, as in a round
-// corridor. Over such a way refined odometry is good to a degree or less.
+// poses adjusted by scans alone) on this share of the ways of this length, m,
+// by more than this, rad, are bent: what was taken for one wall was many, as in
+// a round corridor. Over such a way refined odometry is good to a degree or
+// less.
+constexpr double kBentShare = 0.25;
 constexpr double kBentWay = 10.0;
 constexpr double kBent = DegToRad(3.0);
 constexpr double kLongestStep = 1.0;
@@ -84,8 +86,8 @@ std::vector<Pose2> PosesByMotions(const std::vector<KeyScanRecord>& records,
   return poses;
 }
 
-// Whether the first poses turn otherwise than the second ones on most ways of
-// kBentWay.
+// Whether the first poses turn otherwise than the second ones on kBentShare of
+// the ways.
 bool IsBent(const std::vector<Pose2>& first, const std::vector<Pose2>& second) {
   const std::vector<double> way = WayLengths(second, kLongestStep);
   std::vector<double> turns;
@@ -98,10 +100,11 @@ bool IsBent(const std::vector<Pose2>& first, const std::vector<Pose2>& second) {
                                 Between(second[begin], second[end])[2])));
   }
   if (turns.empty()) return false;
-  const auto middle =
-      turns.begin() + static_cast<std::ptrdiff_t>(turns.size() / 2);
-  std::nth_element(turns.begin(), middle, turns.end());
-  return *middle > kBent;
+  const auto bend = turns.begin() + static_cast<std::ptrdiff_t>(
+                                        (1.0 - kBentShare) *
+                                        static_cast<double>(turns.size() - 1));
+  std::nth_element(turns.begin(), bend, turns.end());
+  return *bend > kBent;
 }
 
 void AddLoose(int begin, int end, std::string why, LogSolverResult* result) {

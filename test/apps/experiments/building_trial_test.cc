@@ -61,6 +61,49 @@ World RoundCorridor(double radius) {
   return world;
 }
 
+// Two straight corridors 40 m long with niches, 16 m apart, joined by round
+// ones at both ends, driven round once and a quarter.
+World RoundEnds() {
+  constexpr double kLength = 40.0;
+  constexpr double kRadius = 8.0;
+  constexpr double kArc = kPi * kRadius;
+  // So far on the way, and so far to its right, m.
+  const auto at = [=](double way, double aside) {
+    const double half = kLength + kArc;
+    const double side = std::fmod(way, 2.0 * half) < half ? 1.0 : -1.0;
+    const double here = std::fmod(way, half);
+    const double turned = std::max(0.0, here - kLength) / kRadius - 0.5 * kPi;
+    const double x = std::min(here, kLength) - 0.5 * kLength;
+    return Eigen::Vector2d(side * (x + (kRadius + aside) * std::cos(turned)),
+                           side * (kRadius + aside) * std::sin(turned));
+  };
+  World world;
+  const auto wall = [&](double way, double aside, double to, double to_aside) {
+    world.walls.push_back({at(way, aside), at(to, to_aside), 0.1});
+  };
+  constexpr int kStraight = 40;
+  constexpr int kRound = 42;
+  double way = 0.0;
+  for (int k = 0; k < 2 * (kStraight + kRound); ++k) {
+    const bool is_straight = k % (kStraight + kRound) < kStraight;
+    const double next =
+        way + (is_straight ? kLength / kStraight : kArc / kRound);
+    wall(way, -1.0, next, -1.0);
+    const bool is_niche = is_straight && k % 7 == 3;
+    const double outside = is_niche ? 2.0 : 1.0;
+    wall(way, outside, next, outside);
+    if (is_niche) {
+      wall(way, 1.0, way, outside);
+      wall(next, 1.0, next, outside);
+    }
+    way = next;
+  }
+  for (double to = 0.5; to < 1.3 * way; to += 1.0) {
+    world.path.push_back(at(to, 0.0));
+  }
+  return world;
+}
+
 // A square ring of corridors, 10 m by 8 m, driven round one and a half times.
 World Ring() {
   World world;
@@ -107,6 +150,17 @@ TEST(BuildingTrialTest, ARoundCorridorStaysRound) {
   RegisterBuiltins(&registry);
   const BuildingTrial trial = RunBuildingTrial(
       RoundCorridor(15.0), SimulatorOptions(), 1, registry, {});
+  EXPECT_LT(trial.mean_position_error, 0.15);
+}
+
+// The same where it is the smaller part of the building.
+TEST(BuildingTrialTest, RoundEndsOfCorridorsStayRound) {
+  Registry registry;
+  RegisterBuiltins(&registry);
+  SimulatorOptions simulator;
+  simulator.drive.scan_rate = 10.0;
+  const BuildingTrial trial =
+      RunBuildingTrial(RoundEnds(), simulator, 2, registry, {});
   EXPECT_LT(trial.mean_position_error, 0.15);
 }
 

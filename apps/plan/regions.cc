@@ -78,6 +78,24 @@ struct Extent {
   }
 };
 
+// What lies between two regions.
+struct Border {
+  BorderLengths all;
+  // By the drawn line that it lies on.
+  std::map<int, BorderLengths> of_line;
+
+  void Add(int line, const BorderLengths& lengths) {
+    all.Add(lengths);
+    of_line[line].Add(lengths);
+  }
+  void Add(const Border& other) {
+    all.Add(other.all);
+    for (const auto& [line, lengths] : other.of_line) {
+      of_line[line].Add(lengths);
+    }
+  }
+};
+
 // Over 0: nothing but an opening as wide as the spaces themselves, while a door
 // has a wall beside it.
 double Through(const BorderLengths& border, double width,
@@ -106,8 +124,8 @@ class Regions {
           region_[static_cast<std::size_t>(edge.right)] < 0) {
         continue;
       }
-      BordersOf(edge.left)[edge.right].Add(edge.lengths);
-      BordersOf(edge.right)[edge.left].Add(edge.lengths);
+      BordersOf(edge.left)[edge.right].Add(edge.line, edge.lengths);
+      BordersOf(edge.right)[edge.left].Add(edge.line, edge.lengths);
     }
   }
 
@@ -124,7 +142,7 @@ class Regions {
     };
     for (std::size_t a = 0; a < borders_.size(); ++a) {
       for (const auto& [b, border] : borders_[a]) {
-        queue.insert(key(border, static_cast<int>(a), b));
+        queue.insert(key(border.all, static_cast<int>(a), b));
       }
     }
     while (!queue.empty()) {
@@ -132,18 +150,20 @@ class Regions {
       if (closed >= options.holds_apart) break;
       for (const int end : {a, b}) {
         for (const auto& [c, border] : BordersOf(end)) {
-          queue.erase(key(border, end, c));
+          queue.erase(key(border.all, end, c));
         }
       }
       Join(a, b);
       for (const auto& [c, border] : BordersOf(a)) {
-        queue.insert(key(border, a, c));
+        queue.insert(key(border.all, a, c));
       }
     }
   }
 
   // Joins across openings as wide as the wider space: a narrow one may be the
-  // part of a room that was seen through its door.
+  // part of a room that was seen through its door. Walls that lie between the
+  // two elsewhere, on other lines, do not matter: a corridor that is cut may
+  // run beside its other part.
   void JoinThrough(const RegionOptions& options) {
     for (;;) {
       double best = 0.0;
@@ -154,7 +174,10 @@ class Regions {
           const double width =
               std::max(extents_[a].Width(),
                        extents_[static_cast<std::size_t>(b)].Width());
-          const double through = Through(border, width, options);
+          double through = Through(border.all, width, options);
+          for (const auto& [line, lengths] : border.of_line) {
+            through = std::max(through, Through(lengths, width, options));
+          }
           if (through <= best) continue;
           best = through;
           best_a = static_cast<int>(a);
@@ -167,7 +190,7 @@ class Regions {
   }
 
  private:
-  std::map<int, BorderLengths>& BordersOf(int region) {
+  std::map<int, Border>& BordersOf(int region) {
     return borders_[static_cast<std::size_t>(region)];
   }
 
@@ -187,7 +210,7 @@ class Regions {
     const Extent& more = extents_[static_cast<std::size_t>(b)];
     extent.area += more.area;
     extent.free += more.free;
-    extent.perimeter += more.perimeter - 2.0 * BordersOf(a)[b].length();
+    extent.perimeter += more.perimeter - 2.0 * BordersOf(a)[b].all.length();
     BordersOf(a).erase(b);
     BordersOf(b).erase(a);
     for (const auto& [c, border] : BordersOf(b)) {
@@ -200,7 +223,7 @@ class Regions {
   }
 
   std::vector<int> region_;
-  std::vector<std::map<int, BorderLengths>> borders_;
+  std::vector<std::map<int, Border>> borders_;
   std::vector<Extent> extents_;
 };
 

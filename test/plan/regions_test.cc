@@ -54,5 +54,55 @@ TEST(RegionsTest, UnseenSpaceBehindAWallIsNoPocket) {
   EXPECT_EQ(FindRegions(Stack({3.0, 0.7, 0.8})), (std::vector<int>{0, -1, -1}));
 }
 
+// A corridor, 2 m wide, goes on through an opening of its whole width in a line
+// of walls (line 0), with a strip at its side that runs back beside its first
+// part behind a wall (on line 1).
+TEST(RegionsTest, ACorridorGoesOnThoughItsPartsShareAWall) {
+  const auto regions = [](double open) {
+    Arrangement arrangement;
+    const auto face = [&](double x1, double y1, double x2, double y2) {
+      Polygon polygon;
+      polygon.shell = {{x1, y1}, {x2, y1}, {x2, y2}, {x1, y2}};
+      arrangement.faces.push_back(polygon);
+      arrangement.free.push_back(polygon.Area());
+      arrangement.unknown.push_back(0.0);
+    };
+    face(0.0, 0.0, 10.0, 2.0);
+    face(10.0, 0.0, 20.0, 2.0);
+    face(0.0, 2.0, 20.0, 2.6);
+    const auto edge = [&](const Vector2d& begin, const Vector2d& end, int left,
+                          int right, int line, double opening) {
+      ArrangementEdge added;
+      added.begin = begin;
+      added.end = end;
+      added.left = left;
+      added.right = right;
+      added.line = line;
+      const double wall = added.length() - opening;
+      added.lengths.metres[static_cast<std::size_t>(Mark::kOpen)] = opening;
+      added.lengths.metres[static_cast<std::size_t>(Mark::kWall)] = wall;
+      // As a wide door holds.
+      added.lengths.holds = wall + 0.35 * opening;
+      arrangement.edges.push_back(added);
+    };
+    edge({0.0, 0.0}, {10.0, 0.0}, 0, -1, 2, 0.0);
+    edge({10.0, 0.0}, {20.0, 0.0}, 1, -1, 2, 0.0);
+    edge({20.0, 0.0}, {20.0, 2.0}, 1, -1, 3, 0.0);
+    edge({20.0, 2.0}, {10.0, 2.0}, 1, 2, 1, 10.0);
+    arrangement.edges.back().lengths.holds = -10.0;
+    edge({10.0, 0.0}, {10.0, 2.0}, 0, 1, 0, open);
+    edge({10.0, 2.0}, {0.0, 2.0}, 0, 2, 1, 0.0);
+    edge({20.0, 2.0}, {20.0, 2.6}, 2, -1, 3, 0.0);
+    edge({20.0, 2.6}, {0.0, 2.6}, 2, -1, 4, 0.0);
+    edge({0.0, 2.6}, {0.0, 0.0}, 2, -1, 5, 0.0);
+    return FindRegions(arrangement);
+  };
+  EXPECT_EQ(regions(2.0), (std::vector<int>{0, 0, 0}));
+  // A door in a wall.
+  const std::vector<int> apart = regions(0.9);
+  EXPECT_NE(apart[0], apart[1]);
+  EXPECT_EQ(apart[1], apart[2]);
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -73,14 +73,14 @@ std::vector<BlockedWay> Innermost(const std::vector<BlockedWay>& ways) {
   return left;
 }
 
-// Poses of the records by refined odometry alone.
+// Poses of the records by refined odometry alone, from the first of `keys` on.
 std::vector<Pose2> PosesByMotions(const std::vector<KeyScanRecord>& records,
-                                  const Pose2& first) {
+                                  const std::vector<Pose2>& keys) {
   std::vector<Pose2> poses;
   for (std::size_t k = 0; k < records.size(); ++k) {
     const std::size_t from =
         records[k].from < 0 ? k - 1 : static_cast<std::size_t>(records[k].from);
-    poses.push_back(k == 0 ? first
+    poses.push_back(k == 0 ? keys.front()
                            : Compose(poses[from], records[k].motion.mean));
   }
   return poses;
@@ -835,7 +835,7 @@ void LogSolver::AdjustPoses(Context* context) {
   if (result.closures.empty()) result.closures = ClosuresOf(result);
   // What was taken for walls must not make odometry worse.
   const std::vector<Pose2> by_odometry =
-      PosesByMotions(result.records, context->keys.front());
+      PosesByMotions(result.records, context->keys);
   const bool is_bent = IsBent(context->keys, by_odometry);
   ClearGraph();
   context->adjustment = std::make_unique<JointAdjustment>(

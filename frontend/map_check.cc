@@ -11,6 +11,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -23,6 +24,9 @@ constexpr double kLongestStep = 2.0;
 
 // Between two times that `stop` is asked.
 constexpr std::size_t kScansAtOnce = 64;
+
+// In which parts of a track are compared.
+constexpr std::size_t kRounds = 4;
 
 enum class Verdict { kUnknown, kAgrees, kContradicts };
 
@@ -79,10 +83,12 @@ class MapComparison {
   ScanAgreement Compare(int scan_index, const Pose2& pose,
                         std::vector<std::pair<double, std::size_t>> others,
                         ScanReturns* returns) const {
-    std::sort(others.begin(), others.end());
-    if (static_cast<int>(others.size()) > options_.max_others) {
-      others.resize(static_cast<std::size_t>(options_.max_others));
-    }
+    const auto count =
+        std::min(others.size(), static_cast<std::size_t>(options_.max_others));
+    std::partial_sort(others.begin(),
+                      others.begin() + static_cast<std::ptrdiff_t>(count),
+                      others.end());
+    others.resize(count);
     std::vector<ScanPoint> reference;
     std::vector<Viewpoint> viewpoints;
     for (const auto& [distance, j] : others) {
@@ -276,9 +282,12 @@ std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
     return result;
   };
   std::map<std::pair<std::size_t, std::size_t>, Evidence> evidence;
-  for (const std::size_t k :
-       SpreadOver(WayLengths(poses, kLongestStep), options.spacing)) {
-    if (parts[k] == kNoPart) continue;
+  const std::vector<std::size_t> looked_at =
+      SpreadOver(WayLengths(poses, kLongestStep), options.spacing);
+  std::set<std::pair<std::size_t, std::size_t>> known;
+  // Compares a key scan with the parts around it; false when it was stopped.
+  const auto compare = [&](std::size_t k) {
+    if (parts[k] == kNoPart) return true;
     // The parts just before and after its own are enough to join all, and what
     // is compared does not grow with the square of the visits.
     auto by_part = near(poses[k]);
@@ -292,19 +301,33 @@ std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
     const auto end = after == by_part.end() ? after : std::next(after);
     auto other = after == by_part.begin() ? after : std::prev(after);
     for (; other != end; ++other) {
-      if (stop && stop()) return is_confirmed;
+      if (stop && stop()) return false;
       auto& [part, others] = *other;
+      const std::pair<std::size_t, std::size_t> pair =
+          std::minmax(part, parts[k]);
+      if (known.count(pair) > 0) continue;
       const ScanAgreement agreement =
           comparison.Compare(keys[k], poses[k], std::move(others), &returns);
       const bool contradicts =
           Judge(agreement, options) == Verdict::kContradicts;
       if (!contradicts && !IsKnown(agreement, options)) continue;
-      Evidence& of_pair = evidence[std::minmax(part, parts[k])];
+      Evidence& of_pair = evidence[pair];
       ++of_pair.compared;
       if (contradicts) ++of_pair.contradicting;
       if (IsConfirming(agreement, options)) {
         of_pair.confirming.emplace_back(poses[k].head<2>());
       }
+    }
+    return true;
+  };
+  // Each round is spread over the way as evenly as all together: a pair of
+  // which enough is known after one is not looked at in the next.
+  for (std::size_t round = 0; round < kRounds; ++round) {
+    for (std::size_t i = round; i < looked_at.size(); i += kRounds) {
+      if (!compare(looked_at[i])) return is_confirmed;
+    }
+    for (const auto& [pair, said] : evidence) {
+      if (said.compared >= options.enough_compared) known.insert(pair);
     }
   }
   DisjointSets joined(cuts.size() + 1);

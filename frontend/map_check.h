@@ -43,6 +43,8 @@ struct MapCheckOptions {
   double min_confirming_share = 0.8;
   double max_contradicting_share = 0.05;
   double min_confirming_spread = 1.0;
+  /// Of two parts that see much of each other so many comparisons are enough.
+  int enough_compared = 100;
   /// Shares as above, up to which a scan agrees, and share of its returns that
   /// do not lie in the unknown.
   double agreeing_intruders = 0.1;

@@ -841,13 +841,16 @@ void WriteRosbag2(const std::vector<BagRecord>& records,
     begin = std::min(begin, record.time);
     end = std::max(end, record.time);
   }
+  // Of times that cannot be, too.
+  const std::uint64_t duration =
+      static_cast<std::uint64_t>(end) - static_cast<std::uint64_t>(begin);
   std::ostringstream text;
   text << "rosbag2_bagfile_information:\n"
           "  version: 5\n"
           "  storage_identifier: sqlite3\n"
           "  duration:\n"
           "    nanoseconds: "
-       << end - begin
+       << duration
        << "\n  starting_time:\n"
           "    nanoseconds_since_epoch: "
        << begin << "\n  message_count: " << records.size()

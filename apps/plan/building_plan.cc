@@ -37,6 +37,13 @@ constexpr int kRaysAside = 3;
 constexpr int kUnseenRounds = 3;
 // Doors between the same rooms nearer to each other than this are one, m.
 constexpr double kSameDoor = 0.8;
+// Walls with nearly one direction, by its cosine, whose middles are so near to
+// each other, m, along so much, m, are one; what is left of the shorter one is
+// a wall from this length on, m.
+constexpr double kSameWallCosine = 0.996;
+constexpr double kSameWall = 0.1;
+constexpr double kLeastDouble = 0.5;
+constexpr double kLeastRest = 0.1;
 
 // How far the face of a line's wall lies to the left of a piece of it, m: where
 // most of the wall is seen from there.
@@ -445,6 +452,65 @@ Ring BodyOf(const PlanWall& wall) {
           wall.end + wall.left * left, wall.begin + wall.left * left};
 }
 
+std::vector<PlanWall> WithoutDoubles(const std::vector<PlanWall>& walls) {
+  const auto length = [&](std::size_t i) {
+    return (walls[i].end - walls[i].begin).norm();
+  };
+  std::vector<std::size_t> order(walls.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(
+      order.begin(), order.end(),
+      [&](std::size_t a, std::size_t b) { return length(a) > length(b); });
+  // What is left of each wall, along it, m.
+  using Pieces = std::vector<std::pair<double, double>>;
+  std::vector<Pieces> left(walls.size());
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    const std::size_t i = order[place];
+    const PlanWall& wall = walls[i];
+    const Vector2d along = (wall.end - wall.begin).normalized();
+    left[i] = {{0.0, length(i)}};
+    for (std::size_t before = 0; before < place; ++before) {
+      const std::size_t j = order[before];
+      const Vector2d other = (walls[j].end - walls[j].begin).normalized();
+      if (std::abs(along.dot(other)) < kSameWallCosine) continue;
+      for (const auto& [first, last] : left[j]) {
+        const Vector2d begin = walls[j].begin + first * other;
+        const Vector2d end = walls[j].begin + last * other;
+        double from = along.dot(begin - wall.begin);
+        double to = along.dot(end - wall.begin);
+        if (from > to) std::swap(from, to);
+        from = std::max(from, 0.0);
+        to = std::min(to, length(i));
+        if (to - from < kLeastDouble) continue;
+        const Vector2d middle = wall.begin + 0.5 * (from + to) * along;
+        const Vector2d across(-other[1], other[0]);
+        if (std::abs(across.dot(middle - begin)) > kSameWall) continue;
+        Pieces rest;
+        for (const auto& [a, b] : left[i]) {
+          if (std::min(b, from) - a >= kLeastRest) {
+            rest.emplace_back(a, std::min(b, from));
+          }
+          if (b - std::max(a, to) >= kLeastRest) {
+            rest.emplace_back(std::max(a, to), b);
+          }
+        }
+        left[i] = std::move(rest);
+      }
+    }
+  }
+  std::vector<PlanWall> kept;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    const Vector2d along = (walls[i].end - walls[i].begin).normalized();
+    for (const auto& [from, to] : left[i]) {
+      PlanWall piece = walls[i];
+      piece.begin = walls[i].begin + from * along;
+      if (to < length(i)) piece.end = walls[i].begin + to * along;
+      kept.push_back(piece);
+    }
+  }
+  return kept;
+}
+
 const char* RoomKindName(PlanRoom::Kind kind) {
   return kind == PlanRoom::Kind::kCorridor ? "corridor" : "room";
 }
@@ -495,6 +561,7 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
   for (std::size_t i = 0; i < drawn.size(); ++i) {
     ReadLine(drawn[i], sides[i], space, options, &plan);
   }
+  plan.walls = WithoutDoubles(plan.walls);
   DropDoubleDoors(&plan.doors);
   TakePath(path, &plan);
   return plan;

@@ -133,6 +133,31 @@ TEST(BuildingPlanTest, WallsCloseTheRooms) {
 
 // A cupboard hides half of a wall: nothing was seen between its front and the
 // wall, but the room is closed there.
+TEST(BuildingPlanTest, WallsOnEachOtherAreDrawnOnce) {
+  const auto wall = [](double x1, double y1, double x2, double y2) {
+    PlanWall made;
+    made.begin = {x1, y1};
+    made.end = {x2, y2};
+    made.left = made.right = 0.05;
+    return made;
+  };
+  const std::vector<PlanWall> walls = WithoutDoubles({
+      wall(3.0, 0.05, 1.0, 0.05),  // within the next one
+      wall(0.0, 0.0, 5.0, 0.0),    //
+      wall(4.0, 0.04, 6.0, 0.05),  // goes on from it
+      wall(4.7, -0.05, 5.3, 0.0),  // meets it
+      wall(1.0, 0.25, 3.0, 0.25),  // another one
+      wall(2.0, -1.0, 2.0, 1.0),   // crosses it
+  });
+  ASSERT_EQ(walls.size(), 5u);
+  EXPECT_EQ(walls[0].end, Vector2d(5.0, 0.0));
+  EXPECT_NEAR(walls[1].begin[0], 5.0, 1e-3);
+  EXPECT_EQ(walls[1].end, Vector2d(6.0, 0.05));
+  EXPECT_EQ(walls[2].begin, Vector2d(4.7, -0.05));
+  EXPECT_EQ(walls[3].begin, Vector2d(1.0, 0.25));
+  EXPECT_EQ(walls[4].begin, Vector2d(2.0, -1.0));
+}
+
 TEST(BuildingPlanTest, JogsOfWallsAreClosed) {
   Drawing drawing(11.0, 9.0);
   drawing.Room(1.0, 1.0, 9.0, 6.0);

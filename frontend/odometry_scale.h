@@ -32,6 +32,7 @@ class OdometryScale {
   /// The motion that is compared next does not begin at a match.
   void Break() { is_anchored_ = false; }
 
+  /// Writes or reads all of it (state_archive.h).
   template <typename Archive>
   friend void Exchange(Archive& archive, OdometryScale& scale) {
     auto& [value, variance, is_anchored] = scale;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -34,6 +35,16 @@ std::vector<std::int64_t> FileIds(const Graph& graph, const G2oFile* file) {
     if (ids[feature->id] == kNoId) ids[feature->id] = next++;
   }
   return ids;
+}
+
+// The one of a type's formats that has the tag; null when it is its own.
+template <typename Format>
+const Format* FormatOf(const std::vector<Format>& formats,
+                       std::string_view tag) {
+  const auto format =
+      std::find_if(formats.begin(), formats.end(),
+                   [tag](const Format& other) { return other.tag == tag; });
+  return format == formats.end() ? nullptr : &*format;
 }
 
 class Writer {
@@ -195,10 +206,8 @@ class Writer {
       AppendText(line);
     } else {
       SplitG2oLine(line.text, &fields_);
-      const G2oVertexFormat* format = nullptr;
-      for (const G2oVertexFormat& other : feature->type->other_g2o_formats) {
-        if (other.tag == fields_[0]) format = &other;
-      }
+      const G2oVertexFormat* format =
+          FormatOf(feature->type->other_g2o_formats, fields_[0]);
       // The extra fields as they stand there.
       const std::size_t extra =
           format == nullptr ? 0 : format->extra_fields.size();
@@ -267,10 +276,8 @@ class Writer {
       AppendText(line);
     } else {
       SplitG2oLine(line.text, &fields_);
-      const G2oEdgeFormat* format = nullptr;
-      for (const G2oEdgeFormat& other : constraint->type->other_g2o_formats) {
-        if (other.tag == fields_[0]) format = &other;
-      }
+      const G2oEdgeFormat* format =
+          FormatOf(constraint->type->other_g2o_formats, fields_[0]);
       AppendG2oEdge(*constraint, format, Options(), file_ids_, &text_);
       EndLine();
     }

@@ -45,6 +45,8 @@ class OdometryScale {
   // The last key scan's match told how far the robot had gone.
   bool is_anchored_ = false;
 
+  // What wheels are entered wrong by: a few percent, and two or three times
+  // that (the metre of the intel log is 0.964 m) is still possible.
   static constexpr double kPriorSigma = 0.05;
 };
 

@@ -9,7 +9,7 @@
 #include <plumbline/frontend/looks.h>
 #include <plumbline/frontend/place_chain.h>
 #include <plumbline/frontend/wall_views.h>
-#include <plumbline/frontend/way_lengths.h>
+#include <plumbline/pipeline/bent_map.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/log_solver_state.h>
 
@@ -34,16 +34,6 @@ constexpr std::size_t kScansAhead = 64;
 // A second map with less than this share of the first one's length of walls has
 // lost what the scans show, and is no better.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
-
-// Poses of a first map that turn otherwise than refined odometry (or than the
-// poses adjusted by scans alone) on this share of the ways of this length, m,
-// by more than this, rad, are bent: what was taken for one wall was many, as in
-// a round corridor. Over such a way refined odometry is good to a degree or
-// less.
-constexpr double kBentShare = 0.25;
-constexpr double kBentWay = 10.0;
-constexpr double kBent = DegToRad(3.0);
-constexpr double kLongestStep = 1.0;
 
 // Rounds of binding walls to a plan, with EM after each.
 constexpr int kPlanRounds = 6;
@@ -71,40 +61,6 @@ std::vector<BlockedWay> Innermost(const std::vector<BlockedWay>& ways) {
     if (!encloses) left.push_back(way);
   }
   return left;
-}
-
-// Poses of the records by refined odometry alone, from the first of `keys` on.
-std::vector<Pose2> PosesByMotions(const std::vector<KeyScanRecord>& records,
-                                  const std::vector<Pose2>& keys) {
-  std::vector<Pose2> poses;
-  for (std::size_t k = 0; k < records.size(); ++k) {
-    const std::size_t from =
-        records[k].from < 0 ? k - 1 : static_cast<std::size_t>(records[k].from);
-    poses.push_back(k == 0 ? keys.front()
-                           : Compose(poses[from], records[k].motion.mean));
-  }
-  return poses;
-}
-
-// Whether the first poses turn otherwise than the second ones on kBentShare of
-// the ways.
-bool IsBent(const std::vector<Pose2>& first, const std::vector<Pose2>& second) {
-  const std::vector<double> way = WayLengths(second, kLongestStep);
-  std::vector<double> turns;
-  std::size_t begin = 0;
-  for (std::size_t end = 0; end < second.size(); ++end) {
-    if (way[end] - way[begin] < kBentWay) continue;
-    while (way[end] - way[begin + 1] >= kBentWay) ++begin;
-    turns.push_back(
-        std::abs(NormalizeAngle(Between(first[begin], first[end])[2] -
-                                Between(second[begin], second[end])[2])));
-  }
-  if (turns.empty()) return false;
-  const auto bend = turns.begin() + static_cast<std::ptrdiff_t>(
-                                        (1.0 - kBentShare) *
-                                        static_cast<double>(turns.size() - 1));
-  std::nth_element(turns.begin(), bend, turns.end());
-  return *bend > kBent;
 }
 
 void AddLoose(int begin, int end, std::string why, LogSolverResult* result) {

@@ -47,7 +47,8 @@ class ScratchFile {
  public:
   ScratchFile() {
     std::error_code failure;
-    path_ = (fs::temp_directory_path(failure) / "plumbline_sweep_XXXXXX");
+    const fs::path folder = fs::temp_directory_path(failure);
+    path_ = (folder / "plumbline_sweep_XXXXXX").string();
     const int descriptor = failure ? -1 : mkstemp(path_.data());
     if (descriptor < 0) {
       throw Error(

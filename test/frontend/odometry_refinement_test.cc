@@ -42,6 +42,27 @@ std::vector<WallEnds> Hall() {
   return walls;
 }
 
+// Walls of pillars, none like another, on both sides of the x axis in a hall of
+// 20 m by 6 m with its middle at the origin: those with their middles beyond
+// `least_x`.
+std::vector<WallEnds> Pillars(double least_x) {
+  std::vector<WallEnds> walls;
+  Noise layout(3);
+  for (double x = -8.5; x < 9.0;
+       x += 1.8 + 0.6 * std::abs(layout.Normal(1.0))) {
+    const double y = layout.Normal(1.0) > 0.0 ? 1.7 : -1.7;
+    const Pose2 place(x, y + 0.2 * layout.Normal(1.0),
+                      0.5 * layout.Normal(1.0));
+    const double width = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
+    const double depth = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
+    if (x <= least_x) continue;
+    for (const WallEnds& side : testing::Moved(Room(width, depth), place)) {
+      walls.push_back(side);
+    }
+  }
+  return walls;
+}
+
 // Drives along relative motions; odometry reports `reported` in their place.
 struct Drive {
   std::vector<Pose2> truth;
@@ -817,17 +838,9 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
       {{0.0, -3.0}, {0.0, -1.2}},    {{0.0, -1.2}, {22.0, -1.2}},
       {{22.0, -1.2}, {22.0, 1.2}},   {{22.0, 1.2}, {0.0, 1.2}},
       {{0.0, 1.2}, {0.0, 3.0}},      {{0.0, 3.0}, {-20.0, 3.0}}};
-  Noise layout(3);
-  for (double x = -18.5; x < -1.0;
-       x += 1.8 + 0.6 * std::abs(layout.Normal(1.0))) {
-    const double y = layout.Normal(1.0) > 0.0 ? 1.7 : -1.7;
-    const Pose2 place(x, y + 0.2 * layout.Normal(1.0),
-                      0.5 * layout.Normal(1.0));
-    const double width = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
-    const double depth = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
-    for (const WallEnds& side : testing::Moved(Room(width, depth), place)) {
-      walls.push_back(side);
-    }
+  for (const WallEnds& side :
+       testing::Moved(Pillars(-20.0), {-10.0, 0.0, 0.0})) {
+    walls.push_back(side);
   }
   Laser laser = FullCircle();
   laser.beams = 240;
@@ -909,23 +922,10 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
 // first one: of all that it sees there one window fits, and that is too little
 // for a part of many.
 TEST(OdometryRefinerTest, OneWindowThatFitsDoesNotPlaceALongPart) {
-  // A hall of 20 m by 6 m with pillars, none like another.
   std::vector<WallEnds> hall = Room(20.0, 6.0);
-  std::vector<WallEnds> there;
-  Noise layout(3);
-  for (double x = -8.5; x < 9.0;
-       x += 1.8 + 0.6 * std::abs(layout.Normal(1.0))) {
-    const double y = layout.Normal(1.0) > 0.0 ? 1.7 : -1.7;
-    const Pose2 place(x, y + 0.2 * layout.Normal(1.0),
-                      0.5 * layout.Normal(1.0));
-    const double width = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
-    const double depth = 0.4 + 0.3 * std::abs(layout.Normal(1.0));
-    for (const WallEnds& side : testing::Moved(Room(width, depth), place)) {
-      hall.push_back(side);
-      if (x > 0.0) there.push_back(side);
-    }
-  }
+  for (const WallEnds& side : Pillars(-10.0)) hall.push_back(side);
   // The right half of the hall, at the end of a jagged corridor.
+  std::vector<WallEnds> there = Pillars(0.0);
   there.push_back({{0.0, 3.0}, {10.0, 3.0}});
   there.push_back({{10.0, 3.0}, {10.0, -3.0}});
   there.push_back({{10.0, -3.0}, {0.0, -3.0}});

@@ -335,7 +335,6 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
                                  double innovation, MatchResult* match,
                                  Outcome* outcome) const {
   const TrackingOptions& tracking = options_.tracking;
-  const bool agrees = innovation <= tracking.max_innovation;
   const Eigen::Vector2d laser = scan.laser_offset.head<2>();
   std::vector<bool> intruders;
   const ScanAgreement there =
@@ -346,6 +345,11 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
   if (there.intruders >= kLeastIntruders && !track_.after_gap) {
     MatchWithoutIntruders(intruders, prior, laser, match, &here);
   }
+  // Few returns fit in many places: they may leave odometry by little.
+  const bool agrees =
+      innovation <=
+      tracking.max_innovation *
+          std::min(1.0, static_cast<double>(here.hits) / tracking.min_hits);
   // What contradicted the scan before already is no news.
   const double before = track_.after_gap
                             ? SeenThrough(track_.matcher.Compare(

@@ -69,7 +69,8 @@ struct TrackingOptions {
   /// must fit at a pose that odometry speaks against.
   double odometry_tail = 9.0;
   /// Returns that lie 0.15 m apart or more that a match which leaves odometry
-  /// by more than that has to have on what the reference has seen.
+  /// by more than that has to have on what the reference has seen. With fewer
+  /// it may leave odometry by less, in proportion. At least 1.
   int min_hits = 15;
   /// A time between scans that is longer than this, s, and this many times the
   /// usual one is a gap.
@@ -136,10 +137,11 @@ struct OdometryRefinementOptions {
   ClutterOptions clutter;
   /// A match that is not good, or whose chi-square against odometry is larger
   /// than this, is asked for without the returns on clutter, too, when they
-  /// have more than this share. What the rest says stands when the two lie
-  /// farther apart than this, m and rad: something moves.
+  /// have more than this share: along a corridor a single person may be all
+  /// that says how far the robot went. What the rest says stands when the two
+  /// lie farther apart than this, m and rad: something moves.
   double clutter_innovation = 4.0;
-  double max_clutter = 0.1;
+  double max_clutter = 0.02;
   double clutter_distance = 0.05;
   double clutter_rotation = DegToRad(1.5);
   /// Scans after that in which clutter is distrusted and kept out of the

@@ -363,6 +363,80 @@ TEST(OdometryRefinerTest, WheelsThatSlipAreCorrected) {
   }
 }
 
+// A robot that sees next to nothing in a turn: a board, in front of the wall
+// that it has seen, and something that stands free. The board fits the wall, a
+// fifth of a radian from where odometry has it; one board is too little to say
+// so.
+TEST(OdometryRefinerTest, FewReturnsLeaveOdometryByLittle) {
+  const double slant = DegToRad(17.0);
+  const Eigen::Vector2d middle(-2.0, 3.85);
+  const Eigen::Vector2d half(0.25 * std::cos(slant), 0.25 * std::sin(slant));
+  const std::vector<WallEnds> board = {{middle - half, middle + half}};
+  constexpr int kTurns = 8;
+  const auto heading_error = [&](int min_hits) {
+    OdometryRefinementOptions options = RefinerOptions();
+    options.tracking.min_hits = min_hits;
+    OdometryRefiner refiner(options);
+    RefinedScan last;
+    for (int i = 0; i < kTurns; ++i) {
+      const Pose2 truth(-2.0, 2.5, 0.5 * kPi - DegToRad(15.0) * (7 - i));
+      Scan scan =
+          MakeScan(i + 1 < kTurns ? Hall() : board, truth, FullCircle());
+      if (i + 1 == kTurns) {
+        // Behind the robot.
+        std::fill_n(scan.ranges.begin() + 40, 20, 0.7f);
+      }
+      scan.timestamp = 100.0 + 0.2 * i;
+      last = refiner.Process(scan);
+    }
+    return HeadingError(last.pose, Pose2(-2.0, 2.5, 0.5 * kPi));
+  };
+  EXPECT_LT(heading_error(OdometryRefinementOptions().tracking.min_hits),
+            DegToRad(1.0));
+  // Where a single return is enough it is believed.
+  EXPECT_GT(heading_error(1), DegToRad(8.0));
+}
+
+// Somebody walks ahead of the robot along a bare corridor, where nothing else
+// says how far it went: a tenth of the returns and less, and yet they would
+// hold the robot back for as long as they are taken for a wall.
+TEST(OdometryRefinerTest, OnePersonInACorridorDoesNotHoldTheRobotBack) {
+  const std::vector<WallEnds> walls = {{{-20.0, 1.0}, {20.0, 1.0}},
+                                       {{-20.0, -1.0}, {20.0, -1.0}}};
+  const auto error = [&](double max_clutter, double* share) {
+    OdometryRefinementOptions options = RefinerOptions();
+    options.max_clutter = max_clutter;
+    OdometryRefiner refiner(options);
+    Laser laser;
+    laser.maximum_range = 8.0;
+    Pose2 pose(-5.0, 0.0, 0.0);
+    RefinedScan last;
+    for (int i = 0; i < 80; ++i) {
+      if (i > 0) pose = Compose(pose, Pose2(0.05, 0.0, 0.0));
+      std::vector<WallEnds> all = walls;
+      for (const WallEnds& side :
+           testing::Moved(Room(0.2, 0.3), Compose(pose, {1.5, 0.2, 0.0}))) {
+        all.push_back(side);
+      }
+      Scan scan = MakeScan(all, pose, laser);
+      scan.timestamp = 100.0 + 0.2 * i;
+      std::vector<bool> clutter;
+      const std::vector<ScanPoint> points = testing::PointsOf(scan);
+      *share = MarkClutter(scan, points, options.clutter, &clutter) /
+               static_cast<double>(points.size());
+      last = refiner.Process(scan);
+    }
+    return PositionError(last.pose, pose);
+  };
+  const double usual = OdometryRefinementOptions().max_clutter;
+  double share = 0.0;
+  EXPECT_LT(error(usual, &share), 0.2);
+  EXPECT_GT(share, usual);
+  EXPECT_LT(share, 0.1);
+  // Where a person is too little to be asked about.
+  EXPECT_GT(error(0.1, &share), 0.5);
+}
+
 TEST(OdometryRefinerTest, NoOdometryAtAll) {
   std::vector<Pose2> motions;
   for (int i = 0; i < 40; ++i) {

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -472,15 +473,22 @@ TEST_F(LogSolverTest, ClosuresOfTheFirstMapAreKept) {
     const Pose2 place =
         Compose(result.trajectory[static_cast<std::size_t>(closure.scan)],
                 closure.place);
-    on_walls += std::any_of(walls.begin(), walls.end(), [&](const Wall& wall) {
+    // How far beyond its ends the nearest wall in line with it is met, m.
+    double beyond = std::numeric_limits<double>::infinity();
+    for (const Wall& wall : walls) {
+      if (std::abs(wall.Across(place.head<2>())) >= 0.1 ||
+          std::abs(NormalizeAngle(wall.angle - place[2])) >= 0.1) {
+        continue;
+      }
       const double along = wall.Along(place.head<2>());
-      return std::abs(wall.Across(place.head<2>())) < 0.2 &&
-             along > wall.begin - 0.5 && along < wall.end + 0.5 &&
-             std::abs(NormalizeAngle(wall.angle - place[2])) < 0.1;
-    });
+      beyond = std::min(beyond, std::max(wall.begin - along, along - wall.end));
+    }
+    EXPECT_LT(beyond, 1.5) << place.transpose();
+    on_walls += beyond < 0.5;
   }
   EXPECT_GT(holding, 5);
-  // Walls end where they were seen: one may have lost the part that it closed.
+  // A stub between a door and a corner, at which one was closed, is too short
+  // for a wall of the second map; the wall beside the door is in line with it.
   EXPECT_GE(on_walls, holding - 1);
 }
 

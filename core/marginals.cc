@@ -2,10 +2,11 @@
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/information.h>
+#include <plumbline/core/information_factor.h>
 #include <plumbline/core/marginals.h>
 #include <plumbline/factors/pose2.h>
 
-#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -16,17 +17,6 @@
 
 namespace plumbline {
 namespace {
-
-using SparseMatrix = Eigen::SparseMatrix<double>;
-
-// Information of the prior on directions that have none.
-constexpr double kPriorInformation = 1.0 / Marginals::kUndeterminedVariance;
-// Pivots below these fractions of the diagonal are rounding, and a prior of
-// that size stands out from rounding.
-constexpr double kPivotRounding = 1e-13;
-constexpr double kPriorOverRounding = 10.0;
-// Every pass over the pivots can only add priors, and few are needed.
-constexpr int kMaxPasses = 20;
 
 std::string Describe(const Feature& feature) {
   return feature.type->name + " " + std::to_string(feature.id);
@@ -67,6 +57,12 @@ struct Marginals::Impl {
     Eigen::MatrixXd lift;
     Pose2 pose = Pose2::Zero();
     std::size_t part = 0;
+
+    // In the normal matrix; none when it is constant.
+    InformationRows rows() const {
+      if (column < 0) return {};
+      return {column, tangent_size};
+    }
   };
 
   using Linearizer = std::function<LinearizedConstraint(const Constraint&)>;
@@ -189,6 +185,7 @@ struct Marginals::Impl {
     }
   }
 
+  // J' J of the constraints in the tangent spaces of the features.
   void Factorize(const Linearizer& linearize, const std::vector<FeatureId>& ids,
                  const std::vector<const Constraint*>& constraints) {
     for (const FeatureId id : ids) {
@@ -226,47 +223,9 @@ struct Marginals::Impl {
         }
       }
     }
-    SparseMatrix normal(columns, columns);
+    Eigen::SparseMatrix<double> normal(columns, columns);
     normal.setFromTriplets(triplets.begin(), triplets.end());
-    AddPriors(&normal);
-  }
-
-  // Factorizes, with priors where the pivots show that nothing is known.
-  void AddPriors(SparseMatrix* normal) {
-    const Eigen::VectorXd diagonal = normal->diagonal();
-    Eigen::VectorXd priors(columns);
-    for (int i = 0; i < columns; ++i) {
-      // Exact zeros would end a factorization early: this much is rounding.
-      priors[i] = diagonal[i] > 0.0 ? 1e-2 * kPivotRounding * diagonal[i]
-                                    : kPriorInformation;
-      normal->coeffRef(i, i) += priors[i];
-    }
-    ldlt.analyzePattern(*normal);
-    for (int pass = 0; pass < kMaxPasses; ++pass) {
-      ldlt.factorize(*normal);
-      bool is_determined = ldlt.info() == Eigen::Success;
-      const Eigen::VectorXd& pivots = ldlt.vectorD();
-      for (int k = 0; k < columns; ++k) {
-        const int i = ldlt.permutationPinv().indices()[k];
-        const double rounding = kPivotRounding * diagonal[i];
-        const double prior =
-            std::max(kPriorInformation, kPriorOverRounding * rounding);
-        if (pivots[k] > std::max(rounding, 1e-2 * kPriorInformation) ||
-            priors[i] >= prior) {
-          continue;
-        }
-        is_determined = false;
-        normal->coeffRef(i, i) += prior;
-        priors[i] += prior;
-        // Exactly zero: that is where the factorization ended.
-        if (pivots[k] == 0.0) break;
-      }
-      if (is_determined) return;
-    }
-    if (ldlt.info() != Eigen::Success) {
-      throw PLUMBLINE_ERROR("the normal matrix cannot be factorized",
-                            "information that is finite and not negative");
-    }
+    factor.Factorize(std::move(normal), kUndeterminedVariance);
   }
 
   const Entry* Find(FeatureId id) const {
@@ -318,67 +277,6 @@ struct Marginals::Impl {
     }
   }
 
-  // The inverse times `right` (columns x any), which is zero but in the rows of
-  // `sources`; right in the rows of `sources` and `wanted` only. What is zero,
-  // and what nobody wants, is not computed: substitution goes up the
-  // elimination tree from the sources and comes down to what is wanted, which
-  // in a thin graph is a small part of the factor.
-  // `Right` has a fixed number of columns where the caller knows it.
-  template <typename Right>
-  Right SolveAt(const Right& right, const std::vector<const Entry*>& sources,
-                const std::vector<const Entry*>& wanted) const {
-    constexpr int kColumns = Right::ColsAtCompileTime;
-    using RowMajor =
-        Eigen::Matrix<double, Eigen::Dynamic, kColumns, Eigen::RowMajor>;
-    const auto& factor = ldlt.matrixL().nestedExpression();
-    const Eigen::VectorXd& pivots = ldlt.vectorD();
-    const auto& position = ldlt.permutationP().indices();
-    const int* starts = factor.outerIndexPtr();
-    const int* rows = factor.innerIndexPtr();
-    const double* values = factor.valuePtr();
-    RowMajor x = RowMajor::Zero(columns, right.cols());
-    std::vector<bool> is_on_way(static_cast<std::size_t>(columns), false);
-    std::vector<int> way;
-    const auto climb = [&](const Entry& entry) {
-      for (int r = 0; entry.column >= 0 && r < entry.tangent_size; ++r) {
-        for (int j = position[entry.column + r]; j >= 0 && !is_on_way[j];
-             j = starts[j] < starts[j + 1] ? rows[starts[j]] : -1) {
-          is_on_way[j] = true;
-          way.push_back(j);
-        }
-      }
-    };
-    for (const Entry* entry : sources) {
-      for (int r = 0; entry->column >= 0 && r < entry->tangent_size; ++r) {
-        x.row(position[entry->column + r]) = right.row(entry->column + r);
-      }
-      climb(*entry);
-    }
-    std::sort(way.begin(), way.end());
-    for (const int j : way) {
-      for (int p = starts[j]; p < starts[j + 1]; ++p) {
-        x.row(rows[p]) -= values[p] * x.row(j);
-      }
-    }
-    for (const int j : way) x.row(j) /= pivots[j];
-    for (const Entry* entry : wanted) climb(*entry);
-    std::sort(way.begin(), way.end(), std::greater<int>());
-    for (const int j : way) {
-      for (int p = starts[j]; p < starts[j + 1]; ++p) {
-        x.row(j) -= values[p] * x.row(rows[p]);
-      }
-    }
-    Right solved = Right::Zero(columns, right.cols());
-    for (const auto* list : {&sources, &wanted}) {
-      for (const Entry* entry : *list) {
-        for (int r = 0; entry->column >= 0 && r < entry->tangent_size; ++r) {
-          solved.row(entry->column + r) = x.row(position[entry->column + r]);
-        }
-      }
-    }
-    return solved;
-  }
-
   // sum of B_i Cov(i, j) B_j' over features and their Jacobians (rows x
   // parameters).
   Eigen::MatrixXd Propagate(
@@ -392,9 +290,9 @@ struct Marginals::Impl {
           (jacobian * entry->lift).transpose();
     }
     if (columns == 0) return Eigen::MatrixXd::Zero(rows, rows);
-    std::vector<const Entry*> at;
-    for (const auto& term : terms) at.push_back(term.first);
-    const Eigen::MatrixXd solved = SolveAt(right, at, at);
+    std::vector<InformationRows> at;
+    for (const auto& term : terms) at.push_back(term.first->rows());
+    const Eigen::MatrixXd solved = factor.SolveAt(right, at, at);
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(rows, rows);
     for (const auto& [entry, jacobian] : terms) {
       if (entry->column < 0) continue;
@@ -415,51 +313,6 @@ struct Marginals::Impl {
     return blocks.emplace(id, Propagate({{&entry, identity}})).first->second;
   }
 
-  // Entries of the inverse at the places where the factor has entries
-  // (Takahashi, Fagan and Chen 1973), from the last column to the first: below
-  // the diagonal in the pattern of L, and the diagonal.
-  void InvertOnPattern(std::vector<double>* below,
-                       Eigen::VectorXd* diagonal) const {
-    const auto& factor = ldlt.matrixL().nestedExpression();
-    const Eigen::VectorXd& pivots = ldlt.vectorD();
-    const int* starts = factor.outerIndexPtr();
-    const int* rows = factor.innerIndexPtr();
-    const double* values = factor.valuePtr();
-    below->assign(static_cast<std::size_t>(starts[columns]), 0.0);
-    diagonal->resize(columns);
-    // Of the column at hand: L by row, and what the entries of the inverse add
-    // up to.
-    std::vector<double> l(static_cast<std::size_t>(columns), 0.0);
-    std::vector<bool> is_in(static_cast<std::size_t>(columns), false);
-    std::vector<double> sum(static_cast<std::size_t>(columns), 0.0);
-    for (int j = columns - 1; j >= 0; --j) {
-      for (int p = starts[j]; p < starts[j + 1]; ++p) {
-        l[rows[p]] = values[p];
-        is_in[rows[p]] = true;
-        sum[rows[p]] = 0.0;
-      }
-      for (int p = starts[j]; p < starts[j + 1]; ++p) {
-        const int k = rows[p];
-        sum[k] += (*diagonal)[k] * l[k];
-        for (int q = starts[k]; q < starts[k + 1]; ++q) {
-          const int i = rows[q];
-          if (!is_in[i]) continue;
-          const double z = (*below)[static_cast<std::size_t>(q)];
-          sum[i] += z * l[k];
-          sum[k] += z * l[i];
-        }
-      }
-      double z_jj = 1.0 / pivots[j];
-      for (int p = starts[j]; p < starts[j + 1]; ++p) {
-        const double z = -sum[rows[p]];
-        (*below)[static_cast<std::size_t>(p)] = z;
-        z_jj -= values[p] * z;
-        is_in[rows[p]] = false;
-      }
-      (*diagonal)[j] = z_jj;
-    }
-  }
-
   void ComputeBlocks(const std::vector<FeatureId>& ids) {
     std::vector<FeatureId> missing;
     for (const FeatureId id : ids) {
@@ -471,34 +324,13 @@ struct Marginals::Impl {
     // column of a typical elimination front.
     constexpr std::size_t kFewFeatures = 10;
     if (missing.size() < kFewFeatures) return;
-    std::vector<double> below;
-    Eigen::VectorXd diagonal;
-    InvertOnPattern(&below, &diagonal);
-    const auto& factor = ldlt.matrixL().nestedExpression();
-    const auto& position = ldlt.permutationP().indices();
-    for (const FeatureId id : missing) {
-      const Entry& entry = *Find(id);
-      Eigen::MatrixXd tangent(entry.tangent_size, entry.tangent_size);
-      for (int r = 0; r < entry.tangent_size; ++r) {
-        for (int c = 0; c <= r; ++c) {
-          const int a = position[entry.column + r];
-          const int b = position[entry.column + c];
-          if (a == b) {
-            tangent(r, c) = diagonal[a];
-            continue;
-          }
-          const int* begin =
-              factor.innerIndexPtr() + factor.outerIndexPtr()[std::min(a, b)];
-          const int* end = factor.innerIndexPtr() +
-                           factor.outerIndexPtr()[std::min(a, b) + 1];
-          const int* found = std::lower_bound(begin, end, std::max(a, b));
-          // Parameters of one feature are coupled in the pattern.
-          tangent(r, c) =
-              below[static_cast<std::size_t>(found - factor.innerIndexPtr())];
-          tangent(c, r) = tangent(r, c);
-        }
-      }
-      blocks.emplace(id, entry.lift * tangent * entry.lift.transpose());
+    std::vector<InformationRows> rows;
+    for (const FeatureId id : missing) rows.push_back(Find(id)->rows());
+    const std::vector<Eigen::MatrixXd> tangents = factor.InverseBlocks(rows);
+    for (std::size_t i = 0; i < missing.size(); ++i) {
+      const Entry& entry = *Find(missing[i]);
+      blocks.emplace(missing[i],
+                     entry.lift * tangents[i] * entry.lift.transpose());
     }
   }
 
@@ -506,9 +338,9 @@ struct Marginals::Impl {
   std::vector<std::unique_ptr<Entry>> entries;
   // By root of a part.
   std::vector<bool> has_gauge;
+  // Of the normal matrix.
   int columns = 0;
-  Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<int>>
-      ldlt;
+  InformationFactor factor;
   // Covariances that were asked for.
   std::map<FeatureId, Eigen::MatrixXd> blocks;
 };
@@ -571,9 +403,9 @@ std::vector<Eigen::Matrix3d> Marginals::RelativeCovariances(
   if (a.column >= 0) {
     ThreeColumns right = ThreeColumns::Zero(impl_->columns, 3);
     right.middleRows(a.column, a.tangent_size) = a.lift.transpose();
-    std::vector<const Impl::Entry*> wanted = {&a};
-    for (const FeatureId id : to) wanted.push_back(&impl_->Get(id));
-    columns = impl_->SolveAt(right, {&a}, wanted);
+    std::vector<InformationRows> wanted = {a.rows()};
+    for (const FeatureId id : to) wanted.push_back(impl_->Get(id).rows());
+    columns = impl_->factor.SolveAt(right, {a.rows()}, wanted);
     own = a.lift * columns.middleRows(a.column, a.tangent_size);
   }
   std::vector<Eigen::Matrix3d> covariances;

@@ -1,0 +1,201 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/information_factor.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Pivots below these fractions of the diagonal are rounding, and a prior of
+// that size stands out from rounding.
+constexpr double kPivotRounding = 1e-13;
+constexpr double kPriorOverRounding = 10.0;
+// Every pass over the pivots can only add priors, and few are needed.
+constexpr int kMaxPasses = 20;
+
+}  // namespace
+
+void InformationFactor::Factorize(Eigen::SparseMatrix<double> information,
+                                  double prior_variance) {
+  const double prior_information = 1.0 / prior_variance;
+  size_ = static_cast<int>(information.rows());
+  const Eigen::VectorXd diagonal = information.diagonal();
+  Eigen::VectorXd priors(size_);
+  for (int i = 0; i < size_; ++i) {
+    // Exact zeros would end a factorization early: this much is rounding.
+    priors[i] = diagonal[i] > 0.0 ? 1e-2 * kPivotRounding * diagonal[i]
+                                  : prior_information;
+    information.coeffRef(i, i) += priors[i];
+  }
+  ldlt_.analyzePattern(information);
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    ldlt_.factorize(information);
+    bool is_determined = ldlt_.info() == Eigen::Success;
+    const Eigen::VectorXd& pivots = ldlt_.vectorD();
+    for (int k = 0; k < size_; ++k) {
+      const int i = ldlt_.permutationPinv().indices()[k];
+      const double rounding = kPivotRounding * diagonal[i];
+      const double prior =
+          std::max(prior_information, kPriorOverRounding * rounding);
+      if (pivots[k] > std::max(rounding, 1e-2 * prior_information) ||
+          priors[i] >= prior) {
+        continue;
+      }
+      is_determined = false;
+      information.coeffRef(i, i) += prior;
+      priors[i] += prior;
+      // Exactly zero: that is where the factorization ended.
+      if (pivots[k] == 0.0) break;
+    }
+    if (is_determined) return;
+  }
+  if (ldlt_.info() != Eigen::Success) {
+    throw PLUMBLINE_ERROR("the normal matrix cannot be factorized",
+                          "information that is finite and not negative");
+  }
+}
+
+template <typename Right>
+Right InformationFactor::SolveAt(
+    const Right& right, const std::vector<InformationRows>& sources,
+    const std::vector<InformationRows>& wanted) const {
+  constexpr int kColumns = Right::ColsAtCompileTime;
+  using RowMajor =
+      Eigen::Matrix<double, Eigen::Dynamic, kColumns, Eigen::RowMajor>;
+  const auto& factor = ldlt_.matrixL().nestedExpression();
+  const Eigen::VectorXd& pivots = ldlt_.vectorD();
+  const auto& position = ldlt_.permutationP().indices();
+  const int* starts = factor.outerIndexPtr();
+  const int* rows = factor.innerIndexPtr();
+  const double* values = factor.valuePtr();
+  RowMajor x = RowMajor::Zero(size_, right.cols());
+  std::vector<bool> is_on_way(static_cast<std::size_t>(size_), false);
+  std::vector<int> way;
+  const auto climb = [&](const InformationRows& block) {
+    for (int r = block.begin; r < block.begin + block.count; ++r) {
+      for (int j = position[r]; j >= 0 && !is_on_way[j];
+           j = starts[j] < starts[j + 1] ? rows[starts[j]] : -1) {
+        is_on_way[j] = true;
+        way.push_back(j);
+      }
+    }
+  };
+  for (const InformationRows& block : sources) {
+    for (int r = block.begin; r < block.begin + block.count; ++r) {
+      x.row(position[r]) = right.row(r);
+    }
+    climb(block);
+  }
+  std::sort(way.begin(), way.end());
+  for (const int j : way) {
+    for (int p = starts[j]; p < starts[j + 1]; ++p) {
+      x.row(rows[p]) -= values[p] * x.row(j);
+    }
+  }
+  for (const int j : way) x.row(j) /= pivots[j];
+  for (const InformationRows& block : wanted) climb(block);
+  std::sort(way.begin(), way.end(), std::greater<int>());
+  for (const int j : way) {
+    for (int p = starts[j]; p < starts[j + 1]; ++p) {
+      x.row(j) -= values[p] * x.row(rows[p]);
+    }
+  }
+  Right solved = Right::Zero(size_, right.cols());
+  for (const auto* list : {&sources, &wanted}) {
+    for (const InformationRows& block : *list) {
+      for (int r = block.begin; r < block.begin + block.count; ++r) {
+        solved.row(r) = x.row(position[r]);
+      }
+    }
+  }
+  return solved;
+}
+
+template Eigen::MatrixXd InformationFactor::SolveAt(
+    const Eigen::MatrixXd&, const std::vector<InformationRows>&,
+    const std::vector<InformationRows>&) const;
+template Eigen::Matrix<double, Eigen::Dynamic, 3> InformationFactor::SolveAt(
+    const Eigen::Matrix<double, Eigen::Dynamic, 3>&,
+    const std::vector<InformationRows>&,
+    const std::vector<InformationRows>&) const;
+
+// Takahashi, Fagan and Chen 1973: from the last column to the first.
+InformationFactor::InverseOnPattern InformationFactor::InvertOnPattern() const {
+  const auto& factor = ldlt_.matrixL().nestedExpression();
+  const Eigen::VectorXd& pivots = ldlt_.vectorD();
+  const int* starts = factor.outerIndexPtr();
+  const int* rows = factor.innerIndexPtr();
+  const double* values = factor.valuePtr();
+  InverseOnPattern inverse;
+  inverse.below.assign(static_cast<std::size_t>(starts[size_]), 0.0);
+  inverse.diagonal.resize(size_);
+  // Of the column at hand: L by row, and what the entries of the inverse add
+  // up to.
+  std::vector<double> l(static_cast<std::size_t>(size_), 0.0);
+  std::vector<bool> is_in(static_cast<std::size_t>(size_), false);
+  std::vector<double> sum(static_cast<std::size_t>(size_), 0.0);
+  for (int j = size_ - 1; j >= 0; --j) {
+    for (int p = starts[j]; p < starts[j + 1]; ++p) {
+      l[rows[p]] = values[p];
+      is_in[rows[p]] = true;
+      sum[rows[p]] = 0.0;
+    }
+    for (int p = starts[j]; p < starts[j + 1]; ++p) {
+      const int k = rows[p];
+      sum[k] += inverse.diagonal[k] * l[k];
+      for (int q = starts[k]; q < starts[k + 1]; ++q) {
+        const int i = rows[q];
+        if (!is_in[i]) continue;
+        const double z = inverse.below[static_cast<std::size_t>(q)];
+        sum[i] += z * l[k];
+        sum[k] += z * l[i];
+      }
+    }
+    double z_jj = 1.0 / pivots[j];
+    for (int p = starts[j]; p < starts[j + 1]; ++p) {
+      const double z = -sum[rows[p]];
+      inverse.below[static_cast<std::size_t>(p)] = z;
+      z_jj -= values[p] * z;
+      is_in[rows[p]] = false;
+    }
+    inverse.diagonal[j] = z_jj;
+  }
+  return inverse;
+}
+
+std::vector<Eigen::MatrixXd> InformationFactor::InverseBlocks(
+    const std::vector<InformationRows>& blocks) const {
+  const InverseOnPattern inverse = InvertOnPattern();
+  const auto& factor = ldlt_.matrixL().nestedExpression();
+  const auto& position = ldlt_.permutationP().indices();
+  std::vector<Eigen::MatrixXd> found;
+  found.reserve(blocks.size());
+  for (const InformationRows& rows : blocks) {
+    Eigen::MatrixXd block(rows.count, rows.count);
+    for (int r = 0; r < rows.count; ++r) {
+      for (int c = 0; c <= r; ++c) {
+        const int a = position[rows.begin + r];
+        const int b = position[rows.begin + c];
+        if (a == b) {
+          block(r, c) = inverse.diagonal[a];
+          continue;
+        }
+        const int* begin =
+            factor.innerIndexPtr() + factor.outerIndexPtr()[std::min(a, b)];
+        const int* end =
+            factor.innerIndexPtr() + factor.outerIndexPtr()[std::min(a, b) + 1];
+        const int* entry = std::lower_bound(begin, end, std::max(a, b));
+        block(r, c) = inverse.below[static_cast<std::size_t>(
+            entry - factor.innerIndexPtr())];
+        block(c, r) = block(r, c);
+      }
+    }
+    found.push_back(std::move(block));
+  }
+  return found;
+}
+
+}  // namespace plumbline

@@ -1,11 +1,12 @@
 #include <plumbline/core/wall.h>
 #include <plumbline/detectors/parameters.h>
 #include <plumbline/detectors/rectangle.h>
+#include <plumbline/detectors/rectangle_fit.h>
+#include <plumbline/detectors/visible_wall.h>
+#include <plumbline/detectors/wall_corners.h>
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,20 +14,12 @@
 #include <memory>
 #include <optional>
 #include <set>
-#include <tuple>
 #include <utility>
 
 namespace plumbline {
 namespace {
 
 constexpr char kName[] = "rectangle";
-constexpr int kNumSides = 4;
-// The sides as the relations name them, counterclockwise.
-constexpr std::array<double, kNumSides> kSides = {0.0, 0.5 * kPi, kPi,
-                                                  -0.5 * kPi};
-// From a corner so many of the nearest on each wall are tried, so that cost
-// does not grow with the square of the rooms along a corridor.
-constexpr std::size_t kMaxTries = 16;
 // Two rectangles with more than this part of the smaller one in common overlap.
 constexpr double kOverlap = 0.1;
 
@@ -34,154 +27,11 @@ double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-// A side of a room, or a part of one: the visible part of a segment or line.
-struct Face {
-  const Feature* feature = nullptr;
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  // rad, and as a unit vector.
-  double angle = 0.0;
-  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();
-  double half_length = 0.0;
-};
-
-// False when it is no wall, or none with a finite visible part.
-bool MakeFace(const Feature& feature, Face* face) {
-  const std::optional<Wall> wall = WallOf(feature);
-  if (!wall) return false;
-  face->feature = &feature;
-  face->middle = wall->Middle();
-  face->angle = wall->angle;
-  face->direction = wall->direction;
-  face->half_length = 0.5 * wall->length();
-  return face->half_length > 0.0 && std::isfinite(face->half_length) &&
-         std::isfinite(face->angle) && face->middle.allFinite();
-}
-
-// Where a wall lies along a line through `origin` in the direction `along`.
-Interval IntervalAlong(const Face& wall, const Eigen::Vector2d& origin,
-                       const Eigen::Vector2d& along) {
-  const double middle = along.dot(wall.middle - origin);
-  const double reach = wall.half_length * std::abs(along.dot(wall.direction));
-  return {middle - reach, middle + reach};
-}
-
-// Whether two walls on one line are two faces of a wall rather than two parts
-// of it: half of the shorter one lies beside the other.
-bool RunsBeside(const Interval& a, const Interval& b) {
-  return Overlap(a, b) > 0.5 * std::min(a.second - a.first, b.second - b.first);
-}
-
-// Walls by place: all that may pass near a point.
-class WallGrid {
- public:
-  explicit WallGrid(double cell) : cell_(cell) {}
-
-  // `reach`: how far the wall counts past its ends.
-  void Add(int index, const Face& wall, double reach) {
-    Visit(wall, reach, [&](const Cell& cell) {
-      std::vector<int>& walls = cells_[cell];
-      if (walls.empty() || walls.back() != index) walls.push_back(index);
-    });
-  }
-
-  // Indices of the walls that pass within a cell of the wall, ascending.
-  std::vector<int> Near(const Face& wall, double reach) const {
-    std::set<int> found;
-    std::set<Cell> seen;
-    Visit(wall, reach, [&](const Cell& center) {
-      for (std::int64_t x = center.first - 1; x <= center.first + 1; ++x) {
-        for (std::int64_t y = center.second - 1; y <= center.second + 1; ++y) {
-          if (!seen.insert({x, y}).second) continue;
-          const auto cell = cells_.find({x, y});
-          if (cell == cells_.end()) continue;
-          found.insert(cell->second.begin(), cell->second.end());
-        }
-      }
-    });
-    return {found.begin(), found.end()};
-  }
-
- private:
-  using Cell = std::pair<std::int64_t, std::int64_t>;
-
-  template <typename Visitor>
-  void Visit(const Face& wall, double reach, const Visitor& visit) const {
-    const double end = wall.half_length + reach;
-    const int steps = 1 + static_cast<int>(std::ceil(2.0 * end / cell_));
-    for (int i = 0; i <= steps; ++i) {
-      const Eigen::Vector2d point =
-          wall.middle +
-          end * (2.0 * static_cast<double>(i) / steps - 1.0) * wall.direction;
-      visit({static_cast<std::int64_t>(std::floor(point.x() / cell_)),
-             static_cast<std::int64_t>(std::floor(point.y() / cell_))});
-    }
-  }
-
-  double cell_;
-  std::map<Cell, std::vector<int>> cells_;
-};
-
-// Where two walls meet.
-struct Corner {
-  int first = -1;
-  int second = -1;
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();
-
-  int Other(int wall) const { return wall == first ? second : first; }
-};
-
-struct Rectangle {
-  Eigen::Vector2d center = Eigen::Vector2d::Zero();
-  double theta = 0.0;
-  // Half its size along theta and across.
-  double a = 0.0;
-  double b = 0.0;
-  // kNoId for one that is not in the graph yet.
-  FeatureId id = kNoId;
-  // Walls on each side: features, where they lie along it from its middle.
-  struct Member {
-    const Feature* feature = nullptr;
-    Interval interval;
-    bool is_new = false;
-  };
-  std::array<std::vector<Member>, kNumSides> sides;
-
-  double area() const { return 4.0 * a * b; }
-  Eigen::Vector2d Direction(int side) const {
-    const double angle = theta + kSides[static_cast<std::size_t>(side)];
-    return {std::cos(angle), std::sin(angle)};
-  }
-  // Outward.
-  Eigen::Vector2d Normal(int side) const {
-    const Eigen::Vector2d along = Direction(side);
-    return {along.y(), -along.x()};
-  }
-  double HalfLength(int side) const { return side % 2 == 0 ? a : b; }
-  Eigen::Vector2d Middle(int side) const {
-    return center + (side % 2 == 0 ? b : a) * Normal(side);
-  }
-};
-
-// Area that two rectangles have in common, when their sides are parallel.
-double CommonArea(const Rectangle& first, const Rectangle& second) {
-  const Eigen::Vector2d x = first.Direction(0);
-  const Eigen::Vector2d y(-x.y(), x.x());
-  const Eigen::Vector2d offset = second.center - first.center;
-  const bool is_turned =
-      std::abs(std::sin(second.theta - first.theta)) > std::sqrt(0.5);
-  const double a = is_turned ? second.b : second.a;
-  const double b = is_turned ? second.a : second.b;
-  const double width =
-      Overlap({-first.a, first.a}, {x.dot(offset) - a, x.dot(offset) + a});
-  const double height =
-      Overlap({-first.b, first.b}, {y.dot(offset) - b, y.dot(offset) + b});
-  return std::max(width, 0.0) * std::max(height, 0.0);
-}
-
 // One call of Detect.
 class RectangleSearch {
  public:
-  RectangleSearch(const RectangleOptions& options, std::vector<Face> walls)
+  RectangleSearch(const RectangleOptions& options,
+                  std::vector<VisibleWall> walls)
       : options_(options),
         walls_(std::move(walls)),
         grid_(std::max(options.corner_gap, options.max_opening)) {
@@ -189,20 +39,25 @@ class RectangleSearch {
   }
 
   // Rectangles that are there, with the walls that they have.
-  void AddExisting(Rectangle rectangle) {
+  void AddExisting(WalledRectangle rectangle) {
     rectangles_.push_back(std::move(rectangle));
     Index(static_cast<int>(rectangles_.size()) - 1);
   }
 
   // Lets walls join what is there and adds what is found.
-  const std::vector<Rectangle>& Run(const DetectionScope& scope) {
+  const std::vector<WalledRectangle>& Run(const DetectionScope& scope) {
     for (std::size_t i = 0; i < rectangles_.size(); ++i) {
       Join(&rectangles_[i]);
       Index(static_cast<int>(i));
     }
-    FindCorners();
+    WallCornerOptions corner_options;
+    corner_options.corner_gap = options_.corner_gap;
+    corner_options.max_opening = options_.max_opening;
+    corner_options.gate = options_.gate;
+    corner_options.gate_angle = options_.gate_angle;
+    const WallCorners corners(walls_, grid_, Reach(), corner_options);
     std::int64_t known = 0;
-    for (Rectangle& candidate : Candidates(scope)) {
+    for (WalledRectangle& candidate : Candidates(corners, scope)) {
       if (IsKnown(candidate)) {
         ++known;
         continue;
@@ -211,7 +66,7 @@ class RectangleSearch {
       Index(static_cast<int>(rectangles_.size()) - 1);
     }
     scope.Count("walls", size());
-    scope.Count("corners", static_cast<std::int64_t>(corners_.size()));
+    scope.Count("corners", corners.size());
     scope.Count("rectangles", tried_);
     scope.Count("rectangles refused: size", wrong_size_);
     scope.Count("rectangles refused: walls not on the sides", not_on_sides_);
@@ -222,7 +77,9 @@ class RectangleSearch {
 
  private:
   int size() const { return static_cast<int>(walls_.size()); }
-  const Face& wall(int i) const { return walls_[static_cast<std::size_t>(i)]; }
+  const VisibleWall& wall(int i) const {
+    return walls_[static_cast<std::size_t>(i)];
+  }
   // Past its ends a wall may meet another or go on as another.
   double Reach() const {
     return std::max(options_.corner_gap, 0.5 * options_.max_opening);
@@ -230,200 +87,22 @@ class RectangleSearch {
 
   // Enters a rectangle's walls into the list by feature.
   void Index(int rectangle) {
-    const Rectangle& r = rectangles_[static_cast<std::size_t>(rectangle)];
-    for (int side = 0; side < kNumSides; ++side) {
-      for (const Rectangle::Member& member :
+    const WalledRectangle& r = rectangles_[static_cast<std::size_t>(rectangle)];
+    for (int side = 0; side < WalledRectangle::kNumSides; ++side) {
+      for (const WalledRectangle::Member& member :
            r.sides[static_cast<std::size_t>(side)]) {
         by_feature_[member.feature->id].insert({rectangle, side});
       }
     }
   }
 
-  bool AreCollinear(const Face& first, const Face& second) const {
-    if (std::abs(NormalizeAxial(first.angle - second.angle)) >
-        options_.gate_angle) {
-      return false;
-    }
-    const auto own = std::pair(-first.half_length, first.half_length);
-    const auto other = IntervalAlong(second, first.middle, first.direction);
-    if (-Overlap(own, other) > options_.max_opening || RunsBeside(own, other)) {
-      return false;
-    }
-    // Across, seen from the nearer end of each.
-    const auto is_near = [&](const Face& from, const Face& to) {
-      const double along = from.direction.dot(to.middle - from.middle);
-      const double sign =
-          (from.direction.dot(to.direction) > 0.0) == (along > 0.0) ? -1.0
-                                                                    : 1.0;
-      const Eigen::Vector2d end =
-          to.middle + sign * to.half_length * to.direction;
-      return std::abs(Cross(from.direction, end - from.middle)) <=
-             options_.gate;
-    };
-    return is_near(first, second) && is_near(second, first);
-  }
-
-  void FindCorners() {
-    const auto count = static_cast<std::size_t>(size());
-    in_line_.resize(count);
-    corners_of_.resize(count);
-    for (int i = 0; i < size(); ++i) {
-      in_line_[static_cast<std::size_t>(i)].push_back(i);
-      for (const int j : grid_.Near(wall(i), Reach())) {
-        if (j == i) continue;
-        if (AreCollinear(wall(i), wall(j))) {
-          in_line_[static_cast<std::size_t>(i)].push_back(j);
-        }
-        if (j < i) continue;
-        const double turn =
-            std::abs(NormalizeAxial(wall(i).angle - wall(j).angle));
-        if (0.5 * kPi - turn > options_.gate_angle) continue;
-        const double sine = Cross(wall(i).direction, wall(j).direction);
-        const double along_i =
-            Cross(wall(j).middle - wall(i).middle, wall(j).direction) / sine;
-        const double along_j =
-            Cross(wall(j).middle - wall(i).middle, wall(i).direction) / sine;
-        if (std::abs(along_i) > wall(i).half_length + options_.corner_gap ||
-            std::abs(along_j) > wall(j).half_length + options_.corner_gap) {
-          continue;
-        }
-        const int corner = static_cast<int>(corners_.size());
-        corners_.push_back(
-            {i, j, wall(i).middle + along_i * wall(i).direction});
-        corners_of_[static_cast<std::size_t>(i)].push_back(corner);
-        corners_of_[static_cast<std::size_t>(j)].push_back(corner);
-        corner_between_[{i, j}] = corner;
-      }
-    }
-  }
-
-  const Corner& corner(int i) const {
-    return corners_[static_cast<std::size_t>(i)];
-  }
-
-  // Corners on a wall or one in line with it, in both directions from one of
-  // them: the nearest ones, as corner and the wall that they are on.
-  std::vector<std::pair<int, int>> CornersAlong(int from,
-                                                int wall_index) const {
-    std::array<std::vector<std::tuple<double, int, int>>, 2> found;
-    for (const int on : in_line_[static_cast<std::size_t>(wall_index)]) {
-      for (const int other : corners_of_[static_cast<std::size_t>(on)]) {
-        const double along =
-            wall(wall_index)
-                .direction.dot(corner(other).position - corner(from).position);
-        if (other == from || std::abs(along) < options_.min_side ||
-            std::abs(along) > options_.max_side) {
-          continue;
-        }
-        found[along < 0.0].emplace_back(std::abs(along), other, on);
-      }
-    }
-    std::vector<std::pair<int, int>> corners;
-    for (auto& direction : found) {
-      std::sort(direction.begin(), direction.end());
-      if (direction.size() > kMaxTries) direction.resize(kMaxTries);
-      for (const auto& entry : direction) {
-        corners.emplace_back(std::get<1>(entry), std::get<2>(entry));
-      }
-    }
-    return corners;
-  }
-
-  // The rectangle whose sides run through these walls, the sides
-  // counterclockwise; its direction is within 45 degrees of the map's x axis,
-  // so that the same one is written in the same way again.
-  Rectangle Fit(const std::array<std::vector<int>, kNumSides>& sides) const {
-    // Sums of the doubled doubled angle tell a direction modulo 90 degrees.
-    double cosine = 0.0, sine = 0.0;
-    for (const auto& side : sides) {
-      for (const int i : side) {
-        // The variance of a direction falls with the length cubed.
-        const double weight = std::pow(wall(i).half_length, 3.0);
-        cosine += weight * std::cos(4.0 * wall(i).angle);
-        sine += weight * std::sin(4.0 * wall(i).angle);
-      }
-    }
-    Rectangle rectangle;
-    rectangle.theta = 0.25 * std::atan2(sine, cosine);
-    const Eigen::Vector2d origin = wall(sides[0][0]).middle;
-    // Offsets of the sides outward. The given sides turn counterclockwise from
-    // any of the four.
-    std::array<double, kNumSides> offsets{};
-    const std::size_t first = FirstSide(rectangle.theta, sides);
-    for (std::size_t given = 0; given < sides.size(); ++given) {
-      const std::size_t k = (first + given) % sides.size();
-      const Eigen::Vector2d normal = rectangle.Normal(static_cast<int>(k));
-      double sum = 0.0, weights = 0.0;
-      for (const int i : sides[given]) {
-        sum += wall(i).half_length * normal.dot(wall(i).middle - origin);
-        weights += wall(i).half_length;
-      }
-      offsets[k] = sum / weights;
-      for (const int i : sides[given]) {
-        rectangle.sides[k].push_back({wall(i).feature, {}, true});
-      }
-    }
-    rectangle.a = 0.5 * (offsets[1] + offsets[3]);
-    rectangle.b = 0.5 * (offsets[0] + offsets[2]);
-    rectangle.center = origin +
-                       0.5 * (offsets[1] - offsets[3]) * rectangle.Normal(1) +
-                       0.5 * (offsets[2] - offsets[0]) * rectangle.Normal(2);
-    return rectangle;
-  }
-
-  // Which side of a rectangle in this direction the first of the given ones is.
-  std::size_t FirstSide(
-      double theta,
-      const std::array<std::vector<int>, kNumSides>& sides) const {
-    const Face& first = wall(sides[0][0]);
-    const Eigen::Vector2d outward = first.middle - wall(sides[2][0]).middle;
-    Eigen::Vector2d normal(first.direction.y(), -first.direction.x());
-    if (normal.dot(outward) < 0.0) normal = -normal;
-    std::size_t best = 0;
-    double largest = -2.0;
-    for (std::size_t k = 0; k < kSides.size(); ++k) {
-      const double angle = theta + kSides[k];
-      const double cosine =
-          normal.dot(Eigen::Vector2d(std::sin(angle), -std::cos(angle)));
-      if (cosine > largest) {
-        largest = cosine;
-        best = k;
-      }
-    }
-    return best;
-  }
-
-  // Where a wall lies along a side; false when it is not on it.
-  bool IsOnSide(const Face& wall, const Rectangle& rectangle, int side,
-                Interval* interval) const {
-    const double angle =
-        rectangle.theta + kSides[static_cast<std::size_t>(side)];
-    const Eigen::Vector2d middle = rectangle.Middle(side);
-    if (std::abs(NormalizeAxial(wall.angle - angle)) > options_.gate_angle) {
-      return false;
-    }
-    // Across where the wall is nearest to the middle of the side: a long wall
-    // may go far beyond it, and a short one says little about what is beyond.
-    const double along = std::clamp(wall.direction.dot(middle - wall.middle),
-                                    -wall.half_length, wall.half_length);
-    const Eigen::Vector2d nearest = wall.middle + along * wall.direction;
-    if (std::abs(rectangle.Normal(side).dot(nearest - middle)) >
-        options_.gate) {
-      return false;
-    }
-    *interval = IntervalAlong(wall, middle, rectangle.Direction(side));
-    const double half = rectangle.HalfLength(side);
-    return Overlap(*interval, {-half, half}) >=
-           std::min(wall.half_length, half);
-  }
-
   // Adds walls that lie on the sides, the longest first, to those that are
   // there: what runs beside one of them is another face of the wall.
-  void Join(Rectangle* rectangle) const {
-    for (int side = 0; side < kNumSides; ++side) {
-      std::vector<Rectangle::Member>& members =
+  void Join(WalledRectangle* rectangle) const {
+    for (int side = 0; side < WalledRectangle::kNumSides; ++side) {
+      std::vector<WalledRectangle::Member>& members =
           rectangle->sides[static_cast<std::size_t>(side)];
-      Face line;
+      VisibleWall line;
       line.middle = rectangle->Middle(side);
       line.direction = rectangle->Direction(side);
       line.half_length = rectangle->HalfLength(side);
@@ -433,26 +112,27 @@ class RectangleSearch {
       }
       std::sort(by_length.begin(), by_length.end());
       for (const auto& entry : by_length) {
-        const Face& candidate = wall(entry.second);
-        Interval interval;
-        if (!IsOnSide(candidate, *rectangle, side, &interval)) continue;
+        const VisibleWall& candidate = wall(entry.second);
+        const std::optional<Interval> interval = IntervalOnSide(
+            candidate, *rectangle, side, options_.gate, options_.gate_angle);
+        if (!interval) continue;
         if (std::any_of(members.begin(), members.end(),
-                        [&](const Rectangle::Member& member) {
+                        [&](const WalledRectangle::Member& member) {
                           return member.feature == candidate.feature ||
-                                 RunsBeside(member.interval, interval);
+                                 RunsBeside(member.interval, *interval);
                         })) {
           continue;
         }
-        members.push_back({candidate.feature, interval, true});
+        members.push_back({candidate.feature, *interval, true});
       }
     }
   }
 
   // Whether walls cover enough of the side and meet the next ones.
-  bool IsCovered(const Rectangle& rectangle, int side) const {
+  bool IsCovered(const WalledRectangle& rectangle, int side) const {
     const double half = rectangle.HalfLength(side);
     std::vector<Interval> intervals;
-    for (const Rectangle::Member& member :
+    for (const WalledRectangle::Member& member :
          rectangle.sides[static_cast<std::size_t>(side)]) {
       intervals.push_back(member.interval);
     }
@@ -473,54 +153,60 @@ class RectangleSearch {
   }
 
   // Rectangles that could be, the smallest first.
-  std::vector<Rectangle> Candidates(const DetectionScope& scope) {
-    std::vector<Rectangle> candidates;
-    for (int at = 0; at < static_cast<int>(corners_.size()); ++at) {
+  std::vector<WalledRectangle> Candidates(const WallCorners& corners,
+                                          const DetectionScope& scope) {
+    std::vector<WalledRectangle> candidates;
+    for (int at = 0; at < corners.size(); ++at) {
       if (scope.ShouldStop()) return {};
-      const Corner& a = corner(at);
+      const WallCorner& a = corners.corner(at);
       for (const int i : {a.first, a.second}) {
         const int j = a.Other(i);
-        const auto along_j = CornersAlong(at, j);
-        for (const auto& [next, i2] : CornersAlong(at, i)) {
+        const auto along_j =
+            corners.Along(at, j, options_.min_side, options_.max_side);
+        for (const auto& [next, i2] :
+             corners.Along(at, i, options_.min_side, options_.max_side)) {
           // Each set of four is looked at from its first corner only.
           if (next < at) continue;
-          const Corner& b = corner(next);
+          const WallCorner& b = corners.corner(next);
           for (const auto& [last, j2] : along_j) {
             if (last < at) continue;
-            const Corner& d = corner(last);
+            const WallCorner& d = corners.corner(last);
             // Counterclockwise.
             if (Cross(b.position - a.position, d.position - a.position) <=
                 0.0) {
               continue;
             }
-            Close(at, {i, i2}, b.Other(i2), d.Other(j2), {j, j2}, &candidates);
+            Close(corners, at, {i, i2}, b.Other(i2), d.Other(j2), {j, j2},
+                  &candidates);
           }
         }
       }
     }
-    std::stable_sort(candidates.begin(), candidates.end(),
-                     [](const Rectangle& first, const Rectangle& second) {
-                       return first.area() < second.area();
-                     });
+    std::stable_sort(
+        candidates.begin(), candidates.end(),
+        [](const WalledRectangle& first, const WalledRectangle& second) {
+          return first.area() < second.area();
+        });
     return candidates;
   }
 
   // Looks for the fourth corner, on the walls k and l or in line with them, and
   // adds the rectangle.
-  void Close(int at, const std::pair<int, int>& bottom, int k, int l,
+  void Close(const WallCorners& corners, int at,
+             const std::pair<int, int>& bottom, int k, int l,
              const std::pair<int, int>& left,
-             std::vector<Rectangle>* candidates) {
-    for (const int k2 : in_line_[static_cast<std::size_t>(k)]) {
-      for (const int l2 : in_line_[static_cast<std::size_t>(l)]) {
-        const auto found = corner_between_.find(std::minmax(k2, l2));
-        if (found == corner_between_.end() || found->second < at) continue;
-        const auto list = [](int first, int second) {
-          return first == second ? std::vector<int>{first}
-                                 : std::vector<int>{first, second};
+             std::vector<WalledRectangle>* candidates) {
+    for (const int k2 : corners.InLineWith(k)) {
+      for (const int l2 : corners.InLineWith(l)) {
+        if (corners.Between(k2, l2) < at) continue;
+        const auto list = [&](int first, int second) {
+          std::vector<const VisibleWall*> walls = {&wall(first)};
+          if (second != first) walls.push_back(&wall(second));
+          return walls;
         };
-        Rectangle rectangle =
-            Fit({list(bottom.first, bottom.second), list(k, k2), list(l, l2),
-                 list(left.first, left.second)});
+        WalledRectangle rectangle =
+            FitRectangle({list(bottom.first, bottom.second), list(k, k2),
+                          list(l, l2), list(left.first, left.second)});
         if (Complete(&rectangle)) candidates->push_back(std::move(rectangle));
       }
     }
@@ -528,26 +214,28 @@ class RectangleSearch {
 
   // Checks the walls that it was fitted to and adds others on its sides; false
   // when it is none.
-  bool Complete(Rectangle* rectangle) {
+  bool Complete(WalledRectangle* rectangle) {
     ++tried_;
     if (2.0 * std::min(rectangle->a, rectangle->b) < options_.min_side ||
         2.0 * std::max(rectangle->a, rectangle->b) > options_.max_side) {
       ++wrong_size_;
       return false;
     }
-    for (int side = 0; side < kNumSides; ++side) {
-      for (Rectangle::Member& member :
+    for (int side = 0; side < WalledRectangle::kNumSides; ++side) {
+      for (WalledRectangle::Member& member :
            rectangle->sides[static_cast<std::size_t>(side)]) {
-        Face wall;
-        MakeFace(*member.feature, &wall);
-        if (!IsOnSide(wall, *rectangle, side, &member.interval)) {
+        const std::optional<Interval> interval =
+            IntervalOnSide(*VisiblePartOf(*member.feature), *rectangle, side,
+                           options_.gate, options_.gate_angle);
+        if (!interval) {
           ++not_on_sides_;
           return false;
         }
+        member.interval = *interval;
       }
     }
     Join(rectangle);
-    for (int side = 0; side < kNumSides; ++side) {
+    for (int side = 0; side < WalledRectangle::kNumSides; ++side) {
       if (!IsCovered(*rectangle, side)) {
         ++not_covered_;
         return false;
@@ -558,16 +246,16 @@ class RectangleSearch {
 
   // Whether a rectangle that is there overlaps it and has two sides in common
   // with it.
-  bool IsKnown(const Rectangle& candidate) const {
+  bool IsKnown(const WalledRectangle& candidate) const {
     // Sides of the candidate that each rectangle has.
     std::map<int, std::set<int>> common;
-    for (int side = 0; side < kNumSides; ++side) {
-      for (const Rectangle::Member& member :
+    for (int side = 0; side < WalledRectangle::kNumSides; ++side) {
+      for (const WalledRectangle::Member& member :
            candidate.sides[static_cast<std::size_t>(side)]) {
         const auto found = by_feature_.find(member.feature->id);
         if (found == by_feature_.end()) continue;
         for (const auto& [other, its_side] : found->second) {
-          const Rectangle& rectangle =
+          const WalledRectangle& rectangle =
               rectangles_[static_cast<std::size_t>(other)];
           if (candidate.Normal(side).dot(rectangle.Normal(its_side)) > 0.0) {
             common[other].insert(side);
@@ -576,7 +264,7 @@ class RectangleSearch {
       }
     }
     return std::any_of(common.begin(), common.end(), [&](const auto& entry) {
-      const Rectangle& rectangle =
+      const WalledRectangle& rectangle =
           rectangles_[static_cast<std::size_t>(entry.first)];
       return entry.second.size() >= 2 &&
              CommonArea(candidate, rectangle) >
@@ -585,14 +273,9 @@ class RectangleSearch {
   }
 
   const RectangleOptions& options_;
-  std::vector<Face> walls_;
-  WallGrid grid_;
-  std::vector<Corner> corners_;
-  // Corners of each wall; walls in line with each, itself first.
-  std::vector<std::vector<int>> corners_of_;
-  std::vector<std::vector<int>> in_line_;
-  std::map<std::pair<int, int>, int> corner_between_;
-  std::vector<Rectangle> rectangles_;
+  std::vector<VisibleWall> walls_;
+  VisibleWallGrid grid_;
+  std::vector<WalledRectangle> rectangles_;
   // Rectangles and their sides that a feature is on.
   std::map<FeatureId, std::set<std::pair<int, int>>> by_feature_;
   // What was tried and refused.
@@ -609,16 +292,17 @@ int SideOf(const Constraint& constraint) {
       !constraint.type->Is(RelationRole::kSide)) {
     return -1;
   }
-  for (int side = 0; side < kNumSides; ++side) {
+  for (int side = 0; side < WalledRectangle::kNumSides; ++side) {
     const double difference =
-        constraint.expected[1] - kSides[static_cast<std::size_t>(side)];
+        constraint.expected[1] -
+        WalledRectangle::kSides[static_cast<std::size_t>(side)];
     if (std::abs(NormalizeAngle(difference)) < 0.25 * kPi) return side;
   }
   return -1;
 }
 
-Rectangle ReadRectangle(const Graph& graph, const Feature& feature) {
-  Rectangle rectangle;
+WalledRectangle ReadRectangle(const Graph& graph, const Feature& feature) {
+  WalledRectangle rectangle;
   rectangle.id = feature.id;
   rectangle.center = {feature.parameters[0], feature.parameters[1]};
   rectangle.theta = feature.parameters[2];
@@ -629,11 +313,12 @@ Rectangle ReadRectangle(const Graph& graph, const Feature& feature) {
     const int side = SideOf(constraint);
     if (side < 0) continue;
     const Feature& support = graph.GetFeature(constraint.features[0]);
-    Face wall;
-    if (!MakeFace(support, &wall)) continue;
+    const std::optional<VisibleWall> wall = VisiblePartOf(support);
+    if (!wall) continue;
     rectangle.sides[static_cast<std::size_t>(side)].push_back(
         {&support,
-         IntervalAlong(wall, rectangle.Middle(side), rectangle.Direction(side)),
+         IntervalAlong(*wall, rectangle.Middle(side),
+                       rectangle.Direction(side)),
          false});
   }
   return rectangle;
@@ -680,18 +365,17 @@ bool RectangleDetector::IsSupported(
     sides.insert(SideOf(*constraint));
   }
   sides.erase(-1);
-  return sides.size() == static_cast<std::size_t>(kNumSides);
+  return sides.size() == static_cast<std::size_t>(WalledRectangle::kNumSides);
 }
 
 Transaction RectangleDetector::Detect(const Graph& graph,
                                       const Registry& registry,
                                       const DetectionScope& scope) const {
-  std::vector<Face> walls;
+  std::vector<VisibleWall> walls;
   for (const Feature* feature : FeaturesInScope(graph, scope)) {
-    Face wall;
-    if (MakeFace(*feature, &wall) &&
-        2.0 * wall.half_length >= options_.min_length) {
-      walls.push_back(wall);
+    const std::optional<VisibleWall> wall = VisiblePartOf(*feature);
+    if (wall && 2.0 * wall->half_length >= options_.min_length) {
+      walls.push_back(*wall);
     }
   }
   Transaction transaction;
@@ -702,14 +386,14 @@ Transaction RectangleDetector::Detect(const Graph& graph,
   for (const FeatureId id : graph.VirtualFeatures(scope.level + 1)) {
     const Feature& feature = graph.GetFeature(id);
     if (!feature.type->Is(FeatureRole::kRectangle)) continue;
-    Rectangle rectangle = ReadRectangle(graph, feature);
+    WalledRectangle rectangle = ReadRectangle(graph, feature);
     if (rectangle.center.allFinite() && std::isfinite(rectangle.theta) &&
         rectangle.a > 0.0 && rectangle.b > 0.0 &&
         std::max(rectangle.a, rectangle.b) <= options_.max_side) {
       search.AddExisting(std::move(rectangle));
     }
   }
-  for (const Rectangle& rectangle : search.Run(scope)) {
+  for (const WalledRectangle& rectangle : search.Run(scope)) {
     FeatureId id = rectangle.id;
     if (id == kNoId) {
       Feature feature;
@@ -721,15 +405,15 @@ Transaction RectangleDetector::Detect(const Graph& graph,
       feature.source = kName;
       id = transaction.AddFeature(std::move(feature));
     }
-    for (std::size_t side = 0; side < kSides.size(); ++side) {
-      for (const Rectangle::Member& member : rectangle.sides[side]) {
+    for (std::size_t side = 0; side < WalledRectangle::kSides.size(); ++side) {
+      for (const WalledRectangle::Member& member : rectangle.sides[side]) {
         if (!member.is_new) continue;
         const RelationType* relation = registry.FindRelation(
             RelationRole::kSide, *member.feature->type, rectangle_type);
         if (relation == nullptr) continue;
         transaction.AddConstraint(
             MakeStructure(*relation, {member.feature->id, id},
-                          Eigen::Vector2d(0.0, kSides[side]),
+                          Eigen::Vector2d(0.0, WalledRectangle::kSides[side]),
                           InformationFromSigmas(Eigen::Vector2d(
                               options_.sigma, options_.sigma_angle)),
                           kName));

@@ -54,6 +54,14 @@ constexpr double kFastest = 3.0;
 constexpr double kFastestTurn = DegToRad(200.0);
 constexpr double kJumpWay = 0.3;
 constexpr double kJumpTurn = DegToRad(15.0);
+// Nor changes its speed by more from scan to scan, m/s.
+constexpr double kFastestChange = 1.0;
+// A pose explains a scan clearly better than another from this difference on,
+// in squared standard deviations of returns that lie apart.
+constexpr double kClearly = 10.0;
+// From here on a robot has moved while odometry stood still, m and rad.
+constexpr double kMovedWay = 0.2;
+constexpr double kMovedTurn = DegToRad(8.0);
 // The usual time between scans follows with this share.
 constexpr double kUsualShare = 0.05;
 // Share by which the noise of the laser has to change before it is followed.
@@ -268,15 +276,19 @@ std::vector<ScanPoint> OdometryRefiner::WithoutClutter(const Scan& scan) const {
 }
 
 MatchPrior OdometryRefiner::PriorOf(const Pose2& pose,
-                                    const Pose2& motion) const {
+                                    const UncertainPose2& step) const {
   MatchPrior prior;
   prior.pose = pose;
   // What was not matched since adds up.
+  const Pose2& motion = step.mean;
   const Pose2 unmatched = track_.refused == 0
                               ? motion
                               : Pose2(motion.head<2>().norm() + track_.way, 0.0,
                                       std::abs(motion[2]) + track_.turn);
-  prior.information = OdometryCovariance(unmatched, options_.noise).inverse();
+  const Eigen::Matrix3d covariance =
+      is_dead_ ? Eigen::Matrix3d((track_.refused + 1) * step.covariance)
+               : OdometryCovariance(unmatched, options_.noise);
+  prior.information = covariance.inverse();
   return prior;
 }
 
@@ -344,6 +356,7 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
   // may speak for odometry.
   if (there.intruders >= kLeastIntruders && !track_.after_gap) {
     MatchWithoutIntruders(intruders, prior, laser, match, &here);
+    innovation = SquaredInnovation(*match, prior);
   }
   // Few returns fit in many places: they may leave odometry by little.
   const bool agrees =
@@ -401,20 +414,106 @@ bool OdometryRefiner::Leaps(const Pose2& matched, const Pose2& motion) const {
          way(Between(Compose(track_.last_pose, motion), matched)) > most;
 }
 
+UncertainPose2 OdometryRefiner::StepOf(const Pose2& by_wheels) {
+  if (by_wheels.isZero(0.0)) {
+    if (still_++ == 0) still_pose_ = track_.last_pose;
+    if (is_dead_) return steady_.Step();
+    return {by_wheels, OdometryCovariance(by_wheels, options_.noise)};
+  }
+  const Pose2 motion =
+      options_.match_scans ? odometry_scale_.Scaled(by_wheels) : by_wheels;
+  UncertainPose2 step = {motion, OdometryCovariance(motion, options_.noise)};
+  // Odometry that has only been late catches up with all of the way at once.
+  if (is_dead_ && IsLate(motion)) {
+    step.mean = Between(track_.last_pose, Compose(still_pose_, motion));
+  }
+  last_motion_ = motion;
+  still_ = 0;
+  is_dead_ = false;
+  ahead_.exists = false;
+  return step;
+}
+
+bool OdometryRefiner::IsLate(const Pose2& motion) const {
+  const Pose2 once = steady_.Step().mean;
+  const auto apart = [&](double times) {
+    const Pose2 left = motion - times * once;
+    return left.head<2>().norm() + std::abs(left[2]);
+  };
+  return apart(still_ + 1.0) < apart(1.0);
+}
+
+bool OdometryRefiner::MovesOn(bool leapt, UncertainPose2* since_key,
+                              MatchPrior* prior, MatchResult* match) {
+  if (is_dead_ || (still_ == 0 && !leapt)) return false;
+  // The returns may lead on by themselves.
+  const Pose2 moved = Between(still_pose_, match->pose);
+  if (!leapt && steady_.IsMoving() &&
+      (moved.head<2>().norm() > kMovedWay || std::abs(moved[2]) > kMovedTurn)) {
+    is_dead_ = true;
+    return false;
+  }
+  if (!ahead_.exists) {
+    // A robot that slows down stands in the end.
+    const bool abruptly =
+        leapt ? !track_.after_gap : steady_.Explains(last_motion_);
+    if (!steady_.IsMoving() || !abruptly) return false;
+    ahead_ = {true, track_.last_pose, track_.since_key, steady_.Step()};
+  }
+  ahead_.since_key = Compose(ahead_.since_key, ahead_.step);
+  MatchPrior moving;
+  moving.pose = Compose(ahead_.pose, ahead_.step.mean);
+  moving.information = ahead_.step.covariance.inverse();
+  const MatchResult other = track_.matcher.Refine(points_, moving.pose, moving);
+  ahead_.pose = other.pose;
+  const Pose2 apart = Between(match->pose, other.pose);
+  const double clearly = (match->cost - other.cost) * CountApart(points_);
+  const bool same = apart.head<2>().norm() <= options_.clutter_distance &&
+                    std::abs(apart[2]) <= options_.clutter_rotation;
+  const bool moves = !same &&
+                     other.inlier_ratio >= options_.minimum_inlier_ratio &&
+                     clearly > (leapt ? -kClearly : kClearly);
+  if (trace_) {
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "ahead %d leapt %d apart %.3f %.1f clearly %.1f ratio %.2f %.2f "
+        "cost %.3f %.3f",
+        static_cast<int>(moves), static_cast<int>(leapt),
+        apart.head<2>().norm(), RadToDeg(apart[2]), clearly,
+        match->inlier_ratio, other.inlier_ratio, match->cost, other.cost);
+    trace_(text);
+  }
+  // Where both lead to one place nothing is open; where it cannot be, neither.
+  if (leapt || moves || same || clearly < -kClearly) ahead_.exists = false;
+  if (!moves) return false;
+  is_dead_ = !leapt;
+  *since_key = ahead_.since_key;
+  *prior = moving;
+  *match = other;
+  return true;
+}
+
 OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
-                                                const Pose2& motion) {
+                                                const UncertainPose2& step,
+                                                bool leapt) {
   Outcome outcome;
+  Pose2 motion = step.mean;
   RefinedScan& result = outcome.refined;
-  result.since_key = Compose(
-      track_.since_key, {motion, OdometryCovariance(motion, options_.noise)});
+  result.since_key = Compose(track_.since_key, step);
   result.pose = Compose(track_.last_pose, motion);
   result.odometry_only = true;
   if (!options_.match_scans || track_.matcher.empty() ||
       static_cast<int>(points_.size()) < options_.minimum_points) {
     return outcome;
   }
-  const MatchPrior prior = PriorOf(result.pose, motion);
+  MatchPrior prior = PriorOf(result.pose, step);
   MatchResult match = MatchPoints(points_, prior, motion);
+  const bool moves_on = MovesOn(leapt, &result.since_key, &prior, &match);
+  if (moves_on) {
+    result.pose = prior.pose;
+    motion = Between(track_.last_pose, result.pose);
+  }
   // What may move is not what stands: where it speaks for another pose than the
   // rest, the rest counts.
   if (track_.moving > 0) --track_.moving;
@@ -431,6 +530,7 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
     believed = StandsUpTo(scan, prior, innovation, &match, &outcome);
   }
   believed = believed && !Leaps(match.pose, motion);
+  if (!believed && moves_on && leapt) return Match(scan, step, false);
   if (!believed) {
     ++refusals_;
     return outcome;
@@ -485,6 +585,13 @@ void OdometryRefiner::NoteGap(double seconds) {
 
 void OdometryRefiner::NoteMatch(const Outcome& outcome, const Pose2& motion) {
   if (outcome.verdict == Outcome::Verdict::kBelieved) {
+    // What follows on a gap, or was not matched, is no motion of one scan.
+    const Pose2 moved = Between(track_.last_pose, outcome.refined.pose);
+    if (track_.refused > 0 || (track_.after_gap && !steady_.Explains(moved))) {
+      steady_.Break();
+    } else {
+      steady_.Add(moved);
+    }
     track_.way = 0.0;
     track_.turn = 0.0;
     track_.refused = 0;
@@ -610,8 +717,8 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
   done.index = count_++;
   const Pose2 by_wheels =
       started_ ? Between(last_odometry_, scan.odometry) : Pose2::Zero();
-  const Pose2 motion =
-      options_.match_scans ? odometry_scale_.Scaled(by_wheels) : by_wheels;
+  const UncertainPose2 step = StepOf(by_wheels);
+  const Pose2& motion = step.mean;
   const double seconds = started_ ? scan.timestamp - last_time_ : 0.0;
   last_odometry_ = scan.odometry;
   last_time_ = scan.timestamp;
@@ -626,16 +733,21 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
 
   NoteGap(seconds);
   track_.seconds += std::max(0.0, seconds);
-  if (motion.head<2>().norm() > kJumpWay + kFastest * std::max(0.0, seconds) ||
-      std::abs(motion[2]) > kJumpTurn + kFastestTurn * std::max(0.0, seconds)) {
-    track_.jumped = true;
-  }
+  const bool jumped =
+      motion.head<2>().norm() > kJumpWay + kFastest * std::max(0.0, seconds) ||
+      std::abs(motion[2]) > kJumpTurn + kFastestTurn * std::max(0.0, seconds);
+  track_.jumped = track_.jumped || jumped;
+  const Pose2 change = motion - steady_.Step().mean;
+  const bool leapt =
+      steady_.IsMoving() && !steady_.Explains(motion) &&
+      (jumped || change.head<2>().norm() >
+                     kJumpWay + kFastestChange * std::max(0.0, seconds));
   if (open_ != nullptr) {
     open_->way += motion.head<2>().norm();
     open_->turn += std::abs(motion[2]);
     open_->seconds += std::max(0.0, seconds);
   }
-  const Outcome outcome = Match(scan, motion);
+  const Outcome outcome = Match(scan, step, leapt);
   NoteMatch(outcome, motion);
   done.refined = outcome.refined;
   const bool is_lost = IsLost(outcome);
@@ -1419,7 +1531,8 @@ void OdometryRefiner::ExchangeState(StateArchive& archive) {
               last_time_, usual_step_, archive_, part_, num_parts_, loose_of_,
               wide_searches_, refusals_, losses_, loose_, guessed_, noise_,
               noise_scale_, key_odometry_, squared_innovations_,
-              compared_motions_, odometry_scale_);
+              compared_motions_, odometry_scale_, steady_, still_, last_motion_,
+              still_pose_, is_dead_, ahead_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

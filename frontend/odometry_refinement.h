@@ -8,6 +8,7 @@
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/scan_points.h>
+#include <plumbline/frontend/steady_motion.h>
 
 #include <Eigen/Core>
 #include <deque>
@@ -385,12 +386,24 @@ class OdometryRefiner {
   template <typename Archive>
   void ExchangeState(Archive& archive);
   void RebuildReference(Track* track);
-  // Matches the scan, which odometry moved by `motion` since the one before.
-  Outcome Match(const Scan& scan, const Pose2& motion);
+  // The motion since the scan before: odometry's, or the robot's own steady one
+  // while odometry is known to stand still although the robot moves.
+  UncertainPose2 StepOf(const Pose2& by_wheels);
+  // Whether a motion by odometry, the first one since it stood still, is that
+  // of all scans since rather than that of one.
+  bool IsLate(const Pose2& motion) const;
+  // Matches the scan, which moved by `step` since the one before. `leapt`:
+  // farther than a robot can.
+  Outcome Match(const Scan& scan, const UncertainPose2& step, bool leapt);
+  // While odometry stands still or leaps: whether the returns say that the
+  // robot goes on as before, against `match`, which follows odometry. If so
+  // sets where it is, and its match.
+  bool MovesOn(bool leapt, UncertainPose2* since_key, MatchPrior* prior,
+               MatchResult* match);
   // Whether a match goes where the robot cannot have got to by itself.
   bool Leaps(const Pose2& matched, const Pose2& motion) const;
   // The pose by odometry, as uncertain as all odometry since the last match.
-  MatchPrior PriorOf(const Pose2& pose, const Pose2& motion) const;
+  MatchPrior PriorOf(const Pose2& pose, const UncertainPose2& step) const;
   // The best pose of `points` near the prior's.
   MatchResult MatchPoints(const std::vector<ScanPoint>& points,
                           const MatchPrior& prior, const Pose2& motion);
@@ -593,6 +606,29 @@ class OdometryRefiner {
   double squared_innovations_ = 0.0;
   int compared_motions_ = 0;
   OdometryScale odometry_scale_;
+  // How the robot moved of late, by its scans.
+  SteadyMotion steady_;
+  // For so many scans odometry did not move; its last motion before, and where
+  // the robot was then. Dead: the robot is known to have gone on.
+  int still_ = 0;
+  Pose2 last_motion_ = Pose2::Zero();
+  Pose2 still_pose_ = Pose2::Zero();
+  bool is_dead_ = false;
+  // Where the robot is if it goes on while odometry stands still: the pose, the
+  // same since the key scan, the motion that goes on.
+  struct Ahead {
+    bool exists = false;
+    Pose2 pose = Pose2::Zero();
+    UncertainPose2 since_key;
+    UncertainPose2 step;
+
+    template <typename Archive>
+    friend void Exchange(Archive& archive, Ahead& ahead) {
+      auto& [exists, pose, since_key, step] = ahead;
+      ExchangeAll(archive, exists, pose, since_key, step);
+    }
+  };
+  Ahead ahead_;
   int wide_searches_ = 0;
   int refusals_ = 0;
   int losses_ = 0;

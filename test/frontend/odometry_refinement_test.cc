@@ -63,6 +63,20 @@ std::vector<WallEnds> Pillars(double least_x) {
   return walls;
 }
 
+// The hall with two niches, so that it looks like itself from one place alone.
+std::vector<WallEnds> PlainHall() {
+  std::vector<WallEnds> walls = Hall();
+  for (const WallEnds& side :
+       testing::Moved(Room(1.0, 2.0), {-4.5, 3.0, 0.0})) {
+    walls.push_back(side);
+  }
+  for (const WallEnds& side :
+       testing::Moved(Room(2.5, 0.6), {3.0, -3.7, 0.0})) {
+    walls.push_back(side);
+  }
+  return walls;
+}
+
 // Drives along relative motions; odometry reports `reported` in their place.
 struct Drive {
   std::vector<Pose2> truth;
@@ -251,8 +265,8 @@ TEST(OdometryRefinerTest, CovarianceIsInTheAxesOfTheKeyScan) {
 }
 
 TEST(OdometryRefinerTest, CovarianceGrowsAlongACorridor) {
-  // What the walls leave open is as uncertain as all the odometry since the key
-  // scan together, however many scans have been matched on the way.
+  // What the walls leave open is as uncertain as all the odometry since the
+  // key scan together, however many scans have been matched on the way.
   const Pose2 step(0.03, 0.0, 0.0);
   const std::vector<Pose2> motions(9, step);
   Laser laser = FullCircle();
@@ -296,26 +310,116 @@ TEST(OdometryRefinerTest, BackwardsGivenAsForwards) {
   }
 }
 
-// A search as wide as the jump would not end.
+// A search as wide as the jump would not end, and no robot leaps: it goes on
+// as it went.
 TEST(OdometryRefinerTest, OdometryThatJumps) {
-  for (const double jump : {50.0, 1e6, 1e9}) {
+  for (const double jump : {1.0, 50.0, 1e6, 1e9}) {
     SCOPED_TRACE(jump);
     std::vector<Pose2> motions(12, Pose2(0.1, 0.0, 0.0));
     std::vector<Pose2> reported = motions;
     reported[5] = Pose2(jump, -jump, 0.5);
+    const Drive drive = Along(Pose2(-2.0, -1.5, 0.2), motions, reported);
     const std::vector<RefinedScan> refined =
-        Refine(Hall(), Along(Pose2(-2.0, -1.5, 0.2), motions, reported),
-               FullCircle(), RefinerOptions());
-    EXPECT_FALSE(refined[5].odometry_only);
-    EXPECT_TRUE(refined[6].odometry_only);
-    EXPECT_TRUE(refined[6].is_key);
-    // From the jump on as before.
-    EXPECT_FALSE(refined[8].odometry_only);
-    for (const RefinedScan& scan : refined) {
-      EXPECT_TRUE(scan.pose.allFinite());
-      EXPECT_TRUE(scan.since_key.covariance.allFinite());
+        Refine(Hall(), drive, FullCircle(), RefinerOptions());
+    for (std::size_t i = 0; i < refined.size(); ++i) {
+      EXPECT_FALSE(refined[i].odometry_only) << i;
+      EXPECT_LT(PositionError(refined[i].pose, drive.truth[i]), 0.05) << i;
+      EXPECT_TRUE(refined[i].since_key.covariance.allFinite());
     }
   }
+}
+
+// Where it goes on there is nothing of what it sees: it was carried.
+TEST(OdometryRefinerTest, OdometryThatJumpsToAnotherPlace) {
+  std::vector<Pose2> motions(12, Pose2(0.1, 0.0, 0.0));
+  motions[5] = Pose2(0.0, 60.0, 0.0);
+  std::vector<WallEnds> walls = Hall();
+  for (const WallEnds& wall :
+       testing::Moved(PlainHall(), {-1.0, 58.0, DegToRad(20.0)})) {
+    walls.push_back(wall);
+  }
+  const std::vector<RefinedScan> refined =
+      Refine(walls, Along(Pose2(-2.0, -1.5, 0.0), motions, motions),
+             FullCircle(), RefinerOptions());
+  EXPECT_FALSE(refined[5].odometry_only);
+  EXPECT_TRUE(refined[6].odometry_only);
+  EXPECT_TRUE(refined[6].is_key);
+  EXPECT_FALSE(refined[8].odometry_only);
+}
+
+// A corridor with a niche every 6 m.
+std::vector<WallEnds> NichedCorridor() {
+  std::vector<WallEnds> walls = {{{-200.0, 1.0}, {200.0, 1.0}}};
+  for (double x = -60.0; x < 60.0; x += 6.0) {
+    walls.push_back({{x, -1.0}, {x + 5.0, -1.0}});
+    walls.push_back({{x + 5.0, -1.0}, {x + 5.0, -1.5}});
+    walls.push_back({{x + 5.0, -1.5}, {x + 6.0, -1.5}});
+    walls.push_back({{x + 6.0, -1.5}, {x + 6.0, -1.0}});
+  }
+  return walls;
+}
+
+// Drives along the corridor; the errors of all scans, m.
+std::vector<double> ErrorsAlong(const std::vector<WallEnds>& walls,
+                                const std::vector<Pose2>& motions,
+                                const std::vector<Pose2>& reported) {
+  Laser laser = FullCircle();
+  laser.maximum_range = 5.0;
+  laser.sigma = 0.01;
+  Noise noise(5);
+  const Drive drive = Along(Pose2::Zero(), motions, reported);
+  OdometryRefiner refiner(RefinerOptions());
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    Scan scan = MakeScan(walls, drive.truth[i], laser, &noise);
+    scan.odometry = drive.odometry[i];
+    scan.timestamp = 100.0 + 0.2 * static_cast<double>(i);
+    errors.push_back(PositionError(refiner.Process(scan).pose, drive.truth[i]));
+  }
+  return errors;
+}
+
+// The wheels' cable is out for 40 scans.
+TEST(OdometryRefinerTest, OdometryThatStandsStillWhileTheRobotGoes) {
+  const std::vector<Pose2> motions(120, Pose2(0.1, 0.0, 0.0));
+  std::vector<Pose2> reported = motions;
+  std::fill_n(reported.begin() + 40, 40, Pose2::Zero());
+  const std::vector<double> errors =
+      ErrorsAlong(NichedCorridor(), motions, reported);
+  EXPECT_LT(errors.back(), 0.2);
+}
+
+// Nothing tells that the robot has stopped but odometry.
+TEST(OdometryRefinerTest, ARobotThatStopsAtOnceInABareCorridor) {
+  std::vector<Pose2> motions(120, Pose2(0.1, 0.0, 0.0));
+  std::fill_n(motions.begin() + 40, 40, Pose2::Zero());
+  const std::vector<double> errors = ErrorsAlong(Corridor(), motions, motions);
+  EXPECT_LT(*std::max_element(errors.begin(), errors.end()), 0.1);
+}
+
+// The same message comes again, and the next one has all of the way.
+TEST(OdometryRefinerTest, OdometryThatIsLateNowAndThen) {
+  const std::vector<Pose2> motions(200, Pose2(0.1, 0.0, 0.0));
+  std::vector<Pose2> reported = motions;
+  for (std::size_t i = 20; i + 3 < reported.size(); i += 10) {
+    const int late = i % 20 == 0 ? 1 : 2;
+    std::fill_n(reported.begin() + i, late, Pose2::Zero());
+    reported[i + late] = Pose2(0.1 * (late + 1), 0.0, 0.0);
+  }
+  for (const auto& walls : {NichedCorridor(), Corridor()}) {
+    const std::vector<double> errors = ErrorsAlong(walls, motions, reported);
+    EXPECT_LT(errors.back(), 0.15);
+  }
+}
+
+// Where no return tells how far it went.
+TEST(OdometryRefinerTest, OdometryThatJumpsInABareCorridor) {
+  const std::vector<Pose2> motions(60, Pose2(0.1, 0.0, 0.0));
+  std::vector<Pose2> reported = motions;
+  reported[20] = Pose2(-0.9, 0.4, DegToRad(40.0));
+  reported[40] = Pose2(1.0, 0.2, DegToRad(-40.0));
+  const std::vector<double> errors = ErrorsAlong(Corridor(), motions, reported);
+  EXPECT_LT(*std::max_element(errors.begin(), errors.end()), 0.1);
 }
 
 // Two scans of another moment among those of a slow drive: the robot does not
@@ -364,9 +468,9 @@ TEST(OdometryRefinerTest, WheelsThatSlipAreCorrected) {
 }
 
 // A robot that sees next to nothing in a turn: a board, in front of the wall
-// that it has seen, and something that stands free. The board fits the wall, a
-// fifth of a radian from where odometry has it; one board is too little to say
-// so.
+// that it has seen, and something that stands free. The board fits the wall,
+// a fifth of a radian from where odometry has it; one board is too little to
+// say so.
 TEST(OdometryRefinerTest, FewReturnsLeaveOdometryByLittle) {
   const double slant = DegToRad(17.0);
   const Eigen::Vector2d middle(-2.0, 3.85);
@@ -486,8 +590,8 @@ TEST(OdometryRefinerTest, KeysComeByDistanceAndByRotation) {
     for (std::size_t i = 0; i < refined.size(); ++i) {
       if (refined[i].is_key) keys.push_back(static_cast<int>(i));
     }
-    // Every third scan of 0.11 m; after the tenth, 0.11 m of the way are left,
-    // and a turn of 12 degrees is over the limit.
+    // Every third scan of 0.11 m; after the tenth, 0.11 m of the way are
+    // left, and a turn of 12 degrees is over the limit.
     EXPECT_EQ(keys, (std::vector<int>{0, 3, 6, 9, 13, 16, 19}));
   }
 }
@@ -643,20 +747,6 @@ std::vector<RefinedScan> TakeAll(OdometryRefiner* refiner,
     before.push_back(settled.refined);
   }
   return before;
-}
-
-// The hall with two niches, so that it looks like itself from one place alone.
-std::vector<WallEnds> PlainHall() {
-  std::vector<WallEnds> walls = Hall();
-  for (const WallEnds& side :
-       testing::Moved(Room(1.0, 2.0), {-4.5, 3.0, 0.0})) {
-    walls.push_back(side);
-  }
-  for (const WallEnds& side :
-       testing::Moved(Room(2.5, 0.6), {3.0, -3.7, 0.0})) {
-    walls.push_back(side);
-  }
-  return walls;
 }
 
 // While the robot turned by 70 degrees scans are missing for three seconds; the

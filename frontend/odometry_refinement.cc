@@ -470,7 +470,8 @@ bool OdometryRefiner::MovesOn(bool leapt, UncertainPose2* since_key,
   const double clearly = (match->cost - other.cost) * CountApart(points_);
   const bool same = apart.head<2>().norm() <= options_.clutter_distance &&
                     std::abs(apart[2]) <= options_.clutter_rotation;
-  const bool moves = !same &&
+  // No robot leaps: what the returns do not speak against holds.
+  const bool moves = (leapt || !same) &&
                      other.inlier_ratio >= options_.minimum_inlier_ratio &&
                      clearly > (leapt ? -kClearly : kClearly);
   if (trace_) {
@@ -514,6 +515,7 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
     result.pose = prior.pose;
     motion = Between(track_.last_pose, result.pose);
   }
+  if (moves_on || is_dead_) odometry_scale_.Break();
   // What may move is not what stands: where it speaks for another pose than the
   // rest, the rest counts.
   if (track_.moving > 0) --track_.moving;

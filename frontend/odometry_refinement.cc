@@ -21,33 +21,11 @@
 namespace plumbline {
 namespace {
 
-// Points of a track that are searched with lie so far apart, m, and those that
-// are kept of old key scans.
-constexpr double kSearchSpacing = 0.2;
-constexpr double kArchiveSpacing = 0.1;
 // First and last key scans of a track that are searched with.
 constexpr std::size_t kLocalKeys = 12;
 constexpr std::size_t kGlobalKeys = 24;
-// Key scans that far from a pose say what was seen around it, m.
-constexpr double kNearArchive = 5.0;
-// Key scans of one visit to a place.
-constexpr std::size_t kShortestVisit = 4;
-constexpr std::size_t kLongestVisit = 40;
-// Visits to a place that are looked at, and key scans that are searched in for
-// each square of the floor, whose side is this, m.
-constexpr std::size_t kMostVisits = 8;
-constexpr std::size_t kMostThere = 32;
-constexpr double kThere = 1.0;
 // Scans that wait for a tie at most while nothing can be tracked.
 constexpr std::size_t kMostPending = 1000;
-// So far from itself a place may lie that is visited again, m and rad.
-constexpr double kVisitDistance = 3.0;
-constexpr double kVisitRotation = DegToRad(15.0);
-// Peaks of a search that are looked at, the least score of one and its share of
-// the best.
-constexpr int kPeaks = 16;
-constexpr double kLeastScore = 0.25;
-constexpr double kPeakShare = 0.6;
 // No robot of a building moves faster, m/s and rad/s, but for so much, m and
 // rad: odometry has jumped.
 constexpr double kFastest = 3.0;
@@ -71,8 +49,6 @@ constexpr double kApart = 0.15;
 // Counted returns from which on a share of them says something.
 constexpr int kLeastIntruders = 5;
 constexpr int kLeastSeenThrough = 20;
-// A returns' share of what is known is not divided by less.
-constexpr double kLeastKnown = 0.4;
 // Standard deviations of a tie: m and rad, and those that grow with the way.
 constexpr double kTieSigma = 0.03;
 constexpr double kTieAngle = DegToRad(0.5);
@@ -86,28 +62,10 @@ constexpr double kUsualInnovation = 9.0;
 // fifth of the usual standard deviation. What is measured holds for single
 // motions; over a gap errors of scale add up that it does not show.
 constexpr double kLeastOdometryScale = 0.04;
-// Where the returns say nothing, m.
-constexpr double kOpenSigma = 2.0;
 // Of a loose one, m and rad: a weak pull that keeps the map in one frame, not a
 // belief.
 constexpr double kLooseSigma = 3.0;
 constexpr double kLooseAngle = DegToRad(20.0);
-
-// Parts that are looked for in the rest when all scans are in, at most.
-constexpr int kMostLateParts = 24;
-// A part is looked for again when the rest has grown by this factor.
-constexpr double kMoreRest = 1.25;
-// Points at most that tell how clearly a window of a part fits somewhere, and
-// nodes of the searches for all windows of a part.
-constexpr std::size_t kClearPoints = 128;
-constexpr std::int64_t kLateNodes = 12000000;
-// A tie that is known worse than this is a rough one: the part is still loose,
-// m and rad.
-constexpr double kLateSigma = 0.5;
-constexpr double kLateAngle = DegToRad(5.0);
-// A rough one that is known worse than this is not taken: a guess is as good.
-constexpr double kRoughSigma = 10.0;
-constexpr double kRoughAngle = DegToRad(20.0);
 
 Eigen::Matrix3d Diagonal(double translation, double rotation) {
   return Eigen::Vector3d(translation * translation, translation * translation,
@@ -115,24 +73,7 @@ Eigen::Matrix3d Diagonal(double translation, double rotation) {
       .asDiagonal();
 }
 
-ScanPoint PointOf(const Eigen::Vector4f& values) {
-  ScanPoint point{};
-  point.position = values.head<2>().cast<double>();
-  point.normal = values.tail<2>().cast<double>();
-  return point;
-}
-
 double Square(double x) { return x * x; }
-
-double SeenThrough(const ScanAgreement& a) {
-  return a.seen > 0 ? static_cast<double>(a.seen_through) / a.seen : 0.0;
-}
-
-// Share of the returns that do not lie in the unknown.
-double KnownShare(const ScanAgreement& a) {
-  const int known = a.hits + a.intruders;
-  return static_cast<double>(known) / std::max(1, known + a.unknown);
-}
 
 // Chi-square of what a match leaves the prior by.
 double SquaredInnovation(const MatchResult& match, const MatchPrior& prior) {
@@ -169,18 +110,6 @@ double OdometryCost(double squared_innovation, double scale) {
   return scale * std::log1p(squared_innovation / scale);
 }
 
-// Share of the returns on what the reference has seen, of all that do not lie
-// in the unknown.
-double Support(const ScanAgreement& a) {
-  return static_cast<double>(a.hits) / std::max(1, a.hits + a.intruders);
-}
-
-// How much of a scan the reference explains, at most 1.
-double Quality(const ScanAgreement& a) {
-  return (a.hits * (1.0 - SeenThrough(a)) - 2.0 * a.intruders) /
-         std::max(1, a.hits + a.intruders + a.unknown);
-}
-
 }  // namespace
 
 Eigen::Matrix3d OdometryCovariance(const Pose2& motion,
@@ -207,14 +136,17 @@ struct OdometryRefiner::Outcome {
 };
 
 OdometryRefiner::OdometryRefiner(const OdometryRefinementOptions& options)
-    : usual_options_(options), options_(options), track_(options.matcher) {
+    : usual_options_(options),
+      options_(options),
+      track_(options.matcher),
+      search_(options.tracking, options.matcher) {
   SetNoiseScale(RangeNoiseScale(options.range_sigma));
 }
 
 void OdometryRefiner::RebuildReference(Track* track) {
   std::vector<ScanPoint> reference;
   std::vector<Viewpoint> viewpoints;
-  for (const KeyScan& key : track->keys) {
+  for (const TrackKey& key : track->keys) {
     // Where odometry has jumped: nothing is in sight of both.
     if ((key.pose - track->keys.back().pose).head<2>().norm() >
         2.0 * options_.points.usable_range) {
@@ -323,7 +255,7 @@ void OdometryRefiner::MatchWithoutIntruders(const std::vector<bool>& intruders,
   const MatchResult other = track_.matcher.Refine(standing, prior.pose, prior);
   const ScanAgreement agreement =
       track_.matcher.Compare(points_, other.pose, laser);
-  if (Quality(agreement) >= Quality(*here)) {
+  if (agreement.Quality() >= here->Quality()) {
     *match = other;
     *here = agreement;
   }
@@ -340,7 +272,7 @@ bool OdometryRefiner::Contradicts(const ScanAgreement& agreement,
           agreement.intruders >
               most * (agreement.hits + agreement.intruders)) ||
          (agreement.seen_through >= kLeastSeenThrough &&
-          SeenThrough(agreement) > through + seen_through);
+          agreement.SeenThroughShare() > through + seen_through);
 }
 
 bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
@@ -364,12 +296,12 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
       tracking.max_innovation *
           std::min(1.0, static_cast<double>(here.hits) / tracking.min_hits);
   // What contradicted the scan before already is no news.
-  const double before = track_.after_gap
-                            ? SeenThrough(track_.matcher.Compare(
-                                  track_.last_points, track_.last_pose, laser))
-                            : 0.0;
-  const double ratio =
-      match->inlier_ratio / std::max(kLeastKnown, KnownShare(here));
+  const double before =
+      track_.after_gap
+          ? track_.matcher.Compare(track_.last_points, track_.last_pose, laser)
+                .SeenThroughShare()
+          : 0.0;
+  const double ratio = here.OfKnown(match->inlier_ratio);
   // After a gap a match must be better.
   const double least = !track_.after_gap ? options_.minimum_inlier_ratio
                        : agrees          ? tracking.min_ratio_after_gap
@@ -378,7 +310,7 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
       ratio >= least && match->inliers >= options_.minimum_points &&
       (agrees || here.hits >= tracking.min_hits) &&
       (agrees || !track_.after_gap ||
-       Support(here) >= tracking.min_unexpected_support) &&
+       here.Support() >= tracking.min_unexpected_support) &&
       !((track_.after_gap || !agrees) && Contradicts(here, before));
   if (!believed && (track_.after_gap || Contradicts(there, before))) {
     outcome->verdict = Outcome::Verdict::kContradicted;
@@ -548,7 +480,8 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   outcome.information = rotation * match.information * rotation.transpose();
   result.since_key.covariance =
       (outcome.information + result.since_key.covariance.inverse()).inverse();
-  result.since_key.covariance += DriftCovariance(result.since_key.mean);
+  result.since_key.covariance +=
+      DriftCovariance(result.since_key.mean, options_.drift);
   return outcome;
 }
 
@@ -567,6 +500,7 @@ void OdometryRefiner::SetNoiseScale(double scale) {
   noise_scale_ = scale;
   options_ = usual_options_;
   options_.ScaleToNoise(scale);
+  search_.set_matcher(options_.matcher);
   track_.matcher.set_point_sigma(options_.matcher.point_sigma);
   if (open_ != nullptr) {
     open_->before.matcher.set_point_sigma(options_.matcher.point_sigma);
@@ -728,7 +662,7 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
     started_ = true;
     done.refined.pose = scan.odometry;
     BeginTrack(scan, &done);
-    Archive(track_.keys.back());
+    search_.Add(track_.keys.back(), part_);
     settled_.push_back(done);
     return done.refined;
   }
@@ -760,7 +694,7 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
     ContinueTrack(scan, outcome.information, &done);
   }
   if (open_ == nullptr) {
-    if (done.refined.is_key) Archive(track_.keys.back());
+    if (done.refined.is_key) search_.Add(track_.keys.back(), part_);
     settled_.push_back(done);
     return done.refined;
   }
@@ -778,140 +712,6 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
   return done.refined;
 }
 
-OdometryRefiner::TrackView OdometryRefiner::ViewOf(
-    const std::vector<KeyScan>& keys, std::size_t begin, std::size_t end) {
-  TrackView view;
-  std::set<std::array<long, 2>> taken;
-  std::set<std::array<long, 2>> taken_dense;
-  const Pose2& middle = keys[(begin + end) / 2].pose;
-  for (std::size_t k = begin; k < end; ++k) {
-    view.keys.push_back(&keys[k]);
-    view.relative.push_back(Between(middle, keys[k].pose));
-    const PoseTransform transform(view.relative.back());
-    for (const ScanPoint& point : keys[k].points) {
-      const ScanPoint moved = Moved(point, transform);
-      const auto cell = [&](double spacing) {
-        return std::array<long, 2>{std::lround(moved.position.x() / spacing),
-                                   std::lround(moved.position.y() / spacing)};
-      };
-      if (taken.insert(cell(kSearchSpacing)).second) {
-        view.sparse.push_back(moved.position);
-      }
-      if (moved.normal.squaredNorm() > 0.0 &&
-          taken_dense.insert(cell(kArchiveSpacing)).second) {
-        view.dense.push_back(moved);
-      }
-    }
-  }
-  return view;
-}
-
-bool OdometryRefiner::Judge(const TrackView& view, const ScoredPose& peak,
-                            const Visit& visit, double seen_through,
-                            bool is_global, Hypothesis* hypothesis) const {
-  const TrackingOptions& tracking = options_.tracking;
-  MatchPrior none;
-  none.pose = peak.pose;
-  const MatchResult match = visit.matcher->Refine(view.dense, peak.pose, none);
-  const Pose2 moved = Between(peak.pose, match.pose);
-  // Nothing there to hold it.
-  if (moved.head<2>().norm() > ScanMatcher::kPeakDistance ||
-      std::abs(moved[2]) > ScanMatcher::kPeakRotation) {
-    return false;
-  }
-  hypothesis->pose = match.pose;
-  hypothesis->information = match.information;
-  hypothesis->begin = visit.begin;
-  hypothesis->end = visit.end;
-  ScanAgreement sum;
-  for (std::size_t k = 0; k < view.keys.size(); ++k) {
-    const ScanAgreement a = visit.matcher->Compare(
-        view.keys[k]->points, Compose(match.pose, view.relative[k]),
-        view.keys[k]->laser);
-    sum.hits += a.hits;
-    sum.intruders += a.intruders;
-    sum.unknown += a.unknown;
-    sum.seen += a.seen;
-    sum.seen_through += a.seen_through;
-  }
-  const double min_support =
-      is_global ? tracking.min_global_support : tracking.min_tie_support;
-  const double min_inliers =
-      is_global ? tracking.min_global_inliers : tracking.min_tie_inliers;
-  const double inliers =
-      match.inlier_ratio / std::max(kLeastKnown, KnownShare(sum));
-  hypothesis->support = Support(sum);
-  hypothesis->quality = Quality(sum) * std::min(1.0, inliers);
-  hypothesis->holds =
-      peak.score >= tracking.min_tie_score &&
-      hypothesis->support >= min_support && inliers >= min_inliers &&
-      SeenThrough(sum) <= tracking.max_tie_seen_through + seen_through &&
-      KnownShare(sum) >= tracking.min_tie_known &&
-      sum.hits >= tracking.min_tie_hits * static_cast<int>(view.keys.size());
-  if (trace_) {
-    char text[256];
-    std::snprintf(text, sizeof text,
-                  "  peak %.2f visit %d-%d -> %.2f %.2f %.1f ratio %.2f "
-                  "hits %d intr %d unk %d seen %d thr %d q %.3f holds %d",
-                  peak.score, static_cast<int>(visit.begin),
-                  static_cast<int>(visit.end), match.pose[0], match.pose[1],
-                  RadToDeg(match.pose[2]), match.inlier_ratio, sum.hits,
-                  sum.intruders, sum.unknown, sum.seen, sum.seen_through,
-                  hypothesis->quality, static_cast<int>(hypothesis->holds));
-    trace_(text);
-  }
-  return true;
-}
-
-bool OdometryRefiner::FindTie(
-    const std::vector<KeyScan>& keys, const ScanMatcher& reference,
-    const std::function<std::vector<Visit>(const Pose2&)>& visits,
-    const Pose2& center, double translation_window, std::size_t begin,
-    std::size_t end, double seen_through, bool is_global, std::int64_t* nodes,
-    Hypothesis* found) {
-  const TrackView view = ViewOf(keys, begin, end);
-  const std::vector<ScoredPose> peaks = reference.Peaks(
-      view.sparse, center, translation_window, kPi, kLeastScore, kPeakShare,
-      kPeaks,
-      is_global ? kNearArchive : std::numeric_limits<double>::infinity(), stop_,
-      nodes);
-  std::vector<Hypothesis> hypotheses;
-  for (const ScoredPose& peak : peaks) {
-    for (const Visit& visit : visits(peak.pose)) {
-      if (stop_ && stop_()) return false;
-      Hypothesis hypothesis;
-      if (Judge(view, peak, visit, seen_through, is_global, &hypothesis)) {
-        hypotheses.push_back(hypothesis);
-      }
-    }
-  }
-  const Hypothesis* best = nullptr;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    if (best == nullptr || hypothesis.quality > best->quality) {
-      best = &hypothesis;
-    }
-  }
-  if (best == nullptr || !best->holds) return false;
-  for (const Hypothesis& rival : hypotheses) {
-    // Seen on another visit a place lies beside itself.
-    const bool same_visit = rival.begin < best->end
-                                ? best->begin < rival.end
-                                : rival.begin == best->begin;
-    const Pose2 apart = Between(best->pose, rival.pose);
-    if (apart.head<2>().norm() <
-            (same_visit ? ScanMatcher::kPeakDistance : kVisitDistance) &&
-        std::abs(apart[2]) <
-            (same_visit ? ScanMatcher::kPeakRotation : kVisitRotation)) {
-      continue;
-    }
-    if (rival.quality > options_.tracking.rival_share * best->quality) {
-      return false;
-    }
-  }
-  *found = *best;
-  return true;
-}
-
 void OdometryRefiner::Tie(bool last) {
   const TrackingOptions& tracking = options_.tracking;
   const int count = static_cast<int>(open_->keys.size());
@@ -919,8 +719,8 @@ void OdometryRefiner::Tie(bool last) {
   open_->next_attempt = count + std::max(1, count / 3);
   if (trace_) trace_("TIE attempt keys " + std::to_string(count));
   RefinedScan first;
-  Hypothesis found;
-  const KeyScan& start = open_->keys.front();
+  FoundTrack found;
+  const TrackKey& start = open_->keys.front();
   std::size_t middle = 0;
   if (count >= tracking.min_tie_keys) {
     const std::size_t end =
@@ -929,16 +729,11 @@ void OdometryRefiner::Tie(bool last) {
     const double window =
         std::min(tracking.max_local_search,
                  0.5 + 0.5 * open_->way + tracking.gap_speed * open_->seconds);
-    const ScanMatcher& reference = open_->before.matcher;
-    if (FindTie(
-            open_->keys, reference,
-            [&reference](const Pose2&) {
-              return std::vector<Visit>{{&reference, 0, 0}};
-            },
-            open_->keys[middle].pose, window, 0, end, open_->seen_through,
-            false, nullptr, &found)) {
+    if (search_.FindHere(open_->keys, open_->before.matcher,
+                         open_->keys[middle].pose, window, 0, end,
+                         open_->seen_through, &found)) {
       const bool is_expected =
-          AgreesWithOdometry(found, middle, archive_.size() - 1);
+          AgreesWithOdometry(found, middle, search_.seen().size() - 1);
       // Where the robot was carried the right place need not be among those
       // that were searched, and the next door looks like this one.
       if (is_expected || (!open_->odometry_holds &&
@@ -950,15 +745,15 @@ void OdometryRefiner::Tie(bool last) {
   if (first.tie == TrackTie::kNone && count >= tracking.first_global_keys &&
       (last || count >= open_->next_global)) {
     open_->next_global = 2 * count;
-    std::vector<std::size_t> where(archive_.size());
+    std::vector<std::size_t> where(search_.seen().size());
     std::iota(where.begin(), where.end(), std::size_t{0});
     const std::size_t end = open_->keys.size();
     const std::size_t begin = end > kGlobalKeys ? end - kGlobalKeys : 0;
     middle = (begin + end) / 2;
-    if (FindInArchive(open_->keys, ViewOfArchive(where), begin, end,
-                      open_->seen_through, nullptr, &found)) {
-      const std::size_t nearest = NearestOf(found, where);
-      const ArchivedKey& key = archive_[nearest];
+    if (search_.FindAnywhere(open_->keys, search_.AreaOf(where), begin, end,
+                             open_->seen_through, nullptr, &found)) {
+      const std::size_t nearest = search_.NearestOf(found, where);
+      const SeenKey& key = search_.seen()[nearest];
       if (!open_->odometry_holds ||
           AgreesWithOdometry(found, middle, nearest)) {
         first.tie = TrackTie::kMatched;
@@ -977,7 +772,7 @@ void OdometryRefiner::Tie(bool last) {
     }
     const UncertainPose2 tie{Between(from, found.pose),
                              TieCovariance(found, from)};
-    first.since_key = Compose(tie, Along(back));
+    first.since_key = Compose(tie, DriftAlong(back, options_.drift));
     first.pose = Compose(from, first.since_key.mean);
   }
   if (first.tie == TrackTie::kNone) {
@@ -1043,14 +838,14 @@ UncertainPose2 OdometryRefiner::BlindMotion() const {
           covariance};
 }
 
-bool OdometryRefiner::AgreesWithOdometry(const Hypothesis& found,
+bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
                                          std::size_t middle,
                                          std::size_t since) const {
   std::vector<Pose2> before;
-  for (std::size_t k = since; k < archive_.size(); ++k) {
+  for (std::size_t k = since; k < search_.seen().size(); ++k) {
     // A guess lies between.
-    if (archive_[k].part != archive_.back().part) return true;
-    before.push_back(archive_[k].pose);
+    if (search_.seen()[k].part != search_.seen().back().part) return true;
+    before.push_back(search_.seen()[k].pose);
   }
   std::vector<Pose2> after;
   for (std::size_t k = 0; k <= middle; ++k) {
@@ -1058,13 +853,13 @@ bool OdometryRefiner::AgreesWithOdometry(const Hypothesis& found,
   }
   // What neighbouring matches have in common adds up faster than a random walk.
   const auto generous = [this](const std::vector<Pose2>& poses) {
-    UncertainPose2 way = Along(poses);
+    UncertainPose2 way = DriftAlong(poses, options_.drift);
     way.covariance *= kGenerous;
     return way;
   };
   const UncertainPose2 predicted =
       Compose(Compose(generous(before), BlindMotion()), generous(after));
-  const Pose2 from = archive_[since].pose;
+  const Pose2 from = search_.seen()[since].pose;
   Pose2 left = Between(from, found.pose) - predicted.mean;
   left[2] = NormalizeAngle(left[2]);
   const Eigen::Matrix3d covariance =
@@ -1110,15 +905,15 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
     }
     loose_.push_back(std::move(part));
   }
-  for (KeyScan& key : open_->keys) {
+  for (TrackKey& key : open_->keys) {
     key.pose = Compose(shift, key.pose);
-    Archive(key);
+    search_.Add(key, part_);
   }
-  for (KeyScan& key : track_.keys) key.pose = Compose(shift, key.pose);
+  for (TrackKey& key : track_.keys) key.pose = Compose(shift, key.pose);
   track_.last_pose = Compose(shift, track_.last_pose);
   // What was seen before goes on being the reference.
   if (first.tie == TrackTie::kMatched && first.since < 0) {
-    std::deque<KeyScan>& before = open_->before.keys;
+    std::deque<TrackKey>& before = open_->before.keys;
     while (static_cast<int>(track_.keys.size()) < options_.window &&
            !before.empty()) {
       track_.keys.push_front(std::move(before.back()));
@@ -1129,386 +924,6 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
   open_.reset();
 }
 
-Eigen::Matrix3d OdometryRefiner::TieCovariance(const Hypothesis& found,
-                                               const Pose2& from) const {
-  const Eigen::Matrix3d rotation = RotationInto(from);
-  const Eigen::Matrix3d information =
-      rotation * found.information * rotation.transpose() +
-      Diagonal(kOpenSigma, kPi).inverse();
-  return information.inverse() + Diagonal(kTieSigma, kTieAngle);
-}
-
-UncertainPose2 OdometryRefiner::Along(const std::vector<Pose2>& poses) const {
-  UncertainPose2 sum;
-  sum.covariance.setZero();
-  for (std::size_t k = 1; k < poses.size(); ++k) {
-    const Pose2 step = Between(poses[k - 1], poses[k]);
-    sum = Compose(sum, {step, DriftCovariance(step)});
-  }
-  return sum;
-}
-
-Eigen::Matrix3d OdometryRefiner::DriftCovariance(const Pose2& motion) const {
-  const MatchDrift& drift = options_.drift;
-  const double way = motion.head<2>().norm();
-  const double turned = std::abs(motion[2]);
-  const double translation =
-      drift.translation_per_root_metre * drift.translation_per_root_metre * way;
-  const double heading =
-      drift.rotation_per_root_metre * drift.rotation_per_root_metre * way +
-      drift.rotation_per_root_radian * drift.rotation_per_root_radian * turned;
-  return Eigen::Vector3d(translation, translation, heading).asDiagonal();
-}
-
-void OdometryRefiner::SetArchive(const std::vector<std::size_t>& where,
-                                 std::size_t begin, std::size_t end,
-                                 ScanMatcher* matcher) const {
-  std::vector<ScanPoint> reference;
-  std::vector<Viewpoint> viewpoints;
-  for (std::size_t i = begin; i < end; ++i) {
-    const ArchivedKey& key = archive_[where[i]];
-    const PoseTransform transform(key.pose);
-    viewpoints.push_back({transform.Point(key.laser), reference.size()});
-    for (const Eigen::Vector4f& values : key.points) {
-      reference.push_back(Moved(PointOf(values), transform));
-    }
-  }
-  matcher->SetReference(std::move(reference), std::move(viewpoints));
-}
-
-std::vector<std::size_t> OdometryRefiner::Thinned(
-    const std::vector<std::size_t>& where) const {
-  std::map<std::pair<long, long>, std::vector<std::size_t>> there;
-  for (const std::size_t k : where) {
-    const Eigen::Vector2d at = archive_[k].pose.head<2>() / kThere;
-    there[{std::lround(at.x()), std::lround(at.y())}].push_back(k);
-  }
-  std::vector<std::size_t> thinned;
-  for (const auto& entry : there) {
-    const std::vector<std::size_t>& all = entry.second;
-    const std::size_t count = std::min(all.size(), kMostThere);
-    for (std::size_t i = 0; i < count; ++i) {
-      thinned.push_back(all[(2 * i + 1) * all.size() / (2 * count)]);
-    }
-  }
-  std::sort(thinned.begin(), thinned.end());
-  return thinned;
-}
-
-OdometryRefiner::ArchiveView OdometryRefiner::ViewOfArchive(
-    const std::vector<std::size_t>& where) const {
-  Eigen::Vector2d low = archive_[where.front()].pose.head<2>();
-  Eigen::Vector2d high = low;
-  for (const std::size_t k : where) {
-    low = low.cwiseMin(archive_[k].pose.head<2>());
-    high = high.cwiseMax(archive_[k].pose.head<2>());
-  }
-  const Eigen::Vector2d center = 0.5 * (low + high);
-  ArchiveView view{where, ScanMatcher(options_.matcher),
-                   Pose2(center.x(), center.y(), 0.0),
-                   0.5 * (high - low).maxCoeff() + 1.0};
-  const std::vector<std::size_t> thinned = Thinned(where);
-  SetArchive(thinned, 0, thinned.size(), &view.matcher);
-  return view;
-}
-
-bool OdometryRefiner::FindInArchive(const std::vector<KeyScan>& keys,
-                                    const ArchiveView& archive,
-                                    std::size_t begin, std::size_t end,
-                                    double seen_through, std::int64_t* nodes,
-                                    Hypothesis* found) {
-  const std::vector<std::size_t>& where = archive.where;
-  std::deque<ScanMatcher> around;
-  const auto visits = [&](const Pose2& pose) {
-    std::vector<std::pair<std::size_t, std::size_t>> all;
-    std::size_t k = 0;
-    while (k < where.size()) {
-      const auto is_near = [&](std::size_t i) {
-        return (archive_[where[i]].pose - pose).head<2>().norm() <=
-               kNearArchive;
-      };
-      if (!is_near(k)) {
-        ++k;
-        continue;
-      }
-      const std::size_t first = k;
-      while (k < where.size() && is_near(k) && k - first < kLongestVisit) ++k;
-      if (k - first >= kShortestVisit) all.emplace_back(first, k);
-    }
-    // In even steps where they are many.
-    const std::size_t count = std::min(all.size(), kMostVisits);
-    std::vector<Visit> result;
-    around.clear();
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto& [first, last] = all[(2 * i + 1) * all.size() / (2 * count)];
-      around.emplace_back(options_.matcher);
-      SetArchive(where, first, last, &around.back());
-      result.push_back({&around.back(), first, last});
-    }
-    return result;
-  };
-  return FindTie(keys, archive.matcher, visits, archive.center, archive.window,
-                 begin, end, seen_through, true, nodes, found);
-}
-
-std::size_t OdometryRefiner::NearestOf(
-    const Hypothesis& found, const std::vector<std::size_t>& where) const {
-  return *std::min_element(
-      where.begin() + static_cast<std::ptrdiff_t>(found.begin),
-      where.begin() + static_cast<std::ptrdiff_t>(found.end),
-      [&](std::size_t a, std::size_t b) {
-        return (archive_[a].pose - found.pose).head<2>().norm() <
-               (archive_[b].pose - found.pose).head<2>().norm();
-      });
-}
-
-void OdometryRefiner::Archive(const KeyScan& key) {
-  ArchivedKey kept;
-  kept.scan = key.scan;
-  kept.part = part_;
-  kept.pose = key.pose;
-  kept.laser = key.laser;
-  Eigen::Vector2d last = Eigen::Vector2d::Constant(1e9);
-  for (const ScanPoint& point : key.points) {
-    if ((point.position - last).norm() < kArchiveSpacing) continue;
-    last = point.position;
-    Eigen::Vector4f values;
-    values << point.position.cast<float>(), point.normal.cast<float>();
-    kept.points.push_back(values);
-  }
-  kept.points.shrink_to_fit();
-  archive_.push_back(std::move(kept));
-}
-
-std::vector<std::vector<std::size_t>> OdometryRefiner::Parts() const {
-  std::vector<std::vector<std::size_t>> parts(
-      static_cast<std::size_t>(num_parts_));
-  for (std::size_t k = 0; k < archive_.size(); ++k) {
-    parts[static_cast<std::size_t>(archive_[k].part)].push_back(k);
-  }
-  return parts;
-}
-
-void OdometryRefiner::JoinParts() {
-  // The largest part takes in others, largest first, until none is found.
-  const std::vector<LooseTrack> loose = loose_;
-  // Key scans that a part was looked for in, by part.
-  std::vector<std::size_t> tried(static_cast<std::size_t>(num_parts_), 0);
-  bool is_joined = num_parts_ > 1;
-  int looked_for = 0;
-  while (is_joined) {
-    is_joined = false;
-    std::vector<std::vector<std::size_t>> parts = Parts();
-    std::stable_sort(
-        parts.begin(), parts.end(),
-        [](const auto& a, const auto& b) { return a.size() > b.size(); });
-    for (std::size_t p = 1; p < parts.size() && !is_joined; ++p) {
-      if (parts[p].empty()) break;
-      std::size_t& before =
-          tried[static_cast<std::size_t>(archive_[parts[p].front()].part)];
-      const std::size_t rest = parts[0].size();
-      if (static_cast<double>(rest) < kMoreRest * static_cast<double>(before)) {
-        continue;
-      }
-      before = rest;
-      // A log of many parts comes to an end, too.
-      if (++looked_for > kMostLateParts) break;
-      if (stop_ && stop_()) break;
-      is_joined = JoinPart(parts[0], parts[p]);
-    }
-  }
-  if (stop_ && stop_()) {
-    loose_ = loose;
-    late_ties_.clear();
-  }
-  std::sort(late_ties_.begin(), late_ties_.end(),
-            [](const LateTie& a, const LateTie& b) { return a.scan < b.scan; });
-}
-
-bool OdometryRefiner::JoinPart(const std::vector<std::size_t>& rest,
-                               const std::vector<std::size_t>& part) {
-  const auto least =
-      static_cast<std::size_t>(options_.tracking.first_global_keys);
-  if (part.size() < least || rest.size() < kShortestVisit) return false;
-  std::vector<KeyScan> keys;
-  for (const std::size_t k : part) {
-    const ArchivedKey& kept = archive_[k];
-    keys.push_back({kept.scan, kept.pose, {}, kept.laser});
-    for (const Eigen::Vector4f& values : kept.points) {
-      keys.back().points.push_back(PointOf(values));
-    }
-  }
-  const std::size_t size = std::min(kGlobalKeys, part.size());
-  const ArchiveView view = ViewOfArchive(rest);
-  const std::vector<std::size_t> windows = WindowsOf(keys, size, view);
-  // What a window says stands when another one says the same, or the part is
-  // too short for another: one that fits nowhere is no reason to believe it.
-  const bool is_short = NumLateWindows(part.size(), size) == 1;
-  std::vector<LateVote> votes;
-  LateVote best_vote;
-  std::optional<LateTie> best;
-  const auto variance = [](const LateTie& tie) {
-    const Eigen::Matrix3d& covariance = tie.since_key.covariance;
-    return std::max({covariance(0, 0) / Square(kLateSigma),
-                     covariance(1, 1) / Square(kLateSigma),
-                     covariance(2, 2) / Square(kLateAngle)});
-  };
-  std::int64_t nodes = kLateNodes;
-  for (const std::size_t begin : windows) {
-    if (stop_ && stop_()) return false;
-    if (nodes <= 0) break;
-    // A jump within a window is none of the track's: parts are whole.
-    LateVote vote{begin + size / 2, {}};
-    if (!FindInArchive(keys, view, begin, begin + size, 0.0, &nodes,
-                       &vote.found)) {
-      continue;
-    }
-    if (trace_) trace_("LATE window found");
-    const auto confirms = [&](const LateVote& other) {
-      const Pose2 expected =
-          Compose(other.found.pose,
-                  Between(keys[other.middle].pose, keys[vote.middle].pose));
-      const Pose2 apart = Between(expected, vote.found.pose);
-      return apart.head<2>().norm() < kVisitDistance &&
-             std::abs(apart[2]) < kVisitRotation;
-    };
-    std::vector<const LateVote*> agreeing;
-    for (const LateVote& other : votes) {
-      if (confirms(other)) agreeing.push_back(&other);
-    }
-    if (!agreeing.empty() || is_short) {
-      agreeing.push_back(&vote);
-      for (const LateVote* other : agreeing) {
-        const LateTie tie = LateTieOf(rest, part, *other);
-        const bool is_narrow = variance(tie) <= 1.0;
-        const bool is_better =
-            !best || (is_narrow && variance(*best) <= 1.0
-                          ? other->found.quality > best_vote.found.quality
-                          : variance(tie) < variance(*best));
-        if (is_better) {
-          best = tie;
-          best_vote = *other;
-        }
-      }
-      if (variance(*best) <= 1.0) break;
-    }
-    votes.push_back(vote);
-  }
-  if (!best ||
-      best->since_key.covariance.diagonal().head<2>().maxCoeff() >
-          Square(kRoughSigma) ||
-      best->since_key.covariance(2, 2) > Square(kRoughAngle)) {
-    return false;
-  }
-  AddLateTie(rest, part, best_vote, *best, variance(*best) > 1.0);
-  return true;
-}
-
-std::size_t OdometryRefiner::NumLateWindows(std::size_t keys,
-                                            std::size_t size) const {
-  return std::min(static_cast<std::size_t>(options_.tracking.max_late_windows),
-                  1 + 2 * (keys - size) / size);
-}
-
-std::vector<std::size_t> OdometryRefiner::WindowsOf(
-    const std::vector<KeyScan>& keys, std::size_t size,
-    const ArchiveView& rest) const {
-  const std::size_t room = keys.size() - size;
-  const std::size_t windows = NumLateWindows(keys.size(), size);
-  std::vector<std::pair<double, std::size_t>> scored;
-  for (std::size_t w = 0; w < windows; ++w) {
-    if (stop_ && stop_()) return {};
-    const std::size_t begin = windows > 1 ? w * room / (windows - 1) : 0;
-    const std::vector<Eigen::Vector2d> all =
-        ViewOf(keys, begin, begin + size).sparse;
-    std::vector<Eigen::Vector2d> few;
-    const std::size_t step = (all.size() + kClearPoints - 1) / kClearPoints;
-    for (std::size_t i = 0; i < all.size(); i += step) few.push_back(all[i]);
-    scored.emplace_back(
-        windows > 1 ? rest.matcher.ClearestScore(few, rest.center, rest.window,
-                                                 kPi, kNearArchive, stop_)
-                    : 1.0,
-        begin);
-  }
-  std::stable_sort(
-      scored.begin(), scored.end(),
-      [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::vector<std::size_t> begins;
-  for (const auto& [score, begin] : scored) {
-    if (score >= options_.tracking.min_tie_score) begins.push_back(begin);
-  }
-  return begins;
-}
-
-LateTie OdometryRefiner::LateTieOf(const std::vector<std::size_t>& rest,
-                                   const std::vector<std::size_t>& part,
-                                   const LateVote& vote) const {
-  // The match says where the part's key scan is among the rest. The one of the
-  // two that begins later hangs on what was seen before it began.
-  const std::size_t at_rest = NearestOf(vote.found, rest);
-  const std::size_t at_part = part[vote.middle];
-  const Pose2 match = Between(archive_[at_rest].pose, vote.found.pose);
-  const bool is_later = part.front() > rest.front();
-  const std::vector<std::size_t>& later = is_later ? part : rest;
-  const std::vector<std::size_t>& earlier = is_later ? rest : part;
-  const std::size_t at_later = is_later ? at_part : at_rest;
-  const std::size_t at_earlier = is_later ? at_rest : at_part;
-  const auto last_before = std::prev(
-      std::lower_bound(earlier.begin(), earlier.end(), later.front()));
-  const std::size_t since = std::min(*last_before, at_earlier);
-  const auto along = [&](const std::vector<std::size_t>& keys, std::size_t from,
-                         std::size_t to) {
-    std::vector<Pose2> poses;
-    for (const std::size_t k : keys) {
-      if (std::min(from, to) <= k && k <= std::max(from, to)) {
-        poses.push_back(archive_[k].pose);
-      }
-    }
-    if (to < from) std::reverse(poses.begin(), poses.end());
-    return Along(poses);
-  };
-  UncertainPose2 tie{match, TieCovariance(vote.found, archive_[at_rest].pose)};
-  if (!is_later) tie = Inverse(tie);
-  LateTie late;
-  late.scan = archive_[later.front()].scan;
-  late.since = archive_[since].scan;
-  late.since_key = Compose(Compose(along(earlier, since, at_earlier), tie),
-                           along(later, at_later, later.front()));
-  return late;
-}
-
-void OdometryRefiner::AddLateTie(const std::vector<std::size_t>& rest,
-                                 const std::vector<std::size_t>& part,
-                                 const LateVote& vote, const LateTie& tie,
-                                 bool is_rough) {
-  late_ties_.push_back(tie);
-  if (trace_) {
-    trace_("JOINED scan " + std::to_string(tie.scan) + " since " +
-           std::to_string(tie.since) + (is_rough ? " roughly" : ""));
-  }
-  const bool is_later = part.front() > rest.front();
-  const std::vector<std::size_t>& later = is_later ? part : rest;
-  const std::vector<std::size_t>& earlier = is_later ? rest : part;
-  // Parts are numbered in the order in which they began.
-  const int number = archive_[later.front()].part;
-  LooseTrack& loose = loose_[loose_of_[static_cast<std::size_t>(number) - 1]];
-  loose.why = loose.why.substr(0, loose.why.find(';')) +
-              "; found again on what was seen later";
-  if (is_rough) {
-    loose.why += ", roughly";
-  } else {
-    loose.found = true;
-    loose.end = tie.scan;
-  }
-  const Pose2 shift =
-      Compose(vote.found.pose, Inverse(archive_[part[vote.middle]].pose));
-  const int into = archive_[earlier.front()].part;
-  for (const std::size_t k : part) {
-    archive_[k].pose = Compose(shift, archive_[k].pose);
-  }
-  for (const std::size_t k : later) archive_[k].part = into;
-}
-
 bool OdometryRefiner::TakeSettled(SettledScan* settled) {
   if (settled_.empty()) return false;
   *settled = std::move(settled_.front());
@@ -1517,22 +932,23 @@ bool OdometryRefiner::TakeSettled(SettledScan* settled) {
 }
 
 void OdometryRefiner::Finish(const std::function<bool()>& stop) {
-  stop_ = stop;
+  search_.set_stop(stop);
   if (open_ != nullptr) Tie(true);
   if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
   guessed_ = -1;
-  JoinParts();
-  stop_ = nullptr;
+  late_ties_ = JoinParts(options_.tracking, options_.drift, loose_of_, &search_,
+                         &loose_);
+  search_.set_stop(nullptr);
   // No scan follows.
-  std::vector<ArchivedKey>().swap(archive_);
+  search_.Clear();
 }
 
 template <typename StateArchive>
 void OdometryRefiner::ExchangeState(StateArchive& archive) {
   ExchangeAll(archive, track_, points_, started_, count_, last_odometry_,
-              last_time_, usual_step_, archive_, part_, num_parts_, loose_of_,
-              wide_searches_, refusals_, losses_, loose_, guessed_, noise_,
-              noise_scale_, key_odometry_, squared_innovations_,
+              last_time_, usual_step_, search_.seen(), part_, num_parts_,
+              loose_of_, wide_searches_, refusals_, losses_, loose_, guessed_,
+              noise_, noise_scale_, key_odometry_, squared_innovations_,
               compared_motions_, odometry_scale_, steady_, still_, last_motion_,
               still_pose_, is_dead_, ahead_);
 }

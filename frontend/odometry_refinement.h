@@ -3,12 +3,16 @@
 
 #include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/match_drift.h>
 #include <plumbline/frontend/odometry_scale.h>
+#include <plumbline/frontend/part_joining.h>
 #include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/scan_points.h>
 #include <plumbline/frontend/steady_motion.h>
+#include <plumbline/frontend/track_search.h>
+#include <plumbline/frontend/tracking_options.h>
 
 #include <Eigen/Core>
 #include <deque>
@@ -38,95 +42,6 @@ struct OdometryNoise {
 /// axes along and across the motion treated alike.
 Eigen::Matrix3d OdometryCovariance(const Pose2& motion,
                                    const OdometryNoise& noise);
-
-/// Errors of scan matching that the returns do not tell of: what neighbouring
-/// matches share (bent surfaces, beams that are not quite where they should be)
-/// adds up along the way like a random walk.
-struct MatchDrift {
-  /// Standard deviations after one metre: m, and rad.
-  double translation_per_root_metre = 0.01;
-  double rotation_per_root_metre = DegToRad(0.1);
-  /// After a turn of one radian, rad.
-  double rotation_per_root_radian = DegToRad(0.7);
-};
-
-/// Options for when the track of the scans is lost, and how its tie to the
-/// earlier track is found again.
-struct TrackingOptions {
-  /// Shares of the returns that stand where the reference has looked through,
-  /// and of the reference's points that the scan looks through, from which on
-  /// they contradict a match. After a gap in the log the second pair counts.
-  double max_intruders = 0.2;
-  double max_seen_through = 0.25;
-  double max_intruders_after_gap = 0.15;
-  double max_seen_through_after_gap = 0.15;
-  /// Inlier ratio, of what is known, that a match after a gap needs when it
-  /// agrees with odometry; else OdometryRefinementOptions::good_inlier_ratio.
-  double min_ratio_after_gap = 0.6;
-  /// Chi-square of a match against odometry from which on contradictions count
-  /// without a gap, too: people contradict, but odometry agrees.
-  double max_innovation = 15.0;
-  /// Scale of Cauchy's loss on that chi-square: how much better the returns
-  /// must fit at a pose that odometry speaks against.
-  double odometry_tail = 9.0;
-  /// Returns that lie 0.15 m apart or more that a match which leaves odometry
-  /// by more than that has to have on what the reference has seen. With fewer
-  /// it may leave odometry by less, in proportion. At least 1.
-  int min_hits = 15;
-  /// A time between scans that is longer than this, s, and this many times the
-  /// usual one is a gap.
-  double gap_seconds = 1.0;
-  double gap_factor = 4.0;
-  /// Scans in a row that are refused, the last for contradicting, after which a
-  /// track of its own begins where there was no gap.
-  int min_contradictions = 3;
-  /// Way (m) and turn (rad) without any match after which a track of its own
-  /// begins.
-  double max_blind_way = 1.5;
-  double max_blind_turn = DegToRad(40.0);
-  /// A tie by odometry alone is accepted when there was neither a gap nor a
-  /// contradiction and its standard deviations, for odometry as it was on this
-  /// log so far, are no larger than these, m and rad.
-  double max_odometry_sigma = 0.75;
-  double max_odometry_angle = DegToRad(20.0);
-  /// From this way without any match on it is reported, m.
-  double max_silent_way = 3.0;
-  /// What a tie needs: scans of the track, share of returns that lie on what
-  /// the reference knows of all that do not lie in the unknown, the same by
-  /// the directions of surfaces too, score of the search, largest share
-  /// of the reference that is looked through, share of the returns that are
-  /// not in the unknown, and returns a scan that lie on the reference.
-  int min_tie_keys = 3;
-  double min_tie_support = 0.85;
-  double min_tie_inliers = 0.5;
-  double min_tie_score = 0.4;
-  double max_tie_seen_through = 0.15;
-  double min_tie_known = 0.4;
-  int min_tie_hits = 15;
-  /// The same share where odometry, which a gap or a contradiction has put in
-  /// doubt, speaks of another place: also for a single scan after a gap.
-  double min_unexpected_support = 0.97;
-  /// What a tie needs that was found in everything seen so far, where many
-  /// places look alike and the right one need not be among them.
-  double min_global_support = 0.96;
-  double min_global_inliers = 0.65;
-  /// A rival pose must be worse by this factor.
-  double rival_share = 0.75;
-  /// Speed at which the robot may have gone in a gap, m/s, and how far the
-  /// search near the last pose goes at most, m. A match that asks for a faster
-  /// move which odometry does not have, and which is longer than
-  /// search_translation by that, does not count: wheels slip, but a robot does
-  /// not leap. A scan may show another time than its stamp says.
-  double gap_speed = 0.8;
-  double max_local_search = 6.0;
-  /// Key scans of the track at which the whole map is searched first, and after
-  /// which the tie is given up.
-  int first_global_keys = 10;
-  int max_open_keys = 150;
-  /// Pieces of a part that hangs loose in the end that are looked for in what
-  /// the rest of the track saw.
-  int max_late_windows = 12;
-};
 
 /// How scans are matched with what was seen last, and how far odometry is
 /// trusted.
@@ -222,28 +137,6 @@ struct SettledScan {
   std::vector<ScanPoint> points;
 };
 
-/// A part of the track that is weakly tied to the rest.
-struct LooseTrack {
-  /// Last scan before it that is sure, and its own last one, or the first one
-  /// that was found again.
-  int begin = 0;
-  int end = 0;
-  std::string why;
-  /// It was found again on what had been seen earlier: the tie is one match,
-  /// not a guess.
-  bool found = false;
-};
-
-/// A tie found once all scans were in, for a part of the track that was settled
-/// as loose.
-struct LateTie {
-  /// First scan of the part; its RefinedScan::tie was kLoose.
-  int scan = 0;
-  /// What RefinedScan::since and since_key of it are now.
-  int since = 0;
-  UncertainPose2 since_key;
-};
-
 /// Refines odometry by matching each scan with the last key scans
 /// (core/method.md, section 7, step 0).
 ///
@@ -307,25 +200,13 @@ class OdometryRefiner {
   /// Calls `trace` with a line on each decision that was not clear-cut.
   void SetTrace(std::function<void(const std::string&)> trace) {
     trace_ = std::move(trace);
+    search_.set_trace(trace_);
   }
 
  private:
-  struct KeyScan {
-    int scan;
-    Pose2 pose;
-    std::vector<ScanPoint> points;
-    // Position of the laser in the robot's frame, m.
-    Eigen::Vector2d laser;
-
-    template <typename Archive>
-    friend void Exchange(Archive& archive, KeyScan& key) {
-      auto& [scan, pose, points, laser] = key;
-      ExchangeAll(archive, scan, pose, points, laser);
-    }
-  };
   // Scans that are matched with each other.
   struct Track {
-    std::deque<KeyScan> keys;
+    std::deque<TrackKey> keys;
     ScanMatcher matcher;
     Pose2 last_pose = Pose2::Zero();
     UncertainPose2 since_key;
@@ -373,7 +254,7 @@ class OdometryRefiner {
     double seen_through = 0.0;
     std::string why;
     // Key scans of the track.
-    std::vector<KeyScan> keys;
+    std::vector<TrackKey> keys;
     int next_attempt = 0;
     int next_global = 0;
   };
@@ -442,62 +323,6 @@ class OdometryRefiner {
                      SettledScan* next);
   // Looks for the tie; settles the track when it is found or `last`.
   void Tie(bool last);
-  // Scans that a tie is judged by, and where it would hang.
-  struct Visit {
-    const ScanMatcher* matcher;
-    // Of the archive, [begin, end); empty for what was seen last.
-    std::size_t begin = 0;
-    std::size_t end = 0;
-  };
-  struct Hypothesis {
-    Pose2 pose = Pose2::Zero();
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-    // Share of the returns on what was seen there, of all that do not lie in
-    // the unknown.
-    double support = 0.0;
-    double quality = 0.0;
-    bool holds = false;
-    std::size_t begin = 0;
-    std::size_t end = 0;
-  };
-  // What key scans of a track have seen, in the frame of their middle.
-  struct TrackView {
-    std::vector<const KeyScan*> keys;
-    std::vector<Pose2> relative;
-    // To search with, and those with normals to match with.
-    std::vector<Eigen::Vector2d> sparse;
-    std::vector<ScanPoint> dense;
-  };
-  static TrackView ViewOf(const std::vector<KeyScan>& keys, std::size_t begin,
-                          std::size_t end);
-  // What a visit says of a pose of the track; false when nothing there holds
-  // it. `seen_through`: share of the reference that was before.
-  bool Judge(const TrackView& view, const ScoredPose& peak, const Visit& visit,
-             double seen_through, bool is_global, Hypothesis* hypothesis) const;
-  // The pose of the middle of the open track's key scans [begin, end) that
-  // explains them best, if it is clear. `visits` gives what was seen around a
-  // pose, each time that the robot was there.
-  // `is_global`: it was looked for in all that was seen.
-  bool FindTie(const std::vector<KeyScan>& keys, const ScanMatcher& reference,
-               const std::function<std::vector<Visit>(const Pose2&)>& visits,
-               const Pose2& center, double translation_window,
-               std::size_t begin, std::size_t end, double seen_through,
-               bool is_global, std::int64_t* nodes, Hypothesis* found);
-  // What was seen from some key scans of the archive, ascending, to be searched
-  // in: around its middle, m each way.
-  struct ArchiveView {
-    const std::vector<std::size_t>& where;
-    ScanMatcher matcher;
-    Pose2 center;
-    double window;
-  };
-  ArchiveView ViewOfArchive(const std::vector<std::size_t>& where) const;
-  // FindTie in it. The visits of `found` are positions in its `where`. `nodes`:
-  // as ScanMatcher::Peaks has it.
-  bool FindInArchive(const std::vector<KeyScan>& keys,
-                     const ArchiveView& archive, std::size_t begin,
-                     std::size_t end, double seen_through, std::int64_t* nodes,
-                     Hypothesis* found);
   // Takes note of how odometry's motion since the last key scan agrees with the
   // match of this one, and begins anew.
   // `information`: of the returns alone, in that key scan's frame.
@@ -510,53 +335,9 @@ class OdometryRefiner {
   // Whether a pose of the open track's key scan `middle` lies within what
   // odometry and the tracks leave open since the archive's key scan `since`;
   // true where they say nothing of it.
-  bool AgreesWithOdometry(const Hypothesis& found, std::size_t middle,
+  bool AgreesWithOdometry(const FoundTrack& found, std::size_t middle,
                           std::size_t since) const;
-  // Of the visit's key scans the nearest one to what was found there.
-  std::size_t NearestOf(const Hypothesis& found,
-                        const std::vector<std::size_t>& where) const;
-  // Sets what was seen from these key scans of the archive, [begin, end).
-  void SetArchive(const std::vector<std::size_t>& where, std::size_t begin,
-                  std::size_t end, ScanMatcher* matcher) const;
-  // Of these key scans of the archive, ascending, at most so many for each
-  // stretch of floor, in even steps: what the same place looked like the
-  // twentieth time says nothing new.
-  std::vector<std::size_t> Thinned(const std::vector<std::size_t>& where) const;
-  // Covariance of a match, in the axes of `from`.
-  Eigen::Matrix3d TieCovariance(const Hypothesis& found,
-                                const Pose2& from) const;
-  // The last of the poses of a track seen from the first.
-  UncertainPose2 Along(const std::vector<Pose2>& poses) const;
-  Eigen::Matrix3d DriftCovariance(const Pose2& motion) const;
-  // Looks for the parts that hang loose in each other.
-  void JoinParts();
-  // Key scans of the archive by part.
-  std::vector<std::vector<std::size_t>> Parts() const;
-  // Where the second part lies in the first.
-  bool JoinPart(const std::vector<std::size_t>& rest,
-                const std::vector<std::size_t>& part);
-  // Where a window of a part's key scans lies in the rest: its middle one.
-  struct LateVote {
-    std::size_t middle;
-    Hypothesis found;
-  };
-  // How many windows of this size are looked for of so many key scans.
-  std::size_t NumLateWindows(std::size_t keys, std::size_t size) const;
-  // Starts of the windows of a part that fit somewhere at all, the clearest one
-  // first.
-  std::vector<std::size_t> WindowsOf(const std::vector<KeyScan>& keys,
-                                     std::size_t size,
-                                     const ArchiveView& rest) const;
-  // The tie that follows from a match.
-  LateTie LateTieOf(const std::vector<std::size_t>& rest,
-                    const std::vector<std::size_t>& part,
-                    const LateVote& vote) const;
-  // `is_rough`: it says little more than where to look.
-  void AddLateTie(const std::vector<std::size_t>& rest,
-                  const std::vector<std::size_t>& part, const LateVote& vote,
-                  const LateTie& tie, bool is_rough);
   void Settle(const Pose2& shift, const RefinedScan& first);
-  void Archive(const KeyScan& key);
 
   const OdometryRefinementOptions usual_options_;
   // For the laser's noise.
@@ -564,8 +345,6 @@ class OdometryRefiner {
   RangeNoise noise_;
   double noise_scale_ = 1.0;
   std::function<void(const std::string&)> trace_;
-  // While Finish runs.
-  std::function<bool()> stop_;
   Track track_;
   std::vector<ScanPoint> points_;
   bool started_ = false;
@@ -578,23 +357,7 @@ class OdometryRefiner {
   // Scans of the open track, and what was lost with it.
   std::vector<SettledScan> pending_;
   std::unique_ptr<OpenTie> open_;
-  // What was seen from key scans that are settled, thinned out.
-  struct ArchivedKey {
-    int scan;
-    // Key scans whose relative poses are known are one part.
-    int part;
-    Pose2 pose;
-    Eigen::Vector2d laser;
-    // Position and normal, robot's frame.
-    std::vector<Eigen::Vector4f> points;
-
-    template <typename Archive>
-    friend void Exchange(Archive& archive, ArchivedKey& key) {
-      auto& [scan, part, pose, laser, points] = key;
-      ExchangeAll(archive, scan, part, pose, laser, points);
-    }
-  };
-  std::vector<ArchivedKey> archive_;
+  TrackSearch search_;
   int part_ = 0;
   int num_parts_ = 1;
   // By part but the first: its entry in loose_.

@@ -5,6 +5,7 @@
 #include <plumbline/frontend/scan_points.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -83,6 +84,31 @@ struct ScanAgreement {
   /// Points of the reference that the scan looks at, and through.
   int seen = 0;
   int seen_through = 0;
+
+  /// Share of what the scan looks at that it looks through.
+  double SeenThroughShare() const {
+    return seen > 0 ? static_cast<double>(seen_through) / seen : 0.0;
+  }
+  /// Share of the returns that do not lie in the unknown.
+  double KnownShare() const {
+    const int known = hits + intruders;
+    return static_cast<double>(known) / std::max(1, known + unknown);
+  }
+  /// Share of the returns on what the reference has seen, of all that do not
+  /// lie in the unknown.
+  double Support() const {
+    return static_cast<double>(hits) / std::max(1, hits + intruders);
+  }
+  /// How much of the scan the reference explains, at most 1.
+  double Quality() const {
+    return (hits * (1.0 - SeenThroughShare()) - 2.0 * intruders) /
+           std::max(1, hits + intruders + unknown);
+  }
+  /// A share of all returns that found a partner as one of those that do not
+  /// lie in the unknown, which are taken to be two in five at least.
+  double OfKnown(double share) const {
+    return share / std::max(0.4, KnownShare());
+  }
 };
 
 /// A pose and how well it fits, at most 1.

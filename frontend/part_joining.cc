@@ -1,0 +1,308 @@
+#include <plumbline/frontend/part_joining.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Key scans of a window of a part that is looked for.
+constexpr std::size_t kWindow = 24;
+// Parts that are looked for, at most.
+constexpr int kMostLateParts = 24;
+// A part is looked for again when the rest has grown by this factor.
+constexpr double kMoreRest = 1.25;
+// Nodes of the searches for all windows of a part.
+constexpr std::int64_t kLateNodes = 12000000;
+// A tie that is known worse than this is a rough one: the part is still loose,
+// m and rad.
+constexpr double kLateSigma = 0.5;
+constexpr double kLateAngle = DegToRad(5.0);
+// A rough one that is known worse than this is not taken: a guess is as good.
+constexpr double kRoughSigma = 10.0;
+constexpr double kRoughAngle = DegToRad(20.0);
+
+double Square(double x) { return x * x; }
+
+// Joins parts one after the other.
+class PartJoining {
+ public:
+  PartJoining(const TrackingOptions& tracking, const MatchDrift& drift,
+              const std::vector<int>& loose_of, TrackSearch* search,
+              std::vector<LooseTrack>* loose)
+      : tracking_(tracking),
+        drift_(drift),
+        loose_of_(loose_of),
+        search_(search),
+        loose_(loose) {}
+
+  std::vector<LateTie> Run();
+
+ private:
+  // Where a window of a part's key scans lies in the rest: its middle one.
+  struct LateVote {
+    std::size_t middle;
+    FoundTrack found;
+  };
+
+  std::size_t num_parts() const { return loose_of_.size() + 1; }
+  // Key scans by part.
+  std::vector<std::vector<std::size_t>> Parts() const;
+  // Where the second part lies in the first.
+  bool JoinPart(const std::vector<std::size_t>& rest,
+                const std::vector<std::size_t>& part);
+  // How many windows of this size are looked for of so many key scans.
+  std::size_t NumLateWindows(std::size_t keys, std::size_t size) const;
+  // Starts of the windows of a part that fit somewhere at all, the clearest one
+  // first.
+  std::vector<std::size_t> WindowsOf(const std::vector<TrackKey>& keys,
+                                     std::size_t size,
+                                     const TrackSearch::SearchArea& rest) const;
+  // The tie that follows from a match.
+  LateTie LateTieOf(const std::vector<std::size_t>& rest,
+                    const std::vector<std::size_t>& part,
+                    const LateVote& vote) const;
+  // `is_rough`: it says little more than where to look.
+  void AddLateTie(const std::vector<std::size_t>& rest,
+                  const std::vector<std::size_t>& part, const LateVote& vote,
+                  const LateTie& tie, bool is_rough);
+
+  const TrackingOptions& tracking_;
+  const MatchDrift& drift_;
+  const std::vector<int>& loose_of_;
+  TrackSearch* search_;
+  std::vector<LooseTrack>* loose_;
+  std::vector<LateTie> ties_;
+};
+
+std::vector<std::vector<std::size_t>> PartJoining::Parts() const {
+  std::vector<std::vector<std::size_t>> parts(num_parts());
+  for (std::size_t k = 0; k < search_->seen().size(); ++k) {
+    parts[static_cast<std::size_t>(search_->seen()[k].part)].push_back(k);
+  }
+  return parts;
+}
+
+std::vector<LateTie> PartJoining::Run() {
+  // The largest part takes in others, largest first, until none is found.
+  const std::vector<LooseTrack> loose = *loose_;
+  // Key scans that a part was looked for in, by part.
+  std::vector<std::size_t> tried(num_parts(), 0);
+  bool is_joined = num_parts() > 1;
+  int looked_for = 0;
+  while (is_joined) {
+    is_joined = false;
+    std::vector<std::vector<std::size_t>> parts = Parts();
+    std::stable_sort(
+        parts.begin(), parts.end(),
+        [](const auto& a, const auto& b) { return a.size() > b.size(); });
+    for (std::size_t p = 1; p < parts.size() && !is_joined; ++p) {
+      if (parts[p].empty()) break;
+      std::size_t& before = tried[static_cast<std::size_t>(
+          search_->seen()[parts[p].front()].part)];
+      const std::size_t rest = parts[0].size();
+      if (static_cast<double>(rest) < kMoreRest * static_cast<double>(before)) {
+        continue;
+      }
+      before = rest;
+      // A log of many parts comes to an end, too.
+      if (++looked_for > kMostLateParts) break;
+      if (search_->Stops()) break;
+      is_joined = JoinPart(parts[0], parts[p]);
+    }
+  }
+  if (search_->Stops()) {
+    *loose_ = loose;
+    ties_.clear();
+  }
+  std::sort(ties_.begin(), ties_.end(),
+            [](const LateTie& a, const LateTie& b) { return a.scan < b.scan; });
+  return std::move(ties_);
+}
+
+bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
+                           const std::vector<std::size_t>& part) {
+  const auto least = static_cast<std::size_t>(tracking_.first_global_keys);
+  if (part.size() < least || rest.size() < TrackSearch::kShortestVisit)
+    return false;
+  const std::vector<TrackKey> keys = search_->Unpacked(part);
+  const std::size_t size = std::min(kWindow, part.size());
+  const TrackSearch::SearchArea view = search_->AreaOf(rest);
+  const std::vector<std::size_t> windows = WindowsOf(keys, size, view);
+  // What a window says stands when another one says the same, or the part is
+  // too short for another: one that fits nowhere is no reason to believe it.
+  const bool is_short = NumLateWindows(part.size(), size) == 1;
+  std::vector<LateVote> votes;
+  LateVote best_vote;
+  std::optional<LateTie> best;
+  const auto variance = [](const LateTie& tie) {
+    const Eigen::Matrix3d& covariance = tie.since_key.covariance;
+    return std::max({covariance(0, 0) / Square(kLateSigma),
+                     covariance(1, 1) / Square(kLateSigma),
+                     covariance(2, 2) / Square(kLateAngle)});
+  };
+  std::int64_t nodes = kLateNodes;
+  for (const std::size_t begin : windows) {
+    if (search_->Stops()) return false;
+    if (nodes <= 0) break;
+    // A jump within a window is none of the track's: parts are whole.
+    LateVote vote{begin + size / 2, {}};
+    if (!search_->FindAnywhere(keys, view, begin, begin + size, 0.0, &nodes,
+                               &vote.found)) {
+      continue;
+    }
+    search_->Trace("LATE window found");
+    const auto confirms = [&](const LateVote& other) {
+      const Pose2 expected =
+          Compose(other.found.pose,
+                  Between(keys[other.middle].pose, keys[vote.middle].pose));
+      const Pose2 apart = Between(expected, vote.found.pose);
+      return apart.head<2>().norm() < TrackSearch::kVisitDistance &&
+             std::abs(apart[2]) < TrackSearch::kVisitRotation;
+    };
+    std::vector<const LateVote*> agreeing;
+    for (const LateVote& other : votes) {
+      if (confirms(other)) agreeing.push_back(&other);
+    }
+    if (!agreeing.empty() || is_short) {
+      agreeing.push_back(&vote);
+      for (const LateVote* other : agreeing) {
+        const LateTie tie = LateTieOf(rest, part, *other);
+        const bool is_narrow = variance(tie) <= 1.0;
+        const bool is_better =
+            !best || (is_narrow && variance(*best) <= 1.0
+                          ? other->found.quality > best_vote.found.quality
+                          : variance(tie) < variance(*best));
+        if (is_better) {
+          best = tie;
+          best_vote = *other;
+        }
+      }
+      if (variance(*best) <= 1.0) break;
+    }
+    votes.push_back(vote);
+  }
+  if (!best ||
+      best->since_key.covariance.diagonal().head<2>().maxCoeff() >
+          Square(kRoughSigma) ||
+      best->since_key.covariance(2, 2) > Square(kRoughAngle)) {
+    return false;
+  }
+  AddLateTie(rest, part, best_vote, *best, variance(*best) > 1.0);
+  return true;
+}
+
+std::size_t PartJoining::NumLateWindows(std::size_t keys,
+                                        std::size_t size) const {
+  return std::min(static_cast<std::size_t>(tracking_.max_late_windows),
+                  1 + 2 * (keys - size) / size);
+}
+
+std::vector<std::size_t> PartJoining::WindowsOf(
+    const std::vector<TrackKey>& keys, std::size_t size,
+    const TrackSearch::SearchArea& rest) const {
+  const std::size_t room = keys.size() - size;
+  const std::size_t windows = NumLateWindows(keys.size(), size);
+  std::vector<std::pair<double, std::size_t>> scored;
+  for (std::size_t w = 0; w < windows; ++w) {
+    if (search_->Stops()) return {};
+    const std::size_t begin = windows > 1 ? w * room / (windows - 1) : 0;
+    scored.emplace_back(
+        windows > 1 ? search_->Clearness(keys, begin, begin + size, rest) : 1.0,
+        begin);
+  }
+  std::stable_sort(
+      scored.begin(), scored.end(),
+      [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::size_t> begins;
+  for (const auto& [score, begin] : scored) {
+    if (score >= tracking_.min_tie_score) begins.push_back(begin);
+  }
+  return begins;
+}
+
+LateTie PartJoining::LateTieOf(const std::vector<std::size_t>& rest,
+                               const std::vector<std::size_t>& part,
+                               const LateVote& vote) const {
+  // The match says where the part's key scan is among the rest. The one of the
+  // two that begins later hangs on what was seen before it began.
+  const std::size_t at_rest = search_->NearestOf(vote.found, rest);
+  const std::size_t at_part = part[vote.middle];
+  const Pose2 match = Between(search_->seen()[at_rest].pose, vote.found.pose);
+  const bool is_later = part.front() > rest.front();
+  const std::vector<std::size_t>& later = is_later ? part : rest;
+  const std::vector<std::size_t>& earlier = is_later ? rest : part;
+  const std::size_t at_later = is_later ? at_part : at_rest;
+  const std::size_t at_earlier = is_later ? at_rest : at_part;
+  const auto last_before = std::prev(
+      std::lower_bound(earlier.begin(), earlier.end(), later.front()));
+  const std::size_t since = std::min(*last_before, at_earlier);
+  const auto along = [&](const std::vector<std::size_t>& keys, std::size_t from,
+                         std::size_t to) {
+    std::vector<Pose2> poses;
+    for (const std::size_t k : keys) {
+      if (std::min(from, to) <= k && k <= std::max(from, to)) {
+        poses.push_back(search_->seen()[k].pose);
+      }
+    }
+    if (to < from) std::reverse(poses.begin(), poses.end());
+    return DriftAlong(poses, drift_);
+  };
+  UncertainPose2 tie{match,
+                     TieCovariance(vote.found, search_->seen()[at_rest].pose)};
+  if (!is_later) tie = Inverse(tie);
+  LateTie late;
+  late.scan = search_->seen()[later.front()].scan;
+  late.since = search_->seen()[since].scan;
+  late.since_key = Compose(Compose(along(earlier, since, at_earlier), tie),
+                           along(later, at_later, later.front()));
+  return late;
+}
+
+void PartJoining::AddLateTie(const std::vector<std::size_t>& rest,
+                             const std::vector<std::size_t>& part,
+                             const LateVote& vote, const LateTie& tie,
+                             bool is_rough) {
+  ties_.push_back(tie);
+  search_->Trace("JOINED scan " + std::to_string(tie.scan) + " since " +
+                 std::to_string(tie.since) + (is_rough ? " roughly" : ""));
+  const bool is_later = part.front() > rest.front();
+  const std::vector<std::size_t>& later = is_later ? part : rest;
+  const std::vector<std::size_t>& earlier = is_later ? rest : part;
+  // Parts are numbered in the order in which they began.
+  const int number = search_->seen()[later.front()].part;
+  LooseTrack& loose =
+      (*loose_)[loose_of_[static_cast<std::size_t>(number) - 1]];
+  loose.why = loose.why.substr(0, loose.why.find(';')) +
+              "; found again on what was seen later";
+  if (is_rough) {
+    loose.why += ", roughly";
+  } else {
+    loose.found = true;
+    loose.end = tie.scan;
+  }
+  const Pose2 shift = Compose(vote.found.pose,
+                              Inverse(search_->seen()[part[vote.middle]].pose));
+  const int into = search_->seen()[earlier.front()].part;
+  for (const std::size_t k : part) {
+    search_->seen()[k].pose = Compose(shift, search_->seen()[k].pose);
+  }
+  for (const std::size_t k : later) search_->seen()[k].part = into;
+}
+
+}  // namespace
+
+std::vector<LateTie> JoinParts(const TrackingOptions& tracking,
+                               const MatchDrift& drift,
+                               const std::vector<int>& loose_of,
+                               TrackSearch* search,
+                               std::vector<LooseTrack>* loose) {
+  return PartJoining(tracking, drift, loose_of, search, loose).Run();
+}
+
+}  // namespace plumbline

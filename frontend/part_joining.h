@@ -1,0 +1,53 @@
+#ifndef PLUMBLINE_FRONTEND_PART_JOINING_H_
+#define PLUMBLINE_FRONTEND_PART_JOINING_H_
+
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/match_drift.h>
+#include <plumbline/frontend/track_search.h>
+#include <plumbline/frontend/tracking_options.h>
+
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// A part of the track that is weakly tied to the rest.
+struct LooseTrack {
+  /// Last scan before it that is sure, and its own last one, or the first one
+  /// that was found again.
+  int begin = 0;
+  int end = 0;
+  std::string why;
+  /// It was found again on what had been seen earlier: the tie is one match,
+  /// not a guess.
+  bool found = false;
+};
+
+/// A tie found once all scans were in, for a part of the track that was settled
+/// as loose.
+struct LateTie {
+  /// First scan of the part; its RefinedScan::tie was kLoose.
+  int scan = 0;
+  /// What RefinedScan::since and since_key of it are now.
+  int since = 0;
+  UncertainPose2 since_key;
+};
+
+/// Looks for the parts of a track that hang loose in each other, once all scans
+/// are in (core/method.md, section 7, step 0). The largest one takes in others,
+/// largest first, until none is found. A part is taken where one of its windows
+/// of key scans was found and another one says the same.
+///
+/// `search` has the key scans of all parts; they are moved and renumbered as
+/// parts are joined. `loose_of`: by part but the first, its entry in `loose`,
+/// which says in the end what was found. Returns the ties in the order of
+/// scans; none, with `loose` as it was, when `search` was stopped.
+std::vector<LateTie> JoinParts(const TrackingOptions& tracking,
+                               const MatchDrift& drift,
+                               const std::vector<int>& loose_of,
+                               TrackSearch* search,
+                               std::vector<LooseTrack>* loose);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_FRONTEND_PART_JOINING_H_

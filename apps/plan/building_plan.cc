@@ -20,7 +20,7 @@ constexpr double kCorridorWidth = 4.0;
 constexpr double kThinnestWall = 0.1;
 // From this share of openings on a side of a room is no wall.
 constexpr double kOpenSide = 0.75;
-// Narrower openings are flaws of a wall, m.
+// Narrower openings are flaws of what closes a space without a wall, m.
 constexpr double kFlaw = 0.3;
 // Between the ends of two walls that are offset by no more than this there is a
 // wall, too, though nothing was seen of it, m.
@@ -32,6 +32,10 @@ constexpr int kLeastJamb = 6;
 // how many rays to each side look for it.
 constexpr double kDeeperThanFurniture = 1.0;
 constexpr int kRaysAside = 3;
+// Returns of the back of a niche lie at one depth to this, m, along this share
+// of its width.
+constexpr double kSameDepth = 0.1;
+constexpr double kNicheShare = 0.6;
 // Walls without a trace are looked for again in the parts of a region, up to so
 // many times.
 constexpr int kUnseenRounds = 3;
@@ -317,6 +321,53 @@ bool LeadsSomewhere(const DrawnLine& on, int first, int last, int side,
   return false;
 }
 
+// What lies behind an opening that leads nowhere, from sample `first` to `last`
+// (not included), on the left (`side` 1) or right (-1) of a line: the shut door
+// of a recess, the back of a niche. A wall where returns lie at one depth, and
+// its sides.
+void AddNiche(const DrawnLine& on, int first, int last, int side,
+              const SpaceGrid& space, std::vector<PlanWall>* walls) {
+  const Vector2d beyond = side * on.line.normal();
+  const double face = side > 0 ? on.line.high : -on.line.low;
+  std::vector<double> depths;
+  for (int i = first; i < last; ++i) {
+    const Vector2d begin = on.line.At(on.profile.MiddleOf(i));
+    for (double depth = face + kBesideWall; depth <= kDeeperThanFurniture;
+         depth += 0.5 * space.resolution) {
+      if (space.At(Vector2d(begin + depth * beyond)) != Space::kOccupied) {
+        continue;
+      }
+      depths.push_back(depth);
+      break;
+    }
+  }
+  if (depths.empty()) return;
+  const auto middle =
+      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  const double depth = *middle;
+  const auto near = std::count_if(
+      depths.begin(), depths.end(),
+      [&](double other) { return std::abs(other - depth) <= kSameDepth; });
+  if (static_cast<double>(near) < kNicheShare * (last - first)) return;
+  // Nobody saw how thick the walls around it are; they lie outside of it.
+  const double half = 0.5 * kThinnestWall;
+  PlanWall wall;
+  wall.left = wall.right = half;
+  const Vector2d begin =
+      on.line.At(on.profile.begin + first * WallProfile::kStep);
+  const Vector2d end = on.line.At(on.profile.begin + last * WallProfile::kStep);
+  for (const Vector2d& jamb : {Vector2d(begin - half * on.line.along),
+                               Vector2d(end + half * on.line.along)}) {
+    wall.begin = jamb;
+    wall.end = jamb + depth * beyond;
+    walls->push_back(wall);
+  }
+  wall.begin = begin + (depth + half) * beyond;
+  wall.end = end + (depth + half) * beyond;
+  walls->push_back(wall);
+}
+
 // Walls and doors along a line.
 void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
               const BuildingPlanOptions& options, BuildingPlan* plan) {
@@ -332,7 +383,11 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
     };
     int j = i;
     while (j < count && open(j)) ++j;
-    if ((j - i) * WallProfile::kStep >= kFlaw) {
+    // What is too narrow for a door is a crack beside a cupboard or a pane in
+    // the wall, which goes on behind it.
+    const double width = (j - i) * WallProfile::kStep;
+    if (on.line.is_wall ? width + space.resolution >= options.min_door
+                        : width >= kFlaw) {
       std::fill(is_open.begin() + i, is_open.begin() + j, true);
     }
     i = std::max(j, i + 1);
@@ -388,6 +443,8 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
         door.width() <=
             (has_both ? options.doors.wide : options.doors.narrow)) {
       plan->doors.push_back(door);
+    } else if (is_between && !is_door && door.width() <= options.doors.wide) {
+      AddNiche(on, i, j, door.rooms[0] >= 0 ? -1 : 1, space, &plan->walls);
     }
     i = j;
   }

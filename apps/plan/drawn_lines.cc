@@ -32,6 +32,9 @@ constexpr double kImportantDoor = 0.6;
 constexpr double kBareFlanks = 0.3;
 constexpr double kFullFlanks = 0.6;
 
+// What nobody saw beside an opening, behind furniture or where no room is, says
+// less against a wall there than what was seen to be open.
+constexpr double kUnseenBeside = 0.5;
 // A line is a wall where another one crosses it when so much of it is, within
 // this distance before or after the crossing, m.
 constexpr double kBesideCrossing = 0.3;
@@ -408,9 +411,17 @@ void Weigh(const DoorOptions& options, bool is_wall, const Crossings& crossings,
   for (std::size_t i = 0; i < marks.size(); ++i) {
     walls_before[i + 1] = walls_before[i] + (marks[i] == Mark::kWall);
   }
+  std::vector<int> seen_before(marks.size() + 1, 0);
+  for (std::size_t i = 0; i < marks.size(); ++i) {
+    seen_before[i + 1] = seen_before[i] + (marks[i] != Mark::kUnknown);
+  }
+  const auto between = [&](const std::vector<int>& before, int first,
+                           int last) {
+    return before[static_cast<std::size_t>(std::min(last, count))] -
+           before[static_cast<std::size_t>(std::max(first, 0))];
+  };
   const auto walls = [&](int first, int last) {
-    return walls_before[static_cast<std::size_t>(std::min(last, count))] -
-           walls_before[static_cast<std::size_t>(std::max(first, 0))];
+    return between(walls_before, first, last);
   };
   const auto goes_straight_on = [&](int i) {
     return std::any_of(crossings.straight_on.begin(),
@@ -436,9 +447,12 @@ void Weigh(const DoorOptions& options, bool is_wall, const Crossings& crossings,
     const double width = size * kStep;
     const int first = std::max(0, whole.first - around);
     const int last = std::min(count, whole.last + around);
-    const int length = std::max(1, last - first - size);
+    const int seen = between(seen_before, first, last) -
+                     between(seen_before, whole.first, whole.last);
+    const int unseen = last - first - size - seen;
     const int beside = walls(first, last) - walls(whole.first, whole.last);
-    const double covered = static_cast<double>(beside) / length;
+    const double covered =
+        beside / std::max(1.0, seen + kUnseenBeside * unseen);
     const bool is_between =
         is_wall && whole.first > 0 && whole.last < count &&
         !(width > options.narrow && goes_straight_on(whole.first) &&

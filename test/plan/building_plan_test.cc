@@ -172,6 +172,74 @@ TEST(BuildingPlanTest, JogsOfWallsAreClosed) {
       }));
 }
 
+bool IsWallAt(const BuildingPlan& plan, const Vector2d& point) {
+  return std::any_of(plan.walls.begin(), plan.walls.end(),
+                     [&](const PlanWall& wall) {
+                       Polygon body;
+                       body.shell = BodyOf(wall);
+                       return body.Contains(point);
+                     });
+}
+
+// What nobody goes through is no opening: a crack beside a cupboard, a pane.
+TEST(BuildingPlanTest, CracksTooNarrowForADoorAreWall) {
+  const auto plan = [](double width) {
+    Drawing drawing = TwoRooms();
+    drawing.Free(5.9, 5.0, 6.3, 5.0 + width);
+    return PlanOf(drawing);
+  };
+  const BuildingPlan crack = plan(0.4);
+  EXPECT_TRUE(IsWallAt(crack, {6.1, 5.2}));
+  EXPECT_EQ(crack.rooms.size(), 3u);
+  EXPECT_EQ(crack.doors.size(), 2u);
+  const BuildingPlan door = plan(0.8);
+  EXPECT_FALSE(IsWallAt(door, {6.1, 5.4}));
+  EXPECT_EQ(door.doors.size(), 3u);
+}
+
+// A shut door in a recess of a corridor's wall: the wall goes around it. Where
+// returns behind an opening lie here and there nothing is drawn.
+TEST(BuildingPlanTest, NichesHaveABackAndSides) {
+  const auto plan = [](bool is_straight) {
+    Drawing drawing = TwoRooms();
+    drawing.Free(5.0, 0.6, 6.0, 1.05);
+    if (is_straight) {
+      drawing.Fill(5.0, 0.5, 6.0, 0.6, Space::kOccupied);
+    } else {
+      drawing.Fill(5.3, 0.8, 5.4, 0.85, Space::kOccupied);
+    }
+    return PlanOf(drawing);
+  };
+  const BuildingPlan niche = plan(true);
+  EXPECT_TRUE(IsWallAt(niche, {5.5, 0.53}));
+  EXPECT_FALSE(IsWallAt(niche, {5.5, 0.8}));
+  EXPECT_TRUE(IsWallAt(niche, {4.95, 0.75}));
+  EXPECT_TRUE(IsWallAt(niche, {6.05, 0.75}));
+  EXPECT_EQ(niche.doors.size(), 2u);
+  EXPECT_EQ(niche.walls.size(), plan(false).walls.size() + 3);
+}
+
+// What was not seen in line with a door says less against it than what was seen
+// to be open.
+TEST(BuildingPlanTest, UnseenPlacesSayLittleAgainstADoor) {
+  const auto holds = [](Space elsewhere) {
+    Drawing drawing(12.0, 2.0);
+    drawing.Fill(0.0, 0.0, 12.0, 2.0, elsewhere);
+    drawing.Fill(4.5, 1.0, 7.5, 1.05, Space::kOccupied);
+    drawing.Free(5.5, 0.0, 6.5, 2.0);
+    DrawnLine drawn;
+    drawn.line.origin = Vector2d(0.0, 1.025);
+    drawn.from = drawn.line.begin = 0.0;
+    drawn.to = drawn.line.end = 12.0;
+    drawn.line.weight = 2.0;
+    std::vector<DrawnLine> lines = {drawn};
+    MeasureLines(drawing.space(), {}, &lines);
+    const WallProfile& profile = lines[0].profile;
+    return profile.holds[static_cast<std::size_t>(profile.IndexOf(6.0))];
+  };
+  EXPECT_GT(holds(Space::kUnknown), holds(Space::kFree));
+}
+
 TEST(BuildingPlanTest, TurnedBuildingIsTheSame) {
   const Drawing drawing = TwoRooms();
   const BuildingPlan straight = PlanOf(drawing);

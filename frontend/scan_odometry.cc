@@ -2,6 +2,7 @@
 #include <plumbline/frontend/scan_odometry.h>
 #include <plumbline/frontend/scan_sweep.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -33,6 +34,9 @@ constexpr double kSearchSigmas = 2.5;
 // nearer to each other no speed is told, s.
 constexpr double kLongestStep = 0.5;
 constexpr double kShortestStep = 1e-6;
+// Where a scan and the last ones leave the place open by more than this, m
+// (standard deviation), in a direction, the way in it is open.
+constexpr double kOpenSigma = 0.05;
 // Robust fit of the gyroscope: scans it needs, and the share of the residuals
 // that are the largest and do not count.
 constexpr std::size_t kFewestTurns = 30;
@@ -238,6 +242,37 @@ class SweepTrial {
   std::vector<std::size_t> turning_;
 };
 
+// Figures of Matcher::Run.
+struct MatchFigures {
+  std::size_t unmatched = 0;
+  double way = 0.0;
+  double open_way = 0.0;
+
+  void Tell(ScanOdometryReport* report) const {
+    report->unmatched = unmatched;
+    report->way = way;
+    report->open_way = open_way;
+  }
+};
+
+// What of a displacement, in the frame of the match, its returns leave open.
+double OpenPart(const Eigen::Matrix3d& information,
+                const Eigen::Vector2d& displacement) {
+  Eigen::Matrix2d position = information.topLeftCorner<2, 2>();
+  if (information(2, 2) > 0.0) {
+    position -= information.topRightCorner<2, 1>() *
+                information.bottomLeftCorner<1, 2>() / information(2, 2);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(position);
+  double squares = 0.0;
+  for (int k = 0; k < 2; ++k) {
+    if (solver.eigenvalues()[k] >= 1.0 / (kOpenSigma * kOpenSigma)) continue;
+    const double along = solver.eigenvectors().col(k).dot(displacement);
+    squares += along * along;
+  }
+  return std::sqrt(squares);
+}
+
 class Matcher {
  public:
   Matcher(const ScanOdometryOptions& options, const TurnIntegral& turns)
@@ -246,15 +281,14 @@ class Matcher {
   // Places the scans. `yaw` and `turns` may be null; `costs` gets the cost of
   // every match, at the bound where there is none.
   bool Run(const Calibration* yaw, std::vector<Scan>* scans,
-           std::size_t* unmatched,
-           std::vector<std::pair<double, double>>* turns,
+           MatchFigures* figures, std::vector<std::pair<double, double>>* turns,
            std::vector<double>* costs) {
     costs->assign(scans->size(), 0.0);
     Pose2 pose = Pose2::Zero();
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
     double last_time = 0.0;
     std::vector<ScanPoint> points;
-    *unmatched = 0;
+    *figures = MatchFigures();
     for (std::size_t i = 0; i < scans->size(); ++i) {
       if (options_.stop && options_.stop()) return false;
       Scan& scan = (*scans)[i];
@@ -281,10 +315,14 @@ class Matcher {
           (is_guided ? options_.gyroscope_noise : options_.turn_noise) * step;
       Pose2 matched;
       const Pose2 guess = Compose(pose, motion);
-      const bool found =
-          Match(points, guess, sigma, turn_sigma, &matched, &(*costs)[i]);
+      Eigen::Matrix3d information;
+      const bool found = Match(points, guess, sigma, turn_sigma, &matched,
+                               &information, &(*costs)[i]);
       if (found) {
         const Pose2 moved = Between(pose, matched);
+        const Eigen::Vector2d displacement = (matched - pose).head<2>();
+        figures->way += displacement.norm();
+        figures->open_way += OpenPart(information, displacement);
         if (step >= kShortestStep) {
           velocity = moved / step;
           if (turns != nullptr && is_measured) {
@@ -293,7 +331,9 @@ class Matcher {
         }
         pose = matched;
       } else {
-        ++*unmatched;
+        ++figures->unmatched;
+        figures->way += motion.head<2>().norm();
+        figures->open_way += motion.head<2>().norm();
         pose = guess;
         velocity *= 0.5;
       }
@@ -338,7 +378,8 @@ class Matcher {
   }
 
   bool Match(const std::vector<ScanPoint>& points, const Pose2& guess,
-             double sigma, double turn_sigma, Pose2* pose, double* cost) const {
+             double sigma, double turn_sigma, Pose2* pose,
+             Eigen::Matrix3d* information, double* cost) const {
     if (matcher_.empty() || static_cast<int>(points.size()) < kLeastPoints) {
       return false;
     }
@@ -359,6 +400,7 @@ class Matcher {
       if (wide.cost < match.cost - kClearlyBetter) match = wide;
     }
     *pose = match.pose;
+    *information = match.information;
     *cost = match.cost;
     return match.inlier_ratio >= kLeastRatio && match.inliers >= kLeastPoints;
   }
@@ -374,7 +416,7 @@ struct SweepRun {
   int direction = 0;
   std::vector<Scan> scans;
   std::vector<double> costs;
-  std::size_t unmatched = 0;
+  MatchFigures figures;
   // False when the work was stopped.
   bool is_done = false;
 };
@@ -400,7 +442,7 @@ std::vector<SweepRun> RunSweeps(const ScanOdometryOptions& options,
     if (i > 0) own.progress = nullptr;
     run.is_done =
         Matcher(own, turns)
-            .Run(guide, &run.scans, &run.unmatched, nullptr, &run.costs);
+            .Run(guide, &run.scans, &run.figures, nullptr, &run.costs);
   });
   return runs;
 }
@@ -432,8 +474,8 @@ ScanOdometryReport AddScanOdometry(const ScanOdometryOptions& options,
   std::vector<Scan>& scans = log->scans;
   std::vector<double> costs;
   std::vector<std::pair<double, double>> pairs;
-  if (!Matcher(options, turns)
-           .Run(nullptr, &scans, &report.unmatched, &pairs, &costs)) {
+  MatchFigures figures;
+  if (!Matcher(options, turns).Run(nullptr, &scans, &figures, &pairs, &costs)) {
     return report;
   }
   Calibration yaw = Fit(pairs);
@@ -444,10 +486,12 @@ ScanOdometryReport AddScanOdometry(const ScanOdometryOptions& options,
     report.yaw_scale = yaw.scale;
     report.yaw_bias = yaw.bias;
     if (!Matcher(options, turns)
-             .Run(guide, &scans, &report.unmatched, nullptr, &costs)) {
+             .Run(guide, &scans, &figures, nullptr, &costs)) {
       return report;
     }
   }
+
+  figures.Tell(&report);
 
   const SweepTrial trial(scans, turns, guide);
   if (trial.turning().size() < kFewestSweeps) return report;
@@ -456,7 +500,7 @@ ScanOdometryReport AddScanOdometry(const ScanOdometryOptions& options,
   SweepRun* const chosen = ChooseSweep(options, trial, costs, &runs);
   if (chosen == nullptr) return report;
   report.sweep = chosen->direction;
-  report.unmatched = chosen->unmatched;
+  chosen->figures.Tell(&report);
   trial.MoveOdometryToBegin(&chosen->scans);
   trial.Undo(report.sweep, 0.0, &scans);
   for (std::size_t i = 0; i < scans.size(); ++i) {

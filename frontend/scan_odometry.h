@@ -40,6 +40,11 @@ struct ScanOdometryOptions {
 struct ScanOdometryReport {
   /// Scans that no match could place: they go on as the robot went before.
   std::size_t unmatched = 0;
+  /// Of the way by scans alone, m, and how much of it lies where the returns
+  /// leave the place along the way open, as in corridors without anything in
+  /// sight: lengths there are those of a steady motion.
+  double way = 0.0;
+  double open_way = 0.0;
   /// The model of the gyroscope, turn rate = scale * rate + bias, rad/s, fitted
   /// to the scans' own turns, and the share of their variance that it explains.
   bool used_yaw_rates = false;

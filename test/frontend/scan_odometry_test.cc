@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "frontend/synthetic_world.h"
@@ -109,6 +110,40 @@ TEST(ScanOdometryTest, ANarrowViewIsNoSweep) {
 }
 
 // A log may say anything about times; the robot stays somewhere.
+// A drive along a corridor whose ends are out of sight for the most part, and
+// one through a room.
+TEST(ScanOdometryTest, AWayThatScansLeaveOpenIsMeasured) {
+  Log room = Drive(0.0, 1, false);
+  const ScanOdometryReport seen = AddScanOdometry({}, &room);
+  EXPECT_GT(seen.way, 1.0);
+  EXPECT_LT(seen.open_way, 0.01 * seen.way);
+
+  const std::vector<WallEnds> walls = {{{-15.0, -1.0}, {15.0, -1.0}},
+                                       {{15.0, -1.0}, {15.0, 1.0}},
+                                       {{15.0, 1.0}, {-15.0, 1.0}},
+                                       {{-15.0, 1.0}, {-15.0, -1.0}}};
+  Noise noise(4);
+  Log corridor;
+  for (int i = 0; i < 150; ++i) {
+    Scan scan;
+    scan.timestamp = kStart + i * kPeriod;
+    scan.angle_step = 2.0 * kPi / kBeams;
+    scan.maximum_range = 6.0;
+    for (int k = 0; k < kBeams; ++k) {
+      const double range =
+          CastRay(walls, Eigen::Vector2d(-14.0 + 0.15 * i, 0.0),
+                  k * scan.angle_step) +
+          noise.Normal(0.01);
+      scan.ranges.push_back(range < 6.0
+                                ? static_cast<float>(range)
+                                : std::numeric_limits<float>::infinity());
+    }
+    corridor.scans.push_back(std::move(scan));
+  }
+  const ScanOdometryReport open = AddScanOdometry({}, &corridor);
+  EXPECT_GT(open.open_way, 0.5 * open.way);
+}
+
 TEST(ScanOdometryTest, TimesThatCannotBe) {
   const double times[] = {5.0, 6.0, 0.0, 5e-324, 1e308, -1e308, 1e-310};
   for (const bool has_gyroscope : {false, true}) {

@@ -49,6 +49,14 @@ constexpr double kSameStretch = 0.7;
 // what is left of a piece in the end has at least this length, m.
 constexpr double kThroughWall = 0.15;
 constexpr double kLeastPiece = 0.1;
+// A door that stands elsewhere: an opening and a wall in the place of one, in
+// one wall (m beside each other, and directions) no farther from each other
+// than this, m.
+constexpr double kSameWall = 0.3;
+constexpr double kSameWallTurn = DegToRad(20.0);
+constexpr double kMovedDoor = 3.0;
+// The share of the best place's support from which on a rival is told.
+constexpr double kToldRival = 0.4;
 // Doors of a mirror image that were seen in passing speak one way only: of all
 // places that changed so many are openings, and so many walls.
 constexpr int kLeastEachWay = 2;
@@ -123,7 +131,7 @@ std::string ShortText(double value) {
   return text;
 }
 
-enum class Verdict { kUnknown, kAgrees, kContradicts };
+enum class Verdict { kUnknown, kDoubtful, kAgrees, kContradicts };
 
 // What one window says of a place of the track.
 struct Judgement {
@@ -213,6 +221,8 @@ Judgement Judge(const std::vector<KeyView>& map,
              (sum.seen >= kLeastReturns &&
               through > options.max_looked_through)) {
     judgement.verdict = Verdict::kContradicts;
+  } else if (known_share >= options.min_known) {
+    judgement.verdict = Verdict::kDoubtful;
   }
   return judgement;
 }
@@ -223,6 +233,7 @@ struct Stretch {
   std::size_t view = 0;
   // Map's frame.
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  Eigen::Vector2d normal = Eigen::Vector2d::Zero();
   double length = 0.0;
 };
 
@@ -272,8 +283,12 @@ void AppendStretches(const ScanMatcher& matcher, const KeyView& view,
     }
     const Eigen::Vector2d& first = view.points[begin].position;
     const Eigen::Vector2d& last = view.points[end - 1].position;
-    stretches->push_back(
-        {index, transform.Point(0.5 * (first + last)), (last - first).norm()});
+    Eigen::Vector2d normal = Eigen::Vector2d::Zero();
+    for (std::size_t i = begin; i < end; ++i) {
+      normal += Moved(view.points[i], transform).normal;
+    }
+    stretches->push_back({index, transform.Point(0.5 * (first + last)),
+                          normal.normalized(), (last - first).norm()});
     begin = end;
   }
 }
@@ -288,14 +303,15 @@ KeyView NearPart(KeyView view) {
   return view;
 }
 
-// Lengths of the pieces of wall that two scans of one of both see and that the
-// other looks through, m: of each the shorter view, the longest first.
-std::vector<double> PiecesOf(std::vector<Stretch> stretches) {
-  std::stable_sort(
-      stretches.begin(), stretches.end(),
-      [](const Stretch& a, const Stretch& b) { return a.length > b.length; });
+// The pieces of wall that two scans of one of both see and that the other looks
+// through: of each the shorter view, the longest first.
+std::vector<Stretch> PiecesOf(std::vector<Stretch> stretches) {
+  const auto by_length = [](const Stretch& a, const Stretch& b) {
+    return a.length > b.length;
+  };
+  std::stable_sort(stretches.begin(), stretches.end(), by_length);
   std::vector<const Stretch*> taken;
-  std::vector<double> pieces;
+  std::vector<Stretch> pieces;
   for (const Stretch& a : stretches) {
     const bool is_known =
         std::any_of(taken.begin(), taken.end(), [&a](const Stretch* other) {
@@ -303,28 +319,56 @@ std::vector<double> PiecesOf(std::vector<Stretch> stretches) {
                  std::max(kSameStretch, 0.5 * (other->length + a.length));
         });
     if (is_known) continue;
-    double length = 0.0;
+    Stretch piece = a;
+    piece.length = 0.0;
     for (const Stretch& b : stretches) {
       if (b.view == a.view || b.length > a.length ||
           (a.middle - b.middle).norm() > kSameStretch) {
         continue;
       }
-      length = std::max(length, b.length);
+      piece.length = std::max(piece.length, b.length);
     }
-    if (length < kLeastPiece) continue;
+    if (piece.length < kLeastPiece) continue;
     taken.push_back(&a);
-    pieces.push_back(length);
+    pieces.push_back(piece);
   }
-  std::sort(pieces.begin(), pieces.end(), std::greater<double>());
+  std::stable_sort(pieces.begin(), pieces.end(), by_length);
   return pieces;
 }
 
-// What stands where the other looks through, m, of what the track has and of
-// what the map has.
+// What stands where the other looks through, of what the track has and of what
+// the map has.
 struct Contradictions {
-  std::vector<double> of_track;
-  std::vector<double> of_map;
+  std::vector<Stretch> of_track;
+  std::vector<Stretch> of_map;
 };
+
+// Doors that stand elsewhere in the same wall. People shut one door and open
+// another, but hardly twice in neighbouring ones.
+int MovedDoors(const Contradictions& contradictions) {
+  std::vector<bool> is_taken(contradictions.of_map.size(), false);
+  int moved = 0;
+  for (const Stretch& shut : contradictions.of_track) {
+    double nearest = kMovedDoor;
+    std::size_t taken = is_taken.size();
+    for (std::size_t i = 0; i < is_taken.size(); ++i) {
+      const Stretch& opened = contradictions.of_map[i];
+      const Eigen::Vector2d apart = opened.middle - shut.middle;
+      const double beside = std::min(std::abs(shut.normal.dot(apart)),
+                                     std::abs(opened.normal.dot(apart)));
+      if (is_taken[i] || apart.norm() > nearest || beside > kSameWall ||
+          std::abs(shut.normal.dot(opened.normal)) < std::cos(kSameWallTurn)) {
+        continue;
+      }
+      nearest = apart.norm();
+      taken = i;
+    }
+    if (taken == is_taken.size()) continue;
+    is_taken[taken] = true;
+    ++moved;
+  }
+  return moved;
+}
 
 // What the windows that agree with a map say of it and the map says of them.
 Contradictions FindContradictions(const std::vector<KeyView>& map,
@@ -409,6 +453,7 @@ struct Candidate {
   std::vector<Judgement> judgements;
   int agreeing = 0;
   int contradicting = 0;
+  int doubtful = 0;
   double support() const {
     return agreeing - kContradictionWeight * contradicting;
   }
@@ -462,6 +507,7 @@ void JudgeCandidate(const std::vector<KeyView>& map,
     const Verdict verdict = candidate->judgements[w].verdict;
     candidate->agreeing += verdict == Verdict::kAgrees ? 1 : 0;
     candidate->contradicting += verdict == Verdict::kContradicts ? 1 : 0;
+    candidate->doubtful += verdict == Verdict::kDoubtful ? 1 : 0;
     if (w == candidate->window && verdict != Verdict::kAgrees) return;
     if (candidate->contradicting >= 3 &&
         candidate->contradicting > candidate->agreeing) {
@@ -572,6 +618,7 @@ class Search {
     placement.pose = best->pose;
     placement.agreeing = best->agreeing;
     placement.contradicting = best->contradicting;
+    placement.doubtful = best->doubtful;
     for (const Candidate& rival : judged_) {
       if (&rival == best ||
           AreOne(*best, rival, windows_, kRivalDistance, kRivalTurn)) {
@@ -582,7 +629,10 @@ class Search {
     placement.misfit = Misfit(*best);
     placement.why_not = WhyNot(*best, &placement);
     placement.found = placement.why_not.empty();
-    if (placement.found) TakeTie(*best, &placement);
+    if (placement.found) {
+      placement.doubt = Doubt(*best, placement);
+      TakeTie(*best, &placement);
+    }
     return placement;
   }
 
@@ -656,9 +706,9 @@ class Search {
     double longest = 0.0;
     for (const auto* pieces :
          {&contradictions.of_track, &contradictions.of_map}) {
-      for (const double piece : *pieces) {
-        longest = std::max(longest, piece);
-        placement->contradicting_length += piece;
+      for (const Stretch& piece : *pieces) {
+        longest = std::max(longest, piece.length);
+        placement->contradicting_length += piece.length;
       }
     }
     if (longest > options_.max_contradicting_stretch) {
@@ -666,11 +716,24 @@ class Search {
              " of it would fit, one of both has " + ShortText(longest) +
              " m of wall where the other has none";
     }
+    const int moved = MovedDoors(contradictions);
+    if (moved >= options_.min_moved_doors) {
+      return "where " + parts(best.agreeing) + " of it would fit, " +
+             std::to_string(moved) +
+             " doors stand elsewhere in the same wall, as in another building "
+             "or in its mirror image";
+    }
     const int exchanged =
         placement->walls_through_map + placement->walls_through_track;
-    if (std::min(placement->walls_through_map,
-                 placement->walls_through_track) >= kLeastEachWay &&
-        exchanged >= 2 * options_.min_exchanged &&
+    const int each_way =
+        std::min(placement->walls_through_map, placement->walls_through_track);
+    if (each_way >= 1 && exchanged >= options_.min_exchanged &&
+        exchanged >= best.agreeing) {
+      return "where " + parts(best.agreeing) + " of it would fit, " +
+             std::to_string(exchanged) +
+             " places have a wall in one and an opening in the other";
+    }
+    if (each_way >= kLeastEachWay && exchanged >= 2 * options_.min_exchanged &&
         exchanged > 2.0 * options_.max_exchanged_share * best.agreeing) {
       return "where " + parts(best.agreeing) +
              " of it would fit, it has wall at " +
@@ -681,6 +744,32 @@ class Search {
              "building has";
     }
     return "";
+  }
+
+  // What else the place that was found might be; empty when there is no doubt.
+  std::string Doubt(const Candidate& best,
+                    const TrackPlacement& placement) const {
+    std::string doubt;
+    const auto add = [&doubt](const std::string& reason) {
+      doubt += (doubt.empty() ? "" : "; ") + reason;
+    };
+    if (!start_ && best.agreeing < kClear * options_.min_agreeing) {
+      add("only " + std::to_string(best.agreeing) + " of " +
+          std::to_string(windows_.size()) + " parts of it agree with the map");
+    }
+    if (best.doubtful + best.contradicting >= best.agreeing) {
+      add("as many parts of it lie where the map is known and do not fit");
+    }
+    if (placement.rival > kToldRival * best.support()) {
+      add("much of it would fit in another place, too");
+    }
+    if (placement.walls_through_map > 0 && placement.walls_through_track > 0) {
+      add("it has wall at " + std::to_string(placement.walls_through_map) +
+          " and openings at " + std::to_string(placement.walls_through_track) +
+          " places where the map has it the other way: doors that were opened "
+          "and shut, or another building");
+    }
+    return doubt;
   }
 
   // Where the tie is best.

@@ -91,6 +91,10 @@ struct TrackPlacementOptions {
   /// than this share of the agreeing windows.
   int min_exchanged = 3;
   double max_exchanged_share = 0.15;
+  /// Doors that stand elsewhere in the same wall (an opening and a wall in its
+  /// place, up to 3 m from each other, either way): so many are another
+  /// building.
+  int min_moved_doors = 2;
   /// With a start that somebody gave: windows that have to agree, and how far
   /// from it the track may start, m and rad.
   int min_agreeing_at_start = 1;
@@ -111,11 +115,13 @@ struct TrackPlacement {
   /// Pose of the track's frame in the map's.
   Pose2 pose = Pose2::Zero();
   /// Windows of the track, those of them that agree with the map at this pose,
-  /// those that contradict it, and the agreeing ones, less the contradicting
-  /// ones, of the best other place.
+  /// those that contradict it, those that do neither though they lie where the
+  /// map is known, and the agreeing ones, less the contradicting ones, of the
+  /// best other place.
   int windows = 0;
   int agreeing = 0;
   int contradicting = 0;
+  int doubtful = 0;
   double rival = 0.0;
   /// How far the agreeing windows lie from where `pose` puts them: the RMS, m.
   double misfit = 0.0;
@@ -130,6 +136,9 @@ struct TrackPlacement {
   int to = 0;
   /// Why it was not found, for people.
   std::string why_not;
+  /// Why it may not be its place though it was found, for people: few parts
+  /// speak for it, or places speak against it. Empty when it is clear.
+  std::string doubt;
 };
 
 /// Finds where a track of scans lies in a map without a guess: a window of key

@@ -299,6 +299,21 @@ TEST_F(SeveralLogsTest, MirrorImagesOfOtherRowsAreKeptApart) {
   }
 }
 
+// A door that is shut and one that is opened beside it may be people's doing
+// once, but not twice.
+TEST_F(SeveralLogsTest, AMirrorImageWithTwoOtherDoorsIsKeptApart) {
+  const Log log = RowsOfRooms(2, 1);
+  const SeveralLogsResult mirrored =
+      SolveSeveralLogs(registry_, {log, Mirrored(RowsOfRooms(2, 2))}, {});
+  EXPECT_EQ(mirrored.maps.size(), 2u);
+  EXPECT_THAT(mirrored.logs[1].placement.why_not,
+              ::testing::HasSubstr("doors stand elsewhere"));
+  EXPECT_TRUE(mirrored.logs[1].placement.doubt.empty());
+  EXPECT_EQ(
+      SolveSeveralLogs(registry_, {log, RowsOfRooms(2, 2)}, {}).maps.size(),
+      1u);
+}
+
 // One door may as well have been shut and another one opened: that is told.
 TEST_F(SeveralLogsTest, OneOtherDoorIsTold) {
   const SeveralLogsResult same =
@@ -306,12 +321,26 @@ TEST_F(SeveralLogsTest, OneOtherDoorIsTold) {
   ASSERT_EQ(same.maps.size(), 1u);
   EXPECT_EQ(same.logs[1].placement.walls_through_map, 0);
   EXPECT_EQ(same.logs[1].placement.walls_through_track, 0);
+  EXPECT_EQ(same.logs[1].placement.doubt, "");
   const SeveralLogsResult other = SolveSeveralLogs(
       registry_, {RowsOfRooms(1, 1), Mirrored(RowsOfRooms(1, 2))}, {});
   ASSERT_EQ(other.maps.size(), 1u);
   const TrackPlacement& placement = other.logs[1].placement;
   EXPECT_GT(placement.walls_through_map + placement.walls_through_track, 0);
   EXPECT_GT(placement.contradicting_length, 0.0);
+}
+
+// A door that both drives went through or along, which is not where it was.
+TEST_F(SeveralLogsTest, ADoorThatMovedMakesAPlaceUncertain) {
+  Rows moved;
+  moved.moved = {4};
+  const SeveralLogsResult result =
+      SolveSeveralLogs(registry_, {Drive({}, 1), Drive(moved, 2)}, {});
+  ASSERT_EQ(result.maps.size(), 1u);
+  const TrackPlacement& placement = result.logs[1].placement;
+  EXPECT_GT(placement.walls_through_map, 0);
+  EXPECT_GT(placement.walls_through_track, 0);
+  EXPECT_THAT(placement.doubt, ::testing::HasSubstr("another building"));
 }
 
 TEST_F(SeveralLogsTest, AWrongStartKeepsALogApart) {

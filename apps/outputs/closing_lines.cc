@@ -89,6 +89,14 @@ void AppendLoose(const SolveOutcome& outcome, const char* what,
          list);
 }
 
+void AppendUncertain(const Summary& summary, std::string* list) {
+  const auto uncertain = static_cast<std::int64_t>(
+      std::count_if(summary.logs.begin(), summary.logs.end(),
+                    [](const auto& log) { return !log.uncertain.empty(); }));
+  if (uncertain == 0) return;
+  Append(Counted(uncertain, "log") + " may be of another building", list);
+}
+
 std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {
   const Summary& summary = outcome.summary;
   std::string list;
@@ -96,6 +104,13 @@ std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {
     Append("the run was interrupted", &list);
   } else if (summary.em_termination != EmTermination::kConvergence) {
     Append("the search for structure did not converge", &list);
+  }
+  AppendUncertain(summary, &list);
+  if (summary.open_way > 0.0) {
+    char text[64];
+    std::snprintf(text, sizeof text, "lengths of corridors (%.0f m are open)",
+                  summary.open_way);
+    Append(text, &list);
   }
   AppendLoose(outcome, "the map", &list);
   if (walls.refuted > 0) {
@@ -162,6 +177,7 @@ std::vector<std::string> ClosingLinesInMap(const SolveOutcome& outcome,
       " in " + map + " (" + agreeing + " agree with it)"};
   std::string worth;
   if (outcome.summary.partial) Append("the run was interrupted", &worth);
+  AppendUncertain(outcome.summary, &worth);
   AppendLoose(outcome, "the track", &worth);
   if (!worth.empty()) lines.push_back("worth a look: " + worth);
   AppendOpen(outcome, folder, &lines);

@@ -444,6 +444,12 @@ Json DataToJson(const Report& report) {
     json["loose"].push_back(
         {{"begin", part.begin}, {"end", part.end}, {"why", part.why}});
   }
+  json["open_way_m"] = Digits(summary.open_way);
+  json["uncertain"] = Json::array();
+  for (const Summary::LogInput& log : summary.logs) {
+    if (log.uncertain.empty()) continue;
+    json["uncertain"].push_back({{"input", log.input}, {"why", log.uncertain}});
+  }
   // Colours are those of the map.
   const MapDrawing drawing = DrawingFromGraph(*report.graph, report.path);
   std::map<FeatureId, int> clusters;

@@ -158,6 +158,7 @@ Json FrontendToJson(const Summary& summary) {
   json["scan_seconds_growth"] =
       early && late && *early > 0.0 ? Json(*late / *early) : Json(nullptr);
   json["range_noise_m"] = summary.range_noise;
+  if (summary.open_way > 0.0) json["open_way_m"] = summary.open_way;
   return json;
 }
 
@@ -170,6 +171,8 @@ Json LogToJson(const Summary::LogInput& log) {
           {"agreeing", log.agreeing},
           {"contradicting", log.contradicting},
           {"changed_places", log.changed_places},
+          {"uncertain",
+           log.uncertain.empty() ? Json(nullptr) : Json(log.uncertain)},
           {"why_apart",
            log.why_apart.empty() ? Json(nullptr) : Json(log.why_apart)}};
 }

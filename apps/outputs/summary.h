@@ -166,6 +166,9 @@ struct Summary {
     int contradicting = 0;
     /// Where it or the rest of the map has wall that the other looks through.
     int changed_places = 0;
+    /// Why it may not be its place though it was placed; empty when it is
+    /// clear.
+    std::string uncertain;
     /// Why it was kept apart; empty when it was not.
     std::string why_apart;
   };
@@ -176,6 +179,9 @@ struct Summary {
   /// scan took, s, in the order of scans; may be empty.
   std::vector<SkipReport> skipped;
   std::vector<double> scan_seconds;
+  /// Of a log without odometry: m of the way along which the scans do not tell
+  /// how far the robot went; 0: too little to speak of.
+  double open_way = 0.0;
   /// Of a log: noise of the laser's ranges (standard deviation, m).
   double range_noise = 0.0;
   /// Of a log only: its format, what gave the scans and the odometry, and what
@@ -205,12 +211,14 @@ std::string CountsAsJson(const Summary& summary);
 /// seconds}}; for a log also frontend {skipped [{reason, count, first_lines}],
 /// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
 /// (their quotient), range_noise_m (of the laser, as the scans show it),
-/// format, scans, odometry (names; of logs that tell), notes [text]}, tracking
-/// {pieces, loose [{begin, end, why}]}, where the outputs were moved alignment
-/// {kind, x, y, theta_deg} (m and degrees), and where there were several logs
+/// open_way_m (along which nothing tells how far the robot went; of logs
+/// without odometry), format, scans, odometry (names; of logs that tell), notes
+/// [text]}, tracking {pieces, loose [{begin, end, why}]}, where the outputs
+/// were moved alignment {kind, x, y, theta_deg} (m and degrees), and where
+/// there were several logs
 /// [{input, trajectory, scans, map, parts, agreeing, contradicting,
-/// changed_places, why_apart (or null)}]. Numbers that are not finite become
-/// null.
+/// changed_places, uncertain (why it may be another building; or null),
+/// why_apart (or null)}]. Numbers that are not finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// Writes it to a file, whole or not at all. Throws Error when it cannot be

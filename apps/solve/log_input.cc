@@ -74,6 +74,9 @@ void TellSweeps(const std::string& name, Summary* summary) {
 // Names what MatchScansAlone takes the time of.
 constexpr char kMatchingStep[] = "scan matching for want of odometry";
 
+// The share of the way that scans may leave open without a word.
+constexpr double kToldOpenShare = 0.05;
+
 // Scan matching alone carries a log without odometry.
 void MatchScansAlone(const std::string& name,
                      const LogSolverOptions& solver_options, RunClock* clock,
@@ -113,6 +116,15 @@ void MatchScansAlone(const std::string& name,
                   report.unmatched, log->scans.size());
     Remark("%s: %s", name.c_str(), text);
     summary->notes.push_back(text);
+  }
+  if (report.open_way > kToldOpenShare * report.way) {
+    std::snprintf(text, sizeof text,
+                  "on %.0f of %.0f m of the way the scans do not tell how far "
+                  "the robot went: lengths there may be off",
+                  report.open_way, report.way);
+    Remark("%s: %s", name.c_str(), text);
+    summary->notes.push_back(text);
+    summary->open_way = report.open_way;
   }
   Detail("matched scans for want of odometry in %.1f s", watch.Seconds());
 }

@@ -64,7 +64,11 @@ std::vector<Summary::LogInput> DescribeLogs(
           "%.2f m; %d contradict it",
           log.input.c_str(), log.agreeing, log.parts, placement.misfit,
           log.contradicting);
-      if (log.changed_places > 0) {
+      log.uncertain = placement.doubt;
+      if (!log.uncertain.empty()) {
+        Remark("%s: may not be its place: %s", log.input.c_str(),
+               log.uncertain.c_str());
+      } else if (log.changed_places > 0) {
         Remark(
             "%s: at %d place%s one has wall where the other looks through: "
             "doors were opened or shut, or it is another building",

@@ -82,6 +82,17 @@ TEST_F(ClosingLinesTest, WhatIsWorthALook) {
             std::string::npos);
 }
 
+TEST_F(ClosingLinesTest, WhatMayBeAnotherBuildingAndLengthsThatAreOpen) {
+  outcome_.summary.logs.resize(3);
+  outcome_.summary.logs[2].uncertain = "few parts agree";
+  outcome_.summary.open_way = 41.7;
+  EXPECT_EQ(ClosingLines(outcome_, "out")[1],
+            "worth a look: 1 log may be of another building, lengths of "
+            "corridors (42 m are open)");
+  EXPECT_EQ(ClosingLinesInMap(outcome_, "out", "map.json")[1],
+            "worth a look: 1 log may be of another building");
+}
+
 // A wall that has another direction in its place is fine.
 TEST_F(ClosingLinesTest, ADirectionInPlaceOfTheOneThatWasBroken) {
   Break(0);

@@ -94,6 +94,18 @@ void ShowScans(const std::vector<Scan>& scans, const ScanPointsOptions& points,
             detectors);
 }
 
+// The scans of the records, and where they are.
+std::pair<std::vector<int>, std::vector<Pose2>> KeyScans(
+    const LogSolverResult& result) {
+  std::vector<int> keys;
+  std::vector<Pose2> poses;
+  for (const KeyScanRecord& record : result.records) {
+    keys.push_back(record.scan);
+    poses.push_back(result.trajectory[static_cast<std::size_t>(record.scan)]);
+  }
+  return {std::move(keys), std::move(poses)};
+}
+
 }  // namespace
 
 double LengthOfWalls(const Graph& graph) {
@@ -793,11 +805,44 @@ void LogSolver::AdjustPoses(Context* context) {
   const std::vector<Pose2> by_odometry =
       PosesByMotions(result.records, context->keys);
   const bool is_bent = IsBent(context->keys, by_odometry);
+  AdjustPosesFrom(is_bent ? by_odometry : context->keys, context);
+  const int contradictions = CountContradictions(context);
+  if (contradictions > 0) {
+    // A start that is far off ends in a wrong place: the map in which less
+    // contradicts stands.
+    StateWriter kept;
+    Exchange(kept, registry_, *graph_);
+    context->adjustment->WriteState(&kept);
+    std::vector<Pose2> trajectory = result.trajectory;
+    AdjustPosesFrom(is_bent ? context->keys : by_odometry, context);
+    if (!context->IsStopped() &&
+        CountContradictions(context) >= contradictions) {
+      const std::string bytes = kept.bytes();
+      StateReader reader(bytes);
+      context->adjustment.reset();
+      DropEm();
+      MakeGraph();
+      Exchange(reader, registry_, *graph_);
+      Renew();
+      context->adjustment = std::make_unique<JointAdjustment>(
+          graph_.get(), session_.get(), registry_, context->scans,
+          result.refined, result.records, &reader, options_.adjustment,
+          context->control.stop);
+      context->places = context->adjustment->places();
+      result.trajectory = std::move(trajectory);
+    }
+  }
+  if (context->IsStopped()) ReturnToFirstMap(context);
+}
+
+void LogSolver::AdjustPosesFrom(const std::vector<Pose2>& start,
+                                Context* context) {
+  const LogSolverResult& result = context->result;
+  context->adjustment.reset();
   ClearGraph();
   context->adjustment = std::make_unique<JointAdjustment>(
       graph_.get(), session_.get(), registry_, context->scans, result.refined,
-      result.records, is_bent ? by_odometry : context->keys, kNoId,
-      options_.adjustment, context->control.stop);
+      result.records, start, kNoId, options_.adjustment, context->control.stop);
   JointAdjustment& adjustment = *context->adjustment;
   context->places = adjustment.places();
   adjustment.Adjust();
@@ -805,9 +850,21 @@ void LogSolver::AdjustPoses(Context* context) {
     adjustment.MatchAnew();
     adjustment.Adjust();
   }
-  if (context->IsStopped()) return ReturnToFirstMap(context);
+  if (context->IsStopped()) return;
   adjustment.EstimateVariances();
   TakeTrajectory(context);
+}
+
+int LogSolver::CountContradictions(Context* context) const {
+  if (!options_.check_map || context->IsStopped()) return 0;
+  const auto [keys, poses] = KeyScans(context->result);
+  int count = 0;
+  for (const MapContradiction& part :
+       FindContradictions(context->scans, keys, poses, options_.check,
+                          [context] { return context->IsStopped(); })) {
+    count += part.end - part.begin;
+  }
+  return count;
 }
 
 std::vector<LoopClosure> LogSolver::ClosuresOf(
@@ -953,12 +1010,7 @@ void LogSolver::CheckMap(Context* context) const {
   }
   context->Begin("check of the map");
   const ScopedTimer timer(&result.relocalization_seconds);
-  std::vector<int> keys;
-  std::vector<Pose2> poses;
-  for (const KeyScanRecord& record : result.records) {
-    keys.push_back(record.scan);
-    poses.push_back(result.trajectory[static_cast<std::size_t>(record.scan)]);
-  }
+  const auto [keys, poses] = KeyScans(result);
   const auto stop = [context] { return context->IsStopped(); };
   const std::vector<MapContradiction> contradictions =
       FindContradictions(context->scans, keys, poses, options_.check, stop);

@@ -315,6 +315,11 @@ class LogSolver {
                            const Context& context) const;
   // The second map, in three stages.
   void AdjustPoses(Context* context);
+  // The poses alone by all scans, from these of the key scans.
+  void AdjustPosesFrom(const std::vector<Pose2>& start, Context* context);
+  // Scans that lie in parts of the trajectory that contradict others, 0 when
+  // the map is not to be checked.
+  int CountContradictions(Context* context) const;
   void MakeWalls(Context* context);
   void AdjustWalls(Context* context);
   // The first map stands.

@@ -174,19 +174,25 @@ struct Evidence {
   }
 };
 
-}  // namespace
+// What other visits say of scans along the way; empty when it was stopped.
+struct JudgedScans {
+  // Of the keys, ascending.
+  std::vector<std::size_t> looked_at;
+  std::vector<Verdict> verdicts;
+};
 
-std::vector<MapContradiction> FindContradictions(
-    const std::vector<Scan>& scans, const std::vector<int>& keys,
-    const std::vector<Pose2>& poses, const MapCheckOptions& options,
-    const std::function<bool()>& stop) {
+JudgedScans JudgeScans(const std::vector<Scan>& scans,
+                       const std::vector<int>& keys,
+                       const std::vector<Pose2>& poses,
+                       const MapCheckOptions& options,
+                       const std::function<bool()>& stop) {
   if (keys.size() != poses.size()) {
     throw PLUMBLINE_ERROR(
         std::to_string(poses.size()) + " poses",
         "one for each of " + std::to_string(keys.size()) + " key scans");
   }
   const std::vector<double> way = WayLengths(poses, kLongestStep);
-  const std::vector<std::size_t> looked_at = SpreadOver(way, options.spacing);
+  std::vector<std::size_t> looked_at = SpreadOver(way, options.spacing);
   const PlaceGrid grid(poses, options.radius);
   const MapComparison comparison(scans, keys, poses, options);
   std::vector<Verdict> verdicts(looked_at.size(), Verdict::kUnknown);
@@ -211,7 +217,17 @@ std::vector<MapContradiction> FindContradictions(
     ParallelFor(std::min(kScansAtOnce, looked_at.size() - begin),
                 options.num_threads, [&](std::size_t i) { judge(begin + i); });
   }
+  return {std::move(looked_at), std::move(verdicts)};
+}
 
+}  // namespace
+
+std::vector<MapContradiction> FindContradictions(
+    const std::vector<Scan>& scans, const std::vector<int>& keys,
+    const std::vector<Pose2>& poses, const MapCheckOptions& options,
+    const std::function<bool()>& stop) {
+  const auto [looked_at, verdicts] =
+      JudgeScans(scans, keys, poses, options, stop);
   std::vector<MapContradiction> found;
   std::size_t i = 0;
   while (i < verdicts.size()) {
@@ -236,6 +252,20 @@ std::vector<MapContradiction> FindContradictions(
     }
   }
   return found;
+}
+
+MapAgreement CountAgreement(const std::vector<Scan>& scans,
+                            const std::vector<int>& keys,
+                            const std::vector<Pose2>& poses,
+                            const MapCheckOptions& options,
+                            const std::function<bool()>& stop) {
+  MapAgreement count;
+  for (const Verdict verdict :
+       JudgeScans(scans, keys, poses, options, stop).verdicts) {
+    count.agreeing += verdict == Verdict::kAgrees ? 1 : 0;
+    count.contradicting += verdict == Verdict::kContradicts ? 1 : 0;
+  }
+  return count;
 }
 
 std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,

@@ -77,6 +77,28 @@ std::vector<MapContradiction> FindContradictions(
     const std::vector<Pose2>& poses, const MapCheckOptions& options,
     const std::function<bool()>& stop = nullptr);
 
+/// How scans along the way, one for each MapCheckOptions::spacing, agree with
+/// what was seen on other visits to their places.
+struct MapAgreement {
+  int agreeing = 0;
+  int contradicting = 0;
+
+  /// Whether a map in which they agree so is better than one of the same scans
+  /// in which they agree as in `other`. One that has come apart contradicts
+  /// itself less, too: nothing of it may agree less.
+  bool IsBetterThan(const MapAgreement& other) const {
+    return contradicting < other.contradicting && agreeing >= other.agreeing;
+  }
+};
+
+/// Counts them. Arguments, cost and Error as of FindContradictions; none once
+/// `stop` has returned true.
+MapAgreement CountAgreement(const std::vector<Scan>& scans,
+                            const std::vector<int>& keys,
+                            const std::vector<Pose2>& poses,
+                            const MapCheckOptions& options,
+                            const std::function<bool()>& stop = nullptr);
+
 /// Where a track was cut, and goes on with what one match or a guess says.
 struct TrackCut {
   /// The last scan that is sure, and the first one of what follows; scans

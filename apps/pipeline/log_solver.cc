@@ -806,17 +806,16 @@ void LogSolver::AdjustPoses(Context* context) {
       PosesByMotions(result.records, context->keys);
   const bool is_bent = IsBent(context->keys, by_odometry);
   AdjustPosesFrom(is_bent ? by_odometry : context->keys, context);
-  const int contradictions = CountContradictions(context);
-  if (contradictions > 0) {
-    // A start that is far off ends in a wrong place: the map in which less
-    // contradicts stands.
+  if (HasContradictions(context)) {
+    // A start that is far off ends in a wrong place: the better of two stands.
+    const MapAgreement agreement = AgreementOf(*context);
     StateWriter kept;
     Exchange(kept, registry_, *graph_);
     context->adjustment->WriteState(&kept);
     std::vector<Pose2> trajectory = result.trajectory;
     AdjustPosesFrom(is_bent ? context->keys : by_odometry, context);
     if (!context->IsStopped() &&
-        CountContradictions(context) >= contradictions) {
+        !AgreementOf(*context).IsBetterThan(agreement)) {
       const std::string bytes = kept.bytes();
       StateReader reader(bytes);
       context->adjustment.reset();
@@ -855,16 +854,18 @@ void LogSolver::AdjustPosesFrom(const std::vector<Pose2>& start,
   TakeTrajectory(context);
 }
 
-int LogSolver::CountContradictions(Context* context) const {
-  if (!options_.check_map || context->IsStopped()) return 0;
+bool LogSolver::HasContradictions(Context* context) const {
+  if (!options_.check_map || context->IsStopped()) return false;
   const auto [keys, poses] = KeyScans(context->result);
-  int count = 0;
-  for (const MapContradiction& part :
-       FindContradictions(context->scans, keys, poses, options_.check,
-                          [context] { return context->IsStopped(); })) {
-    count += part.end - part.begin;
-  }
-  return count;
+  return !FindContradictions(context->scans, keys, poses, options_.check,
+                             [context] { return context->IsStopped(); })
+              .empty();
+}
+
+MapAgreement LogSolver::AgreementOf(const Context& context) const {
+  const auto [keys, poses] = KeyScans(context.result);
+  return CountAgreement(context.scans, keys, poses, options_.check,
+                        context.control.stop);
 }
 
 std::vector<LoopClosure> LogSolver::ClosuresOf(

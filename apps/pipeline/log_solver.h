@@ -317,9 +317,10 @@ class LogSolver {
   void AdjustPoses(Context* context);
   // The poses alone by all scans, from these of the key scans.
   void AdjustPosesFrom(const std::vector<Pose2>& start, Context* context);
-  // Scans that lie in parts of the trajectory that contradict others, 0 when
-  // the map is not to be checked.
-  int CountContradictions(Context* context) const;
+  // Whether what the robot saw contradicts itself; false when the map is not to
+  // be checked. How far it agrees with itself.
+  bool HasContradictions(Context* context) const;
+  MapAgreement AgreementOf(const Context& context) const;
   void MakeWalls(Context* context);
   void AdjustWalls(Context* context);
   // The first map stands.

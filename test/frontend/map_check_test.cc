@@ -95,6 +95,36 @@ TEST(FindContradictionsTest, ARoundThatIsTurned) {
   }
 }
 
+// A round that is turned contradicts the other one; one that lies elsewhere
+// does not, but then nothing agrees.
+TEST(CountAgreementTest, ATrueMapIsBetter) {
+  const Rounds rounds = TwoRounds();
+  const auto count = [&rounds](const Pose2& shift, int from) {
+    std::vector<Pose2> poses = rounds.poses;
+    for (auto k = static_cast<std::size_t>(from); k < poses.size(); ++k) {
+      poses[k] = Compose(shift, poses[k]);
+    }
+    return CountAgreement(rounds.scans, rounds.keys, poses, {});
+  };
+  const MapAgreement right = count(Pose2::Zero(), 0);
+  const MapAgreement turned =
+      count({0.5, -0.8, DegToRad(35.0)}, rounds.second + 40);
+  const MapAgreement apart = count({50.0, 0.0, 0.0}, rounds.second);
+  EXPECT_EQ(right.contradicting, 0);
+  EXPECT_GT(right.agreeing, 20);
+  EXPECT_GT(turned.contradicting, 3);
+  EXPECT_EQ(apart.contradicting, 0);
+  EXPECT_LT(apart.agreeing, turned.agreeing);
+  EXPECT_TRUE(right.IsBetterThan(turned));
+  EXPECT_FALSE(turned.IsBetterThan(right));
+  EXPECT_FALSE(apart.IsBetterThan(turned));
+  EXPECT_FALSE(apart.IsBetterThan(right));
+  EXPECT_FALSE(right.IsBetterThan(right));
+  const MapAgreement stopped = CountAgreement(
+      rounds.scans, rounds.keys, rounds.poses, {}, [] { return true; });
+  EXPECT_EQ(stopped.agreeing + stopped.contradicting, 0);
+}
+
 // What was seen once only cannot contradict anything.
 TEST(FindContradictionsTest, NothingToCompareWith) {
   Rounds rounds = TwoRounds();

@@ -2,6 +2,8 @@
 #include <plumbline/core/marginals.h>
 #include <plumbline/core/wall.h>
 #include <plumbline/detectors/corridor.h>
+#include <plumbline/detectors/corridor_axis.h>
+#include <plumbline/detectors/corridor_model.h>
 #include <plumbline/detectors/map_directions.h>
 #include <plumbline/detectors/parameters.h>
 #include <plumbline/detectors/wall_faces.h>
@@ -9,7 +11,6 @@
 #include <plumbline/factors/corridor.h>
 #include <plumbline/factors/segment_corridor.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -30,163 +31,23 @@ using Eigen::Vector2d;
 
 constexpr char kName[] = "corridor";
 
-// A wall that reaches beyond this part of the half width on both sides of the
-// axis closes the corridor.
-constexpr double kCrossing = 0.5;
-// A face may go on beyond such a wall by this much, m: walls are thick.
+// A face may go on beyond a wall across by this much, m: walls are thick.
 constexpr double kBeyond = 0.3;
 // So many pairs of faces may found a corridor; the one on which most faces fit
 // does. The longest pair may have a niche or a row of cupboards for a side.
 constexpr int kMaxRivals = 8;
-// Variances with which the axis (m^2, rad^2) and half the width (m^2) are known
-// before any face is on them.
-constexpr double kOpen = 1e4;
-
-// The right side and the left one, as the relation names them.
-enum Side : std::size_t { kRight = 0, kLeft = 1 };
-constexpr std::array<double, 2> kDirections = {0.0, kPi};
-// Sign of a distance to the right of the axis.
-constexpr std::array<double, 2> kSigns = {1.0, -1.0};
-
-// Axis and half width.
-struct Axis {
-  Vector2d origin = Vector2d::Zero();
-  double angle = 0.0;
-  double half_width = 0.0;
-
-  Vector2d direction() const { return {std::cos(angle), std::sin(angle)}; }
-  // Coordinates of a point along the axis and to its left.
-  Vector2d Local(const Vector2d& point) const {
-    const Vector2d along = direction();
-    const Vector2d relative = point - origin;
-    return {along.dot(relative),
-            along.x() * relative.y() - along.y() * relative.x()};
-  }
-  Interval IntervalOf(const WallFace& face) const {
-    const double begin = Local(face.wall.At(face.wall.begin)).x();
-    const double end = Local(face.wall.At(face.wall.end)).x();
-    return std::minmax(begin, end);
-  }
-};
-
-// A face as a side of a corridor sees it.
-struct SideFace {
-  std::size_t face = 0;
-  Side side = kRight;
-  Interval interval;
-  // Of its middle.
-  double along = 0.0;
-  // How far it lies past its side, m, and how it is turned against it, rad.
-  double past = 0.0;
-  double turn = 0.0;
-};
-
-SideFace OnSide(const Axis& axis, const WallFace& face, std::size_t index) {
-  SideFace on;
-  on.face = index;
-  const double difference = NormalizeAngle(face.wall.angle - axis.angle);
-  on.side = std::abs(difference) < 0.5 * kPi ? kRight : kLeft;
-  on.turn = NormalizeAngle(difference - kDirections[on.side]);
-  const Vector2d local = axis.Local(face.middle);
-  on.along = local.x();
-  on.past = -kSigns[on.side] * local.y() - axis.half_width;
-  on.interval = axis.IntervalOf(face);
-  return on;
-}
-
-// Length of the union of intervals.
-double UnionLength(std::vector<Interval> intervals) {
-  std::sort(intervals.begin(), intervals.end());
-  double covered = 0.0;
-  double end = -std::numeric_limits<double>::infinity();
-  for (const auto& [begin, its_end] : intervals) {
-    covered += std::max(0.0, its_end - std::max(begin, end));
-    end = std::max(end, its_end);
-  }
-  return covered;
-}
-
-// The faces of a corridor and the corridor as random variables, Gaussian and
-// linear about where they stand: (axis to the left at its origin, its turn,
-// half the width, and for each face its offset to its own left and its turn).
-// Ties enter one by one.
-class CorridorModel {
- public:
-  // `covariance`: of the three of the corridor and the two of each face.
-  CorridorModel(std::vector<SideFace> faces, Eigen::MatrixXd covariance,
-                std::vector<Eigen::Vector2d> tolerances)
-      : faces_(std::move(faces)),
-        covariance_(std::move(covariance)),
-        tolerances_(std::move(tolerances)),
-        mean_(Eigen::VectorXd::Zero(covariance_.rows())) {}
-
-  struct Innovation {
-    Vector2d error = Vector2d::Zero();
-    Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();
-    double chi_square = 0.0;
-  };
-
-  Innovation Predict(std::size_t k) const {
-    const Rows rows = RowsOf(k);
-    Innovation innovation;
-    innovation.error = Vector2d(faces_[k].past, faces_[k].turn) + rows * mean_;
-    innovation.covariance = rows * covariance_ * rows.transpose();
-    // Tolerances are standard deviations.
-    innovation.covariance.diagonal() +=
-        tolerances_[k].cwiseProduct(tolerances_[k]);
-    innovation.chi_square = innovation.error.dot(
-        innovation.covariance.ldlt().solve(innovation.error));
-    return innovation;
-  }
-
-  void Tie(std::size_t k) {
-    const Rows rows = RowsOf(k);
-    const Innovation innovation = Predict(k);
-    const Eigen::MatrixXd cross = covariance_ * rows.transpose();
-    const Eigen::MatrixXd gain =
-        innovation.covariance.ldlt().solve(cross.transpose()).transpose();
-    mean_ -= gain * innovation.error;
-    covariance_ -= gain * cross.transpose();
-    covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
-  }
-
-  // Of the axis to the left, its turn, and of half the width.
-  Eigen::Vector3d Correction() const { return mean_.head<3>(); }
-
- private:
-  using Rows = Eigen::Matrix<double, 2, Eigen::Dynamic>;
-
-  // Derivative of how far a face lies past its side and of its turn.
-  Rows RowsOf(std::size_t k) const {
-    const double sign = kSigns[faces_[k].side];
-    const Eigen::Index own = 3 + 2 * static_cast<Eigen::Index>(k);
-    Rows rows = Rows::Zero(2, covariance_.cols());
-    rows(0, 0) = sign;
-    rows(0, 1) = sign * faces_[k].along;
-    rows(0, 2) = -1.0;
-    rows(0, own) = -1.0;
-    rows(1, 1) = -1.0;
-    rows(1, own + 1) = 1.0;
-    return rows;
-  }
-
-  std::vector<SideFace> faces_;
-  Eigen::MatrixXd covariance_;
-  std::vector<Eigen::Vector2d> tolerances_;
-  Eigen::VectorXd mean_;
-};
 
 // A corridor that is there, with the faces that are tied to it.
 struct Existing {
   const Feature* feature = nullptr;
-  Axis axis;
+  CorridorAxis axis;
   std::vector<Interval> intervals;
 };
 
 // What is found: a new corridor, or faces that join one that is there.
 struct Found {
   const Feature* existing = nullptr;
-  Axis axis;
+  CorridorAxis axis;
   Interval interval;
   std::vector<SideFace> faces;
   // Number of faces that did not fit.
@@ -221,7 +82,8 @@ class CorridorSearch {
     for (std::size_t i = 0; i < seeds.size(); ++i) {
       if (scope.ShouldStop()) return {};
       if (!IsFree(seeds[i])) continue;
-      const Axis axis = AxisOf(seeds[i]);
+      const CorridorAxis axis =
+          AxisBetween(faces_[seeds[i].first], faces_[seeds[i].second]);
       if (LiesInOneOf(existing, axis) || LiesInOneOf(found, axis)) continue;
       std::optional<Found> best = Complete(axis, seeds[i]);
       if (!best) continue;
@@ -230,8 +92,9 @@ class CorridorSearch {
       for (std::size_t j = i + 1; j < seeds.size() && rivals < kMaxRivals;
            ++j) {
         if (!IsFree(seeds[j])) continue;
-        const Axis rival_axis = AxisOf(seeds[j]);
-        if (!IsWithin(rival_axis, first.axis, first.interval)) continue;
+        const CorridorAxis rival_axis =
+            AxisBetween(faces_[seeds[j].first], faces_[seeds[j].second]);
+        if (!rival_axis.IsWithin(first.axis, first.interval)) continue;
         ++rivals;
         std::optional<Found> rival = Complete(rival_axis, seeds[j]);
         if (rival && TiedLength(*rival) > TiedLength(*best)) {
@@ -315,85 +178,24 @@ class CorridorSearch {
     return length;
   }
 
-  // In the middle between the two faces, with the first on its right.
-  Axis AxisOf(const Seed& seed) const {
-    const WallFace& first = faces_[seed.first];
-    const WallFace& second = faces_[seed.second];
-    Axis axis;
-    // A long face knows its direction best.
-    const double weight =
-        std::pow(first.length, 3.0) /
-        (std::pow(first.length, 3.0) + std::pow(second.length, 3.0));
-    const double turn =
-        NormalizeAngle(second.wall.angle - first.wall.angle + kPi);
-    axis.angle = NormalizeAngle(first.wall.angle + (1.0 - weight) * turn);
-    const Interval other = first.wall.IntervalOf(second.wall);
-    const double along = 0.5 * (std::max(first.wall.begin, other.first) +
-                                std::min(first.wall.end, other.second));
-    const Vector2d right = first.wall.At(along);
-    const Vector2d left = second.wall.At(second.wall.Along(right));
-    axis.origin = 0.5 * (right + left);
-    axis.half_width = 0.5 * second.wall.Across(right);
-    return axis;
-  }
-
-  static bool IsWithin(const Axis& axis, const Axis& other,
-                       const Interval& interval) {
-    const Vector2d local = other.Local(axis.origin);
-    return std::abs(local.y()) < other.half_width &&
-           local.x() > interval.first && local.x() < interval.second &&
-           std::abs(NormalizeAxial(axis.angle - other.angle)) < 0.25 * kPi;
-  }
   static bool LiesInOneOf(const std::vector<Existing>& existing,
-                          const Axis& axis) {
+                          const CorridorAxis& axis) {
     return std::any_of(
         existing.begin(), existing.end(), [&](const Existing& corridor) {
           return !corridor.intervals.empty() &&
-                 IsWithin(axis, corridor.axis, Hull(corridor.intervals));
+                 axis.IsWithin(corridor.axis, Hull(corridor.intervals));
         });
   }
-  static bool LiesInOneOf(const std::vector<Found>& found, const Axis& axis) {
+  static bool LiesInOneOf(const std::vector<Found>& found,
+                          const CorridorAxis& axis) {
     return std::any_of(found.begin(), found.end(), [&](const Found& corridor) {
-      return IsWithin(axis, corridor.axis, corridor.interval);
+      return axis.IsWithin(corridor.axis, corridor.interval);
     });
-  }
-
-  static Interval Hull(const std::vector<Interval>& intervals) {
-    Interval hull = intervals.front();
-    for (const auto& [begin, end] : intervals) {
-      hull.first = std::min(hull.first, begin);
-      hull.second = std::max(hull.second, end);
-    }
-    return hull;
-  }
-
-  // How far a corridor can go from a part of it: to the nearest walls across.
-  // False when there is one within.
-  bool FreeReach(const Axis& axis, const Interval& part,
-                 Interval* reach) const {
-    *reach = {-std::numeric_limits<double>::infinity(),
-              std::numeric_limits<double>::infinity()};
-    const double middle = 0.5 * (part.first + part.second);
-    for (const WallFace& face : faces_) {
-      const Vector2d begin = axis.Local(face.wall.At(face.wall.begin));
-      const Vector2d end = axis.Local(face.wall.At(face.wall.end));
-      const double far = kCrossing * axis.half_width;
-      if (std::min(begin.y(), end.y()) > -far ||
-          std::max(begin.y(), end.y()) < far) {
-        continue;
-      }
-      const double share = begin.y() / (begin.y() - end.y());
-      const double at = begin.x() + share * (end.x() - begin.x());
-      if (at > part.first && at < part.second) return false;
-      double& limit = at < middle ? reach->first : reach->second;
-      limit = at < middle ? std::max(limit, at) : std::min(limit, at);
-    }
-    return true;
   }
 
   // Faces that are not used and lie along a side, joined on to `part` across
   // openings.
-  std::vector<SideFace> Gather(const Axis& axis, std::size_t graph_part,
+  std::vector<SideFace> Gather(const CorridorAxis& axis, std::size_t graph_part,
                                const Interval& reach, Interval part) const {
     std::vector<SideFace> candidates;
     for (std::size_t i = 0; i < faces_.size(); ++i) {
@@ -407,43 +209,26 @@ class CorridorSearch {
       }
       candidates.push_back(on);
     }
-    // Nearest first, until the next opening is too wide.
-    std::vector<SideFace> gathered;
-    std::vector<bool> is_in(candidates.size(), false);
-    for (bool has_grown = true; has_grown;) {
-      has_grown = false;
-      for (std::size_t k = 0; k < candidates.size(); ++k) {
-        if (is_in[k] ||
-            -Overlap(candidates[k].interval, part) > options_.max_opening) {
-          continue;
-        }
-        is_in[k] = true;
-        has_grown = true;
-        part = Hull({part, candidates[k].interval});
-      }
-    }
-    for (std::size_t k = 0; k < candidates.size(); ++k) {
-      if (is_in[k]) gathered.push_back(candidates[k]);
-    }
-    return gathered;
+    return JoinedTo(part, candidates, options_.max_opening);
   }
 
   // Long, narrow, and with walls along both sides.
-  bool IsCorridor(const Axis& axis, const std::vector<SideFace>& faces) const {
+  bool IsCorridor(const CorridorAxis& axis,
+                  const std::vector<SideFace>& faces) const {
     std::array<std::vector<Interval>, 2> sides;
     std::vector<Interval> all;
     for (const SideFace& on : faces) {
       sides[on.side].push_back(on.interval);
       all.push_back(on.interval);
     }
-    if (sides[kRight].empty() || sides[kLeft].empty()) return false;
+    if (sides[kRightSide].empty() || sides[kLeftSide].empty()) return false;
     const Interval hull = Hull(all);
     const double length = hull.second - hull.first;
     const double width = 2.0 * axis.half_width;
     return length >= options_.min_length &&
            length >= options_.min_ratio * width &&
-           UnionLength(sides[kRight]) >= options_.min_coverage * length &&
-           UnionLength(sides[kLeft]) >= options_.min_coverage * length;
+           UnionLength(sides[kRightSide]) >= options_.min_coverage * length &&
+           UnionLength(sides[kLeftSide]) >= options_.min_coverage * length;
   }
 
   CorridorModel MakeModel(const Feature* existing,
@@ -464,64 +249,25 @@ class CorridorSearch {
                            FaceCovariance({existing}, faces, &*marginals_),
                            std::move(tolerances));
     }
-    const Eigen::MatrixXd of_faces = FaceCovariance({}, faces, &*marginals_);
-    Eigen::MatrixXd covariance =
-        Eigen::MatrixXd::Zero(3 + of_faces.rows(), 3 + of_faces.cols());
-    covariance.topLeftCorner<3, 3>() = kOpen * Eigen::Matrix3d::Identity();
-    covariance.bottomRightCorner(of_faces.rows(), of_faces.cols()) = of_faces;
-    return CorridorModel(on_sides, std::move(covariance),
-                         std::move(tolerances));
-  }
-
-  // Ties the faces that fit, the most certain first, and returns them. `first`:
-  // faces that are tied before all others; none fits when one of them does not.
-  std::vector<SideFace> TieFitting(const std::vector<SideFace>& faces,
-                                   const std::vector<std::size_t>& first,
-                                   CorridorModel* model) const {
-    std::vector<bool> is_tied(faces.size(), false);
-    for (const std::size_t k : first) {
-      if (!(model->Predict(k).chi_square <= options_.gate)) return {};
-      model->Tie(k);
-      is_tied[k] = true;
-    }
-    while (true) {
-      std::size_t best = faces.size();
-      double least = std::numeric_limits<double>::infinity();
-      for (std::size_t k = 0; k < faces.size(); ++k) {
-        if (is_tied[k]) continue;
-        const CorridorModel::Innovation innovation = model->Predict(k);
-        if (!(innovation.chi_square <= options_.gate)) continue;
-        const double size = innovation.covariance.determinant();
-        if (size < least) {
-          least = size;
-          best = k;
-        }
-      }
-      if (best == faces.size()) break;
-      model->Tie(best);
-      is_tied[best] = true;
-    }
-    std::vector<SideFace> fitting;
-    for (std::size_t k = 0; k < faces.size(); ++k) {
-      if (is_tied[k]) fitting.push_back(faces[k]);
-    }
-    return fitting;
+    return CorridorModel::OfNewCorridor(on_sides,
+                                        FaceCovariance({}, faces, &*marginals_),
+                                        std::move(tolerances));
   }
 
   // The corridor that two faces found.
-  std::optional<Found> Complete(const Axis& axis, const Seed& seed) {
+  std::optional<Found> Complete(const CorridorAxis& axis, const Seed& seed) {
     ++tried_;
-    const Interval first = axis.IntervalOf(faces_[seed.first]);
-    const Interval second = axis.IntervalOf(faces_[seed.second]);
+    const Interval first = axis.IntervalOf(faces_[seed.first].wall);
+    const Interval second = axis.IntervalOf(faces_[seed.second].wall);
     const Interval common = {std::max(first.first, second.first),
                              std::min(first.second, second.second)};
-    Interval reach;
-    if (!FreeReach(axis, common, &reach)) {
+    const std::optional<Interval> reach = FreeReach(axis, common, faces_);
+    if (!reach) {
       ++crossed_;
       return std::nullopt;
     }
     const std::vector<SideFace> gathered =
-        Gather(axis, faces_[seed.first].part, reach, common);
+        Gather(axis, faces_[seed.first].part, *reach, common);
     // A face that ends beyond a wall across is none of them.
     std::vector<std::size_t> first_faces;
     for (std::size_t k = 0; k < gathered.size(); ++k) {
@@ -535,7 +281,7 @@ class CorridorSearch {
     }
     CorridorModel model = MakeModel(nullptr, gathered);
     Found found;
-    found.faces = TieFitting(gathered, first_faces, &model);
+    found.faces = model.TieFitting(first_faces, options_.gate);
     if (!IsCorridor(axis, found.faces)) {
       ++not_long_;
       return std::nullopt;
@@ -549,7 +295,7 @@ class CorridorSearch {
     if (!(found.axis.half_width > 0.0)) return std::nullopt;
     std::vector<Interval> intervals;
     for (const SideFace& on : found.faces) {
-      intervals.push_back(found.axis.IntervalOf(faces_[on.face]));
+      intervals.push_back(found.axis.IntervalOf(faces_[on.face].wall));
     }
     found.interval = Hull(intervals);
     found.refused =
@@ -560,16 +306,17 @@ class CorridorSearch {
   std::optional<Found> Extend(const Existing& corridor) {
     if (corridor.intervals.empty()) return std::nullopt;
     const Interval hull = Hull(corridor.intervals);
-    Interval reach;
+    const std::optional<Interval> reach =
+        FreeReach(corridor.axis, hull, faces_);
     // What is there is not taken apart for a wall across.
-    if (!FreeReach(corridor.axis, hull, &reach)) return std::nullopt;
+    if (!reach) return std::nullopt;
     const std::vector<SideFace> gathered =
-        Gather(corridor.axis, PartOf(*corridor.feature), reach, hull);
+        Gather(corridor.axis, PartOf(*corridor.feature), *reach, hull);
     if (gathered.empty()) return std::nullopt;
     CorridorModel model = MakeModel(corridor.feature, gathered);
     Found found;
     found.existing = corridor.feature;
-    found.faces = TieFitting(gathered, {}, &model);
+    found.faces = model.TieFitting({}, options_.gate);
     refused_ += static_cast<std::int64_t>(gathered.size() - found.faces.size());
     if (found.faces.empty()) return std::nullopt;
     for (const SideFace& on : found.faces) is_used_[on.face] = true;
@@ -602,8 +349,8 @@ class CorridorSearch {
   std::int64_t refused_ = 0;
 };
 
-Side SideOf(const Constraint& constraint) {
-  return std::cos(constraint.expected[1]) >= 0.0 ? kRight : kLeft;
+CorridorSide SideOf(const Constraint& constraint) {
+  return std::cos(constraint.expected[1]) >= 0.0 ? kRightSide : kLeftSide;
 }
 
 Existing ReadCorridor(const Graph& graph, const RelationType& relation,
@@ -620,9 +367,7 @@ Existing ReadCorridor(const Graph& graph, const RelationType& relation,
     const std::optional<Wall> wall =
         WallOf(graph.GetFeature(constraint.features[0]));
     if (!wall) continue;
-    WallFace face;
-    face.wall = *wall;
-    corridor.intervals.push_back(corridor.axis.IntervalOf(face));
+    corridor.intervals.push_back(corridor.axis.IntervalOf(*wall));
   }
   return corridor;
 }
@@ -673,7 +418,7 @@ const std::string& CorridorDetector::name() const {
 
 bool CorridorDetector::IsSupported(
     const std::vector<const Constraint*>& support) const {
-  std::set<Side> sides;
+  std::set<CorridorSide> sides;
   for (const Constraint* constraint : support) {
     sides.insert(SideOf(*constraint));
   }
@@ -726,9 +471,10 @@ Transaction CorridorDetector::Detect(const Graph& graph,
       const WallFace& face = search.face(on.face);
       const Vector2d tolerance = search.ToleranceOf(face);
       Constraint tie = MakeStructure(
-          relation, {face.feature->id, id}, Vector2d(0.0, kDirections[on.side]),
-          CorridorInformation(tolerance[0], tolerance[1], kDirections[on.side],
-                              on.along),
+          relation, {face.feature->id, id},
+          Vector2d(0.0, CorridorSideDirection(on.side)),
+          CorridorInformation(tolerance[0], tolerance[1],
+                              CorridorSideDirection(on.side), on.along),
           kName);
       // What was accepted by its innovation goes at the same gate.
       tie.break_below = ChiSquarePValue(options_.gate, 2);

@@ -34,18 +34,55 @@ std::string_view Trimmed(std::string_view text) {
   return text;
 }
 
-std::vector<std::string_view> Cells(std::string_view line) {
+// What stands between the cells of a table with this header: a comma, or what
+// spreadsheets write where the comma stands in numbers.
+char SeparatorOf(std::string_view header) {
+  const std::size_t found = header.find_first_of(",;\t");
+  return found == std::string_view::npos ? ',' : header[found];
+}
+
+// R and others put names in quotes.
+std::string_view Unquoted(std::string_view cell) {
+  cell = Trimmed(cell);
+  if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') {
+    cell = Trimmed(cell.substr(1, cell.size() - 2));
+  }
+  return cell;
+}
+
+std::vector<std::string_view> Cells(std::string_view line, char separator) {
   std::vector<std::string_view> cells;
   while (true) {
-    const std::size_t comma = line.find(',');
-    cells.push_back(Trimmed(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return cells;
-    line.remove_prefix(comma + 1);
+    const std::size_t end = line.find(separator);
+    cells.push_back(Unquoted(line.substr(0, end)));
+    if (end == std::string_view::npos) return cells;
+    line.remove_prefix(end + 1);
   }
 }
 
-// None when the cell is anything but a number.
+// The next line of `text`, which is taken off it. Lines end as on any system:
+// with CR and LF, LF, or CR alone.
+std::string_view TakeLine(std::string_view* text) {
+  const std::size_t end = text->find_first_of("\r\n");
+  const std::string_view line = text->substr(0, end);
+  if (end == std::string_view::npos) {
+    *text = {};
+    return line;
+  }
+  const bool is_pair = text->substr(end, 2) == "\r\n";
+  text->remove_prefix(end + (is_pair ? 2 : 1));
+  return line;
+}
+
+// None when the cell is anything but a number. Where cells are not separated by
+// commas numbers may have one.
 std::optional<double> Number(std::string_view cell) {
+  const std::size_t comma = cell.find(',');
+  if (comma != std::string_view::npos) {
+    std::string with_point(cell);
+    with_point[comma] = '.';
+    return Number(with_point);
+  }
   double value = 0.0;
   const auto [end, error] =
       std::from_chars(cell.data(), cell.data() + cell.size(), value);
@@ -82,24 +119,30 @@ class CsvReader {
   }
 
   Log Read() {
-    std::string_view line;
+    std::string_view lines;
     bool has_header = false;
-    while (input_->ReadLine(&line)) {
-      const std::string_view text = Trimmed(line);
-      if (text.empty() || text.front() == '#') continue;
-      if (!has_header) {
-        ReadHeader(text);
-        has_header = true;
-      } else {
-        ReadScan(text);
-      }
+    while (input_->ReadLine(&lines)) {
+      // More than one where lines end with CR alone.
+      do {
+        ++line_number_;
+        // With its tabs, which may stand for empty cells.
+        const std::string_view line = TakeLine(&lines);
+        const std::string_view text = Trimmed(line);
+        if (text.empty() || text.front() == '#') continue;
+        if (!has_header) {
+          ReadHeader(line);
+          has_header = true;
+        } else {
+          ReadScan(line);
+        }
+      } while (!lines.empty());
     }
     if (!input_->damage().empty()) {
       Skip(input_->damage() +
            ": what was unpacked before it is used, the rest is lost");
     }
     if (log_.scans.empty()) {
-      throw Error(input_->name(), input_->line_number(),
+      throw Error(input_->name(), line_number_,
                   has_header ? "no line is a scan" + FirstReason()
                              : "no line names columns",
                   "a line that names the columns, then a line per scan");
@@ -110,7 +153,7 @@ class CsvReader {
 
  private:
   Error Refuse(const std::string& what, const std::string& expected) const {
-    return Error(input_->name(), input_->line_number(), what, expected);
+    return Error(input_->name(), line_number_, what, expected);
   }
 
   std::string FirstReason() const {
@@ -118,7 +161,8 @@ class CsvReader {
   }
 
   void ReadHeader(std::string_view line) {
-    const std::vector<std::string_view> names = Cells(line);
+    separator_ = SeparatorOf(line);
+    const std::vector<std::string_view> names = Cells(line, separator_);
     num_cells_ = names.size();
     std::string unused;
     int num_unused = 0;
@@ -179,7 +223,7 @@ class CsvReader {
   }
 
   void ReadScan(std::string_view line) {
-    const std::vector<std::string_view> cells = Cells(line);
+    const std::vector<std::string_view> cells = Cells(line, separator_);
     if (cells.size() != num_cells_) {
       Skip("line with another number of cells than there are columns");
       return;
@@ -201,6 +245,8 @@ class CsvReader {
     Scan scan;
     scan.timestamp = number("time", 0.0);
     scan.timestamp_text = std::string(cells[columns_.at("time")]);
+    std::replace(scan.timestamp_text.begin(), scan.timestamp_text.end(), ',',
+                 '.');
     if (has_poses_) {
       scan.odometry = Pose2(number("x", 0.0), number("y", 0.0),
                             NormalizeAngle(number("theta", 0.0)));
@@ -229,7 +275,7 @@ class CsvReader {
       Skip("line with an absurd pose: expected metres and radians");
       return;
     }
-    scan.line = input_->line_number();
+    scan.line = line_number_;
     const std::size_t stride =
         (beams_.size() + kMostBeamsUsed - 1) / kMostBeamsUsed;
     if (stride > 1) {
@@ -265,7 +311,7 @@ class CsvReader {
     }
     ++found->count;
     if (static_cast<int>(found->first_lines.size()) < kShownLines) {
-      found->first_lines.push_back(input_->line_number());
+      found->first_lines.push_back(line_number_);
     }
   }
 
@@ -284,6 +330,8 @@ class CsvReader {
   InputStream* input_;
   const LaserOptions& options_;
   Log log_;
+  int line_number_ = 0;
+  char separator_ = ',';
   std::size_t num_cells_ = 0;
   // Cells by name, and of the ranges.
   std::map<std::string, std::size_t> columns_;
@@ -299,21 +347,15 @@ Log ReadCsvLog(InputStream* input, const LaserOptions& options) {
 
 bool LooksLikeCsvLog(std::string_view prefix) {
   while (!prefix.empty()) {
-    const std::size_t end = prefix.find('\n');
-    std::string_view line = prefix.substr(0, end);
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    line = Trimmed(line);
-    if (!line.empty() && line.front() != '#') {
-      bool has_time = false;
-      bool has_ranges = false;
-      for (const std::string_view cell : Cells(line)) {
-        has_time = has_time || cell == "time";
-        has_ranges = has_ranges || cell == "r0";
-      }
-      return has_time && has_ranges;
+    const std::string_view line = Trimmed(TakeLine(&prefix));
+    if (line.empty() || line.front() == '#') continue;
+    bool has_time = false;
+    bool has_ranges = false;
+    for (const std::string_view cell : Cells(line, SeparatorOf(line))) {
+      has_time = has_time || cell == "time";
+      has_ranges = has_ranges || cell == "r0";
     }
-    if (end == std::string_view::npos) break;
-    prefix.remove_prefix(end + 1);
+    return has_time && has_ranges;
   }
   return false;
 }

@@ -152,6 +152,47 @@ TEST(CsvReaderTest, ARefusalSaysWhatWasWrongWithTheLines) {
               HasSubstr("number of cells"));
 }
 
+// As they come from Unix, Windows and old Macs.
+TEST(CsvReaderTest, LinesEndInThreeWays) {
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    SCOPED_TRACE(end.size());
+    const std::string text =
+        "# of a robot" + end + end + "time,start_angle,angle_step,r0,r1,r2" +
+        end + "1,-1,1,2,3,4" + end + "2,-1,1,2,3" + end + "3,-1,1,2,3,";
+    EXPECT_TRUE(LooksLikeCsvLog(text));
+    for (const std::string& last : {std::string(), end}) {
+      const Log log = ReadCsv(text + last);
+      ASSERT_EQ(log.scans.size(), 2u);
+      EXPECT_THAT(log.scans[0].ranges, ElementsAre(2.0f, 3.0f, 4.0f));
+      EXPECT_THAT(log.scans[1].ranges, ElementsAre(2.0f, 3.0f, 0.0f));
+      EXPECT_EQ(log.scans[1].line, 6);
+      ASSERT_EQ(log.skipped.size(), 1u);
+      EXPECT_THAT(log.skipped[0].first_lines, ElementsAre(5));
+    }
+  }
+}
+
+// As R and spreadsheets write them.
+TEST(CsvReaderTest, QuotesSemicolonsTabsAndDecimalCommas) {
+  for (const std::string text :
+       {"\"time\",\"start_angle\",\"angle_step\",\"r0\",\"r1\",\"r2\"\n"
+        "\"1.25\",-1,1,2.5,3,NA\n",
+        "time;start_angle;angle_step;r0;r1;r2\n1,25;-1;1;2,5;3;\n",
+        "time\tstart_angle\tangle_step\tr0\tr1\tr2\n1.25\t-1\t1\t2.5\t3\t\n"}) {
+    SCOPED_TRACE(text);
+    EXPECT_TRUE(LooksLikeCsvLog(text));
+    const Log log = ReadCsv(text);
+    ASSERT_EQ(log.scans.size(), 1u);
+    EXPECT_EQ(log.scans[0].timestamp, 1.25);
+    EXPECT_EQ(log.scans[0].timestamp_text, "1.25");
+    EXPECT_EQ(log.scans[0].start_angle, -1.0);
+    EXPECT_THAT(log.scans[0].ranges, ElementsAre(2.5f, 3.0f, 0.0f));
+    EXPECT_TRUE(log.skipped.empty());
+  }
+  EXPECT_THAT(WhyNot("time;start_angle;angle_step;r0;r1\n1,2,5;-1;1;2;3\n"),
+              HasSubstr("not a finite number"));
+}
+
 TEST(CsvReaderTest, IsRecognizedByItsColumns) {
   EXPECT_TRUE(LooksLikeCsvLog("# c\n\n x , time,r0\r\n"));
   EXPECT_TRUE(LooksLikeCsvLog("time,r0"));

@@ -24,7 +24,6 @@ EPOCH = 1.7e9  # s
 STAMP = lambda time: EPOCH + time
 FRAME = lambda name: name
 RECORDED = lambda time: EPOCH + time
-ODOMETRY_RATE = 30.0  # Hz
 
 
 class Cdr:
@@ -69,9 +68,29 @@ class Bag:
         self.messages.append((round(RECORDED(time) * 1e9), index,
                               bytes(message.data)))
 
-    def write(self, folder):
+    def write(self, folder, files):
         os.makedirs(folder, exist_ok=True)
-        path = os.path.join(folder, "bag_0.db3")
+        self.messages.sort(key=lambda message: message[0])
+        names = [f"bag_{i}.db3" for i in range(files)]
+        for i, name in enumerate(names):
+            cut = [len(self.messages) * k // files for k in (i, i + 1)]
+            self.write_file(os.path.join(folder, name),
+                            self.messages[cut[0]:cut[1]])
+        lines = ["rosbag2_bagfile_information:", "  version: 4",
+                 "  storage_identifier: sqlite3", "  relative_file_paths:"]
+        lines += [f"    - {name}" for name in names]
+        lines += [f"  message_count: {len(self.messages)}",
+                  "  topics_with_message_count:"]
+        for name, (index, kind) in self.topics.items():
+            count = sum(message[1] == index for message in self.messages)
+            lines += ["    - topic_metadata:", f"        name: {name}",
+                      f"        type: {kind}",
+                      "        serialization_format: cdr",
+                      f"      message_count: {count}"]
+        with open(os.path.join(folder, "metadata.yaml"), "w") as out:
+            out.write("\n".join(lines) + "\n")
+
+    def write_file(self, path, messages):
         if os.path.exists(path):
             os.remove(path)
         base = sqlite3.connect(path)
@@ -83,23 +102,10 @@ class Bag:
         for name, (index, kind) in self.topics.items():
             base.execute("INSERT INTO topics VALUES(?, ?, ?, 'cdr', '')",
                          (index, name, kind))
-        self.messages.sort(key=lambda message: message[0])
         base.executemany(
             "INSERT INTO messages(timestamp, topic_id, data) VALUES(?, ?, ?)",
-            self.messages)
+            messages)
         base.commit()
-        lines = ["rosbag2_bagfile_information:", "  version: 4",
-                 "  storage_identifier: sqlite3", "  relative_file_paths:",
-                 "    - bag_0.db3", f"  message_count: {len(self.messages)}",
-                 "  topics_with_message_count:"]
-        for name, (index, kind) in self.topics.items():
-            count = sum(message[1] == index for message in self.messages)
-            lines += ["    - topic_metadata:", f"        name: {name}",
-                      f"        type: {kind}",
-                      "        serialization_format: cdr",
-                      f"      message_count: {count}"]
-        with open(os.path.join(folder, "metadata.yaml"), "w") as out:
-            out.write("\n".join(lines) + "\n")
 
 
 def cast(walls, circles, x, y, dx, dy):
@@ -187,10 +193,23 @@ def parse():
                         help="by how much all clocks jump half way, s")
     parser.add_argument("--odometry_until", type=float, default=1.0,
                         help="share of the drive after which odometry is gone")
+    parser.add_argument("--odometry_from", type=float, default=0.0,
+                        help="share of the drive before which there is none")
+    parser.add_argument("--odometry_rate", type=float, default=30.0, help="Hz")
+    parser.add_argument("--nan_odometry", type=float, default=0.0,
+                        help="share of odometry whose quaternion is no number")
     parser.add_argument("--odometry_reset", type=float, default=1.0,
                         help="share after which odometry begins at zero again")
     parser.add_argument("--zero_stamps", action="store_true",
                         help="of all headers")
+    parser.add_argument("--stuck_stamps", type=int, default=1,
+                        help="so many scans in a row have the same stamp")
+    parser.add_argument("--static_late", action="store_true",
+                        help="tf_static is recorded last")
+    parser.add_argument("--point_cloud", action="store_true",
+                        help="scans are of type PointCloud2")
+    parser.add_argument("--files", type=int, default=1,
+                        help="that the bag is split into")
     parser.add_argument("--out_of_order", type=float, default=0.0,
                         help="share of scans recorded after the next one")
     parser.add_argument("--twice", type=float, default=0.0,
@@ -254,7 +273,9 @@ def main():
                  "max": [options.reach], "beyond": [options.reach + 5.0],
                  "mixed": [np.inf, np.nan, 0.0]}[options.no_return]
         ranges = np.where(is_lost, noise.choice(kinds, beams), ranges)
-        message = Cdr().header(time, frame)
+        number = round((time - 0.5) / period)
+        stuck = number % options.stuck_stamps * period
+        message = Cdr().header(time - stuck, frame)
         message.put("f", start, start + step * (beams - 1), step,
                     per_beam if options.time_increment else 0.0, period, 0.15,
                     options.reach)
@@ -262,9 +283,10 @@ def main():
         late = period + 0.01
         if options.out_of_order > noise_of_order.random():
             late += 1.5 * period
-        bag.add(time + late, topic, "sensor_msgs/msg/LaserScan", message)
+        kind = "PointCloud2" if options.point_cloud else "LaserScan"
+        bag.add(time + late, topic, "sensor_msgs/msg/" + kind, message)
         if options.twice > noise_of_order.random():
-            bag.add(time + late + 0.001, topic, "sensor_msgs/msg/LaserScan",
+            bag.add(time + late + 0.001, topic, "sensor_msgs/msg/" + kind,
                     message)
 
     with open(options.folder.rstrip("/") + ".tum", "w") as reference:
@@ -282,7 +304,7 @@ def main():
                          yaw + np.pi)
             time += period * (1.0 + options.uneven * noise.uniform(-1, 1))
 
-    times = np.arange(0.0, end, 1.0 / ODOMETRY_RATE)
+    times = np.arange(0.0, end, 1.0 / options.odometry_rate)
     true = poses_at(times)
     odometry = drift(true, noise)
     after = times > options.odometry_reset * end
@@ -293,12 +315,15 @@ def main():
         odometry[after] = np.stack(
             [cos * moved[:, 0] + sin * moved[:, 1],
              -sin * moved[:, 0] + cos * moved[:, 1], moved[:, 2]], -1)
-    rates = np.gradient(true[:, 2]) * ODOMETRY_RATE
+    rates = np.gradient(true[:, 2]) * options.odometry_rate
     for i, time in enumerate(times):
         x, y, heading = odometry[i]
         turn = (0.0, 0.0, np.sin(heading / 2), np.cos(heading / 2))
+        if noise_of_order.random() < options.nan_odometry:
+            turn = (np.nan,) * 4
         stamp = time + options.clock
-        is_there = time <= options.odometry_until * end
+        is_there = (options.odometry_from * end <= time
+                    <= options.odometry_until * end)
         if is_there and options.odometry in ("both", "odom"):
             message = Cdr().header(stamp, "odom").text(FRAME("base_link"))
             message.put("d", x, y, 0.0, *turn).numbers("d", np.zeros(78))
@@ -325,8 +350,9 @@ def main():
                         np.cos(roll / 2) * np.sin(angle / 2),
                         np.cos(roll / 2) * np.cos(angle / 2))
             transform(message, 0.0, "base_link", frame, offset, 0.0, rotation)
-        bag.add(0.0, "/tf_static", "tf2_msgs/msg/TFMessage", message)
-    bag.write(options.folder)
+        bag.add(end + 1.0 if options.static_late else 0.0, "/tf_static",
+                "tf2_msgs/msg/TFMessage", message)
+    bag.write(options.folder, options.files)
 
 
 if __name__ == "__main__":

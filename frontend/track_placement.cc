@@ -55,6 +55,9 @@ constexpr double kLeastPiece = 0.1;
 constexpr double kSameWall = 0.3;
 constexpr double kSameWallTurn = DegToRad(20.0);
 constexpr double kMovedDoor = 3.0;
+// The share of the best place's support from which on another one may be the
+// place where the best contradicts the map.
+constexpr double kNearlyAsMuch = 0.9;
 // The share of the best place's support from which on a rival is told.
 constexpr double kToldRival = 0.4;
 // Doors of a mirror image that were seen in passing speak one way only: of all
@@ -125,6 +128,10 @@ void SetMap(const std::vector<KeyView>& map, ScanMatcher* matcher) {
   matcher->SetReference(std::move(points), std::move(viewpoints));
 }
 
+std::string Parts(int number) {
+  return std::to_string(number) + (number == 1 ? " part" : " parts");
+}
+
 std::string ShortText(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f", value);
@@ -136,7 +143,7 @@ enum class Verdict { kUnknown, kDoubtful, kAgrees, kContradicts };
 // What one window says of a place of the track.
 struct Judgement {
   Verdict verdict = Verdict::kUnknown;
-  // Of the window's middle, in the map's frame, matched.
+  // Of the window's middle, in the map's frame, matched where it agrees.
   Pose2 pose = Pose2::Zero();
   double quality = 0.0;
   // What the returns say of the middle's position, map's frame.
@@ -341,6 +348,23 @@ std::vector<Stretch> PiecesOf(std::vector<Stretch> stretches) {
 struct Contradictions {
   std::vector<Stretch> of_track;
   std::vector<Stretch> of_map;
+
+  std::size_t number() const { return of_track.size() + of_map.size(); }
+  // Of all pieces, and of the longest, m.
+  double length() const {
+    double sum = 0.0;
+    for (const auto* pieces : {&of_track, &of_map}) {
+      for (const Stretch& piece : *pieces) sum += piece.length;
+    }
+    return sum;
+  }
+  double longest() const {
+    double most = 0.0;
+    for (const auto* pieces : {&of_track, &of_map}) {
+      for (const Stretch& piece : *pieces) most = std::max(most, piece.length);
+    }
+    return most;
+  }
 };
 
 // Doors that stand elsewhere in the same wall. People shut one door and open
@@ -454,6 +478,8 @@ struct Candidate {
   int agreeing = 0;
   int contradicting = 0;
   int doubtful = 0;
+  // Once they were asked for.
+  std::optional<Contradictions> contradictions;
   double support() const {
     return agreeing - kContradictionWeight * contradicting;
   }
@@ -601,16 +627,10 @@ class Search {
   }
 
   // What there is to say by now.
-  TrackPlacement Decide() const {
+  TrackPlacement Decide() {
     TrackPlacement placement;
     placement.windows = static_cast<int>(windows_.size());
-    const Candidate* best = nullptr;
-    for (const Candidate& candidate : judged_) {
-      if (candidate.agreeing == 0) continue;
-      if (best == nullptr || candidate.support() > best->support()) {
-        best = &candidate;
-      }
-    }
+    Candidate* best = FindBest();
     if (best == nullptr) {
       placement.why_not = "no part of it looks like a part of the map";
       return placement;
@@ -619,15 +639,17 @@ class Search {
     placement.agreeing = best->agreeing;
     placement.contradicting = best->contradicting;
     placement.doubtful = best->doubtful;
-    for (const Candidate& rival : judged_) {
-      if (&rival == best ||
-          AreOne(*best, rival, windows_, kRivalDistance, kRivalTurn)) {
+    for (Candidate& rival : judged_) {
+      if (&rival == best || rival.support() <= placement.rival ||
+          AreOne(*best, rival, windows_, kRivalDistance, kRivalTurn) ||
+          (rival.support() > kToldRival * best->support() &&
+           IsRather(best, &rival))) {
         continue;
       }
-      placement.rival = std::max(placement.rival, rival.support());
+      placement.rival = rival.support();
     }
     placement.misfit = Misfit(*best);
-    placement.why_not = WhyNot(*best, &placement);
+    placement.why_not = WhyNot(best, &placement);
     placement.found = placement.why_not.empty();
     if (placement.found) {
       placement.doubt = Doubt(*best, placement);
@@ -637,6 +659,47 @@ class Search {
   }
 
  private:
+  // The place that most speaks for. Of places that it speaks for nearly as
+  // much one where the building is not another is rather its place.
+  Candidate* FindBest() {
+    Candidate* best = nullptr;
+    for (Candidate& candidate : judged_) {
+      if (candidate.agreeing > 0 &&
+          (best == nullptr || candidate.support() > best->support())) {
+        best = &candidate;
+      }
+    }
+    if (best == nullptr) return best;
+    Candidate* other = nullptr;
+    for (Candidate& candidate : judged_) {
+      if (candidate.support() >= kNearlyAsMuch * best->support() &&
+          (other == nullptr || candidate.support() > other->support()) &&
+          &candidate != best && IsRather(&candidate, best)) {
+        other = &candidate;
+      }
+    }
+    return other != nullptr ? other : best;
+  }
+
+  // Whether a place is one by what speaks against it, and another one is none
+  // that clearly more speaks against.
+  bool IsRather(Candidate* place, Candidate* other) {
+    const Contradictions& of_place = ContradictionsOf(place);
+    const Contradictions& of_other = ContradictionsOf(other);
+    return 2 * of_place.number() <= of_other.number() &&
+           WhyAnother(place->agreeing, of_place).empty() &&
+           !WhyAnother(other->agreeing, of_other).empty();
+  }
+
+  // Those of a place, which are found once.
+  const Contradictions& ContradictionsOf(Candidate* candidate) {
+    if (!candidate->contradictions) {
+      candidate->contradictions = FindContradictions(
+          map_, track_, windows_, candidate->judgements, options_);
+    }
+    return *candidate->contradictions;
+  }
+
   // RMS distance of the windows that agree from where the track has them, m.
   double Misfit(const Candidate& candidate) const {
     double sum = 0.0;
@@ -665,31 +728,28 @@ class Search {
   }
 
   // Nothing when it is its place.
-  std::string WhyNot(const Candidate& best, TrackPlacement* placement) const {
+  std::string WhyNot(Candidate* best, TrackPlacement* placement) {
     const int least =
         start_ ? options_.min_agreeing_at_start : options_.min_agreeing;
-    const auto parts = [](int number) {
-      return std::to_string(number) + (number == 1 ? " part" : " parts");
-    };
-    if (best.agreeing < least) {
-      return "only " + parts(best.agreeing) + " of " +
+    if (best->agreeing < least) {
+      return "only " + Parts(best->agreeing) + " of " +
              std::to_string(windows_.size()) + " found a place in the map";
     }
-    if (best.contradicting >
-        options_.max_contradicting * (best.agreeing + best.contradicting)) {
-      return "where " + parts(best.agreeing) + " of it would fit, " +
-             parts(best.contradicting) + " would contradict";
+    if (best->contradicting >
+        options_.max_contradicting * (best->agreeing + best->contradicting)) {
+      return "where " + Parts(best->agreeing) + " of it would fit, " +
+             Parts(best->contradicting) + " would contradict";
     }
-    if (placement->rival > options_.rival_share * best.support()) {
+    if (placement->rival > options_.rival_share * best->support()) {
       return "it would fit in more than one place";
     }
     if (placement->misfit >
-        options_.max_misfit + options_.max_misfit_per_metre * Spread(best)) {
+        options_.max_misfit + options_.max_misfit_per_metre * Spread(*best)) {
       return "its parts fit, but not together: they lie " +
              ShortText(placement->misfit) + " m (RMS) from where it has them";
     }
     Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-    for (const Judgement& judgement : best.judgements) {
+    for (const Judgement& judgement : best->judgements) {
       information += judgement.information;
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(information);
@@ -697,49 +757,47 @@ class Search {
         options_.min_information_share * solver.eigenvalues()[1]) {
       return "it could be moved along the walls that it shares with the map";
     }
-    const Contradictions contradictions =
-        FindContradictions(map_, track_, windows_, best.judgements, options_);
+    const Contradictions& contradictions = ContradictionsOf(best);
     placement->walls_through_map =
         static_cast<int>(contradictions.of_track.size());
     placement->walls_through_track =
         static_cast<int>(contradictions.of_map.size());
-    double longest = 0.0;
-    for (const auto* pieces :
-         {&contradictions.of_track, &contradictions.of_map}) {
-      for (const Stretch& piece : *pieces) {
-        longest = std::max(longest, piece.length);
-        placement->contradicting_length += piece.length;
-      }
-    }
+    placement->contradicting_length = contradictions.length();
+    return WhyAnother(best->agreeing, contradictions);
+  }
+
+  // Why the contradictions of a place say that it is another building, though
+  // so many windows agree; empty when they do not.
+  std::string WhyAnother(int agreeing,
+                         const Contradictions& contradictions) const {
+    const std::string would = "where " + Parts(agreeing) + " of it would fit, ";
+    const double longest = contradictions.longest();
     if (longest > options_.max_contradicting_stretch) {
-      return "where " + parts(best.agreeing) +
-             " of it would fit, one of both has " + ShortText(longest) +
+      return would + "one of both has " + ShortText(longest) +
              " m of wall where the other has none";
     }
     const int moved = MovedDoors(contradictions);
-    if (moved >= options_.min_moved_doors) {
-      return "where " + parts(best.agreeing) + " of it would fit, " +
-             std::to_string(moved) +
-             " doors stand elsewhere in the same wall, as in another building "
-             "or in its mirror image";
+    if (moved >= (start_ ? options_.min_moved_doors_at_start
+                         : options_.min_moved_doors)) {
+      return would + std::to_string(moved) +
+             (moved == 1 ? " door stands" : " doors stand") +
+             " elsewhere in the same wall, as in another building or in its "
+             "mirror image (--start_pose says that it is this building)";
     }
-    const int exchanged =
-        placement->walls_through_map + placement->walls_through_track;
-    const int each_way =
-        std::min(placement->walls_through_map, placement->walls_through_track);
+    const auto of_track = static_cast<int>(contradictions.of_track.size());
+    const auto of_map = static_cast<int>(contradictions.of_map.size());
+    const int exchanged = of_track + of_map;
+    const int each_way = std::min(of_track, of_map);
     if (each_way >= 1 && exchanged >= options_.min_exchanged &&
-        exchanged >= best.agreeing) {
-      return "where " + parts(best.agreeing) + " of it would fit, " +
-             std::to_string(exchanged) +
+        exchanged >= agreeing) {
+      return would + std::to_string(exchanged) +
              " places have a wall in one and an opening in the other";
     }
     if (each_way >= kLeastEachWay && exchanged >= 2 * options_.min_exchanged &&
-        exchanged > 2.0 * options_.max_exchanged_share * best.agreeing) {
-      return "where " + parts(best.agreeing) +
-             " of it would fit, it has wall at " +
-             std::to_string(placement->walls_through_map) +
+        exchanged > 2.0 * options_.max_exchanged_share * agreeing) {
+      return would + "it has wall at " + std::to_string(of_track) +
              " places where the map has openings, and openings at " +
-             std::to_string(placement->walls_through_track) +
+             std::to_string(of_map) +
              " places where the map has wall, as a mirror image of the "
              "building has";
     }
@@ -763,11 +821,12 @@ class Search {
     if (placement.rival > kToldRival * best.support()) {
       add("much of it would fit in another place, too");
     }
-    if (placement.walls_through_map > 0 && placement.walls_through_track > 0) {
+    // A single one is a door that somebody opened or shut.
+    if (placement.walls_through_map + placement.walls_through_track > 1) {
       add("it has wall at " + std::to_string(placement.walls_through_map) +
           " and openings at " + std::to_string(placement.walls_through_track) +
           " places where the map has it the other way: doors that were opened "
-          "and shut, or another building");
+          "or shut, or another building");
     }
     return doubt;
   }

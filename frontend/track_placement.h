@@ -93,11 +93,13 @@ struct TrackPlacementOptions {
   double max_exchanged_share = 0.15;
   /// Doors that stand elsewhere in the same wall (an opening and a wall in its
   /// place, up to 3 m from each other, either way): so many are another
-  /// building.
-  int min_moved_doors = 2;
-  /// With a start that somebody gave: windows that have to agree, and how far
-  /// from it the track may start, m and rad.
+  /// building. People shut one door and open the next, too, but a log that is
+  /// kept apart without need does less harm than two buildings in one map.
+  int min_moved_doors = 1;
+  /// With a start that somebody gave: windows that have to agree, doors that
+  /// stand elsewhere, and how far from it the track may start, m and rad.
   int min_agreeing_at_start = 1;
+  int min_moved_doors_at_start = 2;
   double start_distance = 3.0;
   double start_turn = DegToRad(45.0);
 

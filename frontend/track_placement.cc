@@ -821,8 +821,8 @@ class Search {
     if (placement.rival > kToldRival * best.support()) {
       add("much of it would fit in another place, too");
     }
-    // A single one is a door that somebody opened or shut.
-    if (placement.walls_through_map + placement.walls_through_track > 1) {
+    // A single one may be all that is seen of another building.
+    if (placement.walls_through_map > 0 || placement.walls_through_track > 0) {
       add("it has wall at " + std::to_string(placement.walls_through_map) +
           " and openings at " + std::to_string(placement.walls_through_track) +
           " places where the map has it the other way: doors that were opened "

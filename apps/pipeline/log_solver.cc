@@ -7,6 +7,7 @@
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/detectors/visibility.h>
 #include <plumbline/frontend/looks.h>
+#include <plumbline/frontend/open_ways.h>
 #include <plumbline/frontend/place_chain.h>
 #include <plumbline/frontend/wall_views.h>
 #include <plumbline/pipeline/bent_map.h>
@@ -14,6 +15,7 @@
 #include <plumbline/pipeline/log_solver_state.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <limits>
 #include <optional>
 #include <string>
@@ -70,6 +72,26 @@ void AddLoose(int begin, int end, std::string why, LogSolverResult* result) {
   loose.found = true;
   loose.why = std::move(why);
   result->loose.push_back(std::move(loose));
+}
+
+// The returns and the matches of the check of the map.
+OpenWayOptions OptionsOfOpenWays(const MapCheckOptions& check) {
+  OpenWayOptions options;
+  options.points = check.points;
+  options.matcher = check.matcher;
+  options.num_threads = check.num_threads;
+  return options;
+}
+
+void AddOpenWays(const std::vector<OpenWay>& ways, LogSolverResult* result) {
+  for (const OpenWay& way : ways) {
+    char why[128];
+    std::snprintf(why, sizeof why,
+                  "nothing in sight shows how far the robot went: the %.0f m "
+                  "of this way are known to %.1f m",
+                  way.length, way.sigma);
+    AddLoose(way.begin, way.end, why, result);
+  }
 }
 
 // Before the detector that refutes closures.
@@ -1046,6 +1068,9 @@ void LogSolver::CheckMap(Context* context) const {
              "wall: that was moved, or the map is wrong",
              &result);
   }
+  AddOpenWays(FindOpenWays(context->scans, keys, poses,
+                           OptionsOfOpenWays(options_.check), stop),
+              &result);
   std::stable_sort(result.loose.begin(), result.loose.end(),
                    [](const LooseTrack& a, const LooseTrack& b) {
                      return a.begin < b.begin;

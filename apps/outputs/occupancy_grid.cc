@@ -2,6 +2,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/number_text.h>
 #include <plumbline/outputs/occupancy_grid.h>
+#include <plumbline/outputs/reachable_space.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,18 @@ namespace plumbline {
 namespace {
 
 using Eigen::Vector2d;
+
+// Free space that cannot be reached is a pocket up to this far from what can,
+// m.
+constexpr double kPocket = 1.0;
+// What was hit is kept this far behind free space that can be reached, m: walls
+// are as thick as poses are uncertain.
+constexpr double kBehindFree = 0.3;
+// Gaps between free cells that hinder nobody, m; and those between rays that
+// are so many cells apart across, along rows and columns.
+constexpr double kLeastGap = 0.2;
+constexpr double kSlanted = 1.5;
+constexpr double kMostSpacing = 1e6;
 
 std::string Number(double value) {
   std::string text;
@@ -87,6 +100,13 @@ OccupancyGrid::Tile* OccupancyGrid::TileAt(int column, int row) {
   return tile.get();
 }
 
+OccupancyGrid::Cell* OccupancyGrid::CellAt(int column, int row) {
+  return &TileAt(column, row)
+              ->cells[static_cast<std::size_t>(
+                  ((row & (kTileSize - 1)) << kTileBits) +
+                  (column & (kTileSize - 1)))];
+}
+
 // Once a scan; the share is kept when a counter is full.
 inline void OccupancyGrid::Count(std::uint16_t Cell::*counter, Cell* cell) {
   if (cell->scan == scan_) return;
@@ -119,10 +139,14 @@ void OccupancyGrid::Clear(int column0, int row0, int column1, int row1,
       const bool is_inside = tile_x >= 0 && tile_y >= 0 &&
                              tile_x < tile_columns_ && tile_y < tile_rows_;
       tile = is_inside ? TileAt(x, y) : nullptr;
+      if (tile != nullptr) {
+        tile->spacing = std::min(
+            tile->spacing, angle_step_ * std::hypot(x - column0, y - row0));
+      }
     }
     if (tile != nullptr) {
-      Count(&Cell::misses, &(*tile)[((y & (kTileSize - 1)) << kTileBits) +
-                                    (x & (kTileSize - 1))]);
+      Count(&Cell::misses, &tile->cells[((y & (kTileSize - 1)) << kTileBits) +
+                                        (x & (kTileSize - 1))]);
     }
     if (is_last) return;
     const int doubled = 2 * error;
@@ -151,6 +175,11 @@ void OccupancyGrid::AddScan(const Scan& scan, const Pose2& pose) {
   if (!(start.cwiseAbs().maxCoeff() < kFarthestCell)) return;
   const int column = static_cast<int>(std::floor(start[0]));
   const int row = static_cast<int>(std::floor(start[1]));
+  angle_step_ = std::abs(scan.angle_step);
+  if (column >= 0 && row >= 0 && column < width_ && row < height_ &&
+      (starts_.empty() || starts_.back() != std::make_pair(column, row))) {
+    starts_.emplace_back(column, row);
+  }
   rays_.clear();
   const std::vector<Vector2d>& beams = beams_.Of(scan);
   for (std::size_t i = 0; i < beams.size(); ++i) {
@@ -170,9 +199,7 @@ void OccupancyGrid::AddScan(const Scan& scan, const Pose2& pose) {
         ray.row >= height_) {
       continue;
     }
-    Tile* const tile = TileAt(ray.column, ray.row);
-    Count(&Cell::hits, &(*tile)[((ray.row & (kTileSize - 1)) << kTileBits) +
-                                (ray.column & (kTileSize - 1))]);
+    Count(&Cell::hits, CellAt(ray.column, ray.row));
   }
   for (const Ray& ray : rays_) {
     Clear(column, row, ray.column, ray.row, !ray.is_hit);
@@ -194,8 +221,8 @@ std::uint8_t OccupancyGrid::Pixel(int column, int row) const {
       tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
              (column >> kTileBits)];
   if (tile == nullptr) return kUnknown;
-  return Shade((*tile)[((row & (kTileSize - 1)) << kTileBits) +
-                       (column & (kTileSize - 1))]);
+  return Shade(tile->cells[((row & (kTileSize - 1)) << kTileBits) +
+                           (column & (kTileSize - 1))]);
 }
 
 void OccupancyGrid::Row(int row, std::string* pixels) const {
@@ -206,11 +233,52 @@ void OccupancyGrid::Row(int row, std::string* pixels) const {
                (begin >> kTileBits)];
     if (tile == nullptr) continue;
     const Cell* const cells =
-        tile->data() + ((row & (kTileSize - 1)) << kTileBits);
+        tile->cells.data() + ((row & (kTileSize - 1)) << kTileBits);
     const int end = std::min(width_ - begin, kTileSize);
     for (int i = 0; i < end; ++i) {
       (*pixels)[static_cast<std::size_t>(begin + i)] =
           static_cast<char>(Shade(cells[i]));
+    }
+  }
+}
+
+void OccupancyGrid::ForgetUnreachable() {
+  if (!(options_.least_passage > 0.0)) return;
+  SeenCells seen;
+  seen.width = width_;
+  seen.height = height_;
+  seen.cells.reserve(static_cast<std::size_t>(width_) * height_);
+  std::string line;
+  for (int row = 0; row < height_; ++row) {
+    Row(row, &line);
+    for (const char pixel : line) {
+      const auto value = static_cast<std::uint8_t>(pixel);
+      seen.cells.push_back(value == kFree       ? SeenCells::kFree
+                           : value == kOccupied ? SeenCells::kOccupied
+                                                : SeenCells::kUnknown);
+    }
+  }
+  const auto cells = [this](double metres) {
+    return static_cast<int>(metres / options_.resolution + 1e-9);
+  };
+  ReachOptions options;
+  // A disc of whole cells around its middle one.
+  options.body = std::max(0, (cells(options_.least_passage) - 1) / 2);
+  options.pocket = cells(kPocket);
+  options.behind = std::max(2, cells(kBehindFree));
+  const int least_gap = cells(kLeastGap);
+  options.gap = [&](int column, int row) {
+    const double spacing = TileAt(column, row)->spacing;
+    return spacing < kMostSpacing
+               ? std::max(least_gap, static_cast<int>(kSlanted * spacing))
+               : least_gap;
+  };
+  const std::vector<std::uint8_t> before = seen.cells;
+  KeepReachable(starts_, options, &seen);
+  for (int row = 0; row < height_; ++row) {
+    for (int column = 0; column < width_; ++column) {
+      const std::size_t i = static_cast<std::size_t>(row) * width_ + column;
+      if (seen.cells[i] != before[i]) *CellAt(column, row) = Cell();
     }
   }
 }
@@ -254,6 +322,7 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
   for (std::size_t i = 0; i < poses.size(); i += step) {
     grid.AddScan(scans[i], poses[i]);
   }
+  grid.ForgetUnreachable();
   return grid;
 }
 

@@ -9,9 +9,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -30,6 +32,10 @@ struct OccupancyOptions {
   /// for a miss.
   int min_hits = 2;
   double occupied_share = 0.25;
+  /// Free is what a way as wide as this leads to from where the robot was, m,
+  /// and what lies close to it (ForgetUnreachable); 0: all that was seen
+  /// through.
+  double least_passage = 0.35;
   /// Rim of unknown cells around what was seen.
   int border = 10;
   /// Most scans that rays are cast for, in even steps through the log; 0: all.
@@ -60,6 +66,13 @@ class OccupancyGrid {
   /// on glass and on black things. What lies outside of the grid is left out.
   void AddScan(const Scan& scan, const Pose2& pose);
 
+  /// Makes unknown what was seen of places that the robot cannot reach from
+  /// where the scans were taken, as wide as OccupancyOptions::least_passage
+  /// (KeepReachable): glimpses through windows, rays past walls. What lies
+  /// within 1 m of what it can reach stays, as among furniture. Where rays are
+  /// farther apart than a cell the space between them is no hindrance.
+  void ForgetUnreachable();
+
   /// kOccupied, kFree or kUnknown; column from the left (x), row from the
   /// bottom (y).
   std::uint8_t Pixel(int column, int row) const;
@@ -82,9 +95,14 @@ class OccupancyGrid {
     /// The scan that counted it last.
     std::uint16_t scan = 0;
   };
-  using Tile = std::array<Cell, kTileSize * kTileSize>;
+  struct Tile {
+    std::array<Cell, kTileSize * kTileSize> cells;
+    // Least distance between neighboring rays of a scan in it, cells.
+    double spacing = std::numeric_limits<double>::infinity();
+  };
 
   Tile* TileAt(int column, int row);
+  Cell* CellAt(int column, int row);
   std::uint8_t Shade(const Cell& cell) const;
   void Count(std::uint16_t Cell::*counter, Cell* cell);
   void Clear(int column0, int row0, int column1, int row1, bool with_last);
@@ -100,6 +118,10 @@ class OccupancyGrid {
   /// exactly this many scans ago is passed over once.
   std::uint16_t scan_ = 0;
   BeamDirections beams_;
+  /// Between beams of the present scan, rad.
+  double angle_step_ = 0.0;
+  /// Cells that scans were taken in: column, row.
+  std::vector<std::pair<int, int>> starts_;
   /// Ends of the present scan's rays.
   struct Ray {
     int column, row;
@@ -109,7 +131,8 @@ class OccupancyGrid {
 };
 
 /// The grid of all scans, or of OccupancyOptions::max_scans, one pose (map
-/// frame) per scan; poses that are not finite are passed over. Throws as the
+/// frame) per scan; poses that are not finite are passed over. What cannot be
+/// reached is forgotten (ForgetUnreachable). Throws as the
 /// constructor does, also when there is nothing to be seen.
 OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
                                 const std::vector<Pose2>& poses,

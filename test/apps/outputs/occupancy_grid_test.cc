@@ -291,6 +291,40 @@ TEST(OccupancyGridTest, SoManyScansInEvenSteps) {
             "..#\n..#\n..#\n..#\n..#\n");
 }
 
+TEST(OccupancyGridTest, WhatIsSeenThroughAPaneIsNotFree) {
+  // Three degrees of what is seen of the room are a pane in its right wall.
+  std::vector<Scan> scans;
+  std::vector<Pose2> poses;
+  for (int i = 0; i < 3; ++i) {
+    scans.push_back(RoomScan(3.0, 2.0));
+    for (int beam = 357; beam <= 363; ++beam) {
+      scans.back().ranges[static_cast<std::size_t>(beam)] = 9.0f;
+    }
+    poses.emplace_back(3.0, 2.0, 0.0);
+  }
+  OccupancyOptions options;
+  const auto free_beyond = [&] {
+    const OccupancyGrid grid = MakeOccupancyGrid(scans, poses, options);
+    int free = 0;
+    int occupied = 0;
+    int inside = 0;
+    for (int row = 0; row < grid.height(); ++row) {
+      for (int column = 0; column < grid.width(); ++column) {
+        const double x = grid.origin()[0] + (column + 0.5) * options.resolution;
+        const std::uint8_t pixel = grid.Pixel(column, row);
+        free += x > 6.5 && pixel == OccupancyGrid::kFree;
+        occupied += x > 6.5 && pixel == OccupancyGrid::kOccupied;
+        inside += x < 6.0 && pixel == OccupancyGrid::kFree;
+      }
+    }
+    EXPECT_GT(inside, 9000);
+    return free + occupied;
+  };
+  EXPECT_EQ(free_beyond(), 0);
+  options.least_passage = 0.0;
+  EXPECT_GT(free_beyond(), 100);
+}
+
 TEST(OccupancyGridTest, TooManyCellsAreRefusedWithWhatWouldDo) {
   OccupancyOptions options;
   options.max_cells = 1000000;

@@ -140,8 +140,10 @@ void OccupancyGrid::Clear(int column0, int row0, int column1, int row1,
                              tile_x < tile_columns_ && tile_y < tile_rows_;
       tile = is_inside ? TileAt(x, y) : nullptr;
       if (tile != nullptr) {
+        // Where they leave it, at the latest.
         tile->spacing = std::min(
-            tile->spacing, angle_step_ * std::hypot(x - column0, y - row0));
+            tile->spacing, angle_step_ * (std::hypot(x - column0, y - row0) +
+                                          1.5 * kTileSize));
       }
     }
     if (tile != nullptr) {

@@ -97,7 +97,8 @@ class OccupancyGrid {
   };
   struct Tile {
     std::array<Cell, kTileSize * kTileSize> cells;
-    // Least distance between neighboring rays of a scan in it, cells.
+    // Distance between neighboring rays where they leave it, at most, of the
+    // scan that saw it from nearest, cells.
     double spacing = std::numeric_limits<double>::infinity();
   };
 

@@ -325,6 +325,25 @@ TEST(OccupancyGridTest, WhatIsSeenThroughAPaneIsNotFree) {
   EXPECT_GT(free_beyond(), 100);
 }
 
+TEST(OccupancyGridTest, FewBeamsOfARobotThatStandsAreNoGlimpses) {
+  for (const double step : {1.0, 2.0, 4.0}) {
+    // A hall of 40 m x 12 m.
+    std::vector<float> ranges;
+    for (double angle = -180.0; angle < 180.0; angle += step) {
+      const double c = std::abs(std::cos(DegToRad(angle)));
+      const double s = std::abs(std::sin(DegToRad(angle)));
+      ranges.push_back(static_cast<float>(
+          std::min(20.0 / std::max(1e-9, c), 6.0 / std::max(1e-9, s))));
+    }
+    const std::vector<Scan> scans(2, MakeScan(-180.0, step, ranges));
+    const std::vector<Pose2> poses(2, Pose2(0.0, 0.0, 0.0));
+    OccupancyOptions options;
+    const std::string kept = Picture(MakeOccupancyGrid(scans, poses, options));
+    options.least_passage = 0.0;
+    EXPECT_EQ(kept, Picture(MakeOccupancyGrid(scans, poses, options))) << step;
+  }
+}
+
 TEST(OccupancyGridTest, TooManyCellsAreRefusedWithWhatWouldDo) {
   OccupancyOptions options;
   options.max_cells = 1000000;

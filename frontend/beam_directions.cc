@@ -9,7 +9,8 @@ const std::vector<Eigen::Vector2d>& BeamDirections::Of(const Scan& scan) {
   if (!scan.bearings.empty()) {
     directions_.resize(scan.ranges.size());
     for (std::size_t i = 0; i < directions_.size(); ++i) {
-      directions_[i] = {std::cos(scan.bearings[i]), std::sin(scan.bearings[i])};
+      const double bearing = scan.Bearing(i);
+      directions_[i] = {std::cos(bearing), std::sin(bearing)};
     }
     // No other scan has these.
     angle_step_ = 0.0;

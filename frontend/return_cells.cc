@@ -5,13 +5,6 @@
 
 namespace plumbline {
 
-std::int64_t CellKey(std::int64_t column, std::int64_t row) {
-  // Unsigned, since a negative column cannot be shifted.
-  return static_cast<std::int64_t>(
-      static_cast<std::uint64_t>(column) << 32 |
-      (static_cast<std::uint64_t>(row) & 0xffffffffu));
-}
-
 void LineFit::Solve(Eigen::Vector2d* mean, Eigen::Vector2d* direction,
                     double* across, double* along) const {
   *mean = sum / n;
@@ -27,7 +20,8 @@ void LineFit::Solve(Eigen::Vector2d* mean, Eigen::Vector2d* direction,
 
 void ReturnCells::Clear() {
   cells_.clear();
-  cell_of_.clear();
+  cell_of_.Clear();
+  looks_.clear();
 }
 
 void ReturnCells::Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
@@ -36,38 +30,50 @@ void ReturnCells::Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
       static_cast<std::int64_t>(std::floor(point.x() / cell_size_));
   const auto row =
       static_cast<std::int64_t>(std::floor(point.y() / cell_size_));
-  const auto inserted = cell_of_.try_emplace(CellKey(column, row),
-                                             static_cast<int>(cells_.size()));
-  if (inserted.second) cells_.emplace_back();
-  Cell& cell = cells_[inserted.first->second];
+  const int next = static_cast<int>(cells_.size());
+  const int index = cell_of_.FindOrAdd(CellKey(column, row), next);
+  if (index == next) cells_.emplace_back();
+  Cell& cell = cells_[index];
   cell.sum += point;
   cell.view -= ray;
   ++cell.returns;
-  if (cell.scans.empty() || cell.scans.back() != scan) {
-    cell.scans.push_back(scan);
+  if (cell.last_scan != scan) {
+    cell.last_scan = scan;
+    looks_.emplace_back(index, scan);
   }
 }
 
 void ReturnCells::Finish(double least_share) {
+  SortLooks();
   FillBuckets();
   if (least_share > 0.0) DropStrays(least_share);
   FitDirections();
 }
 
+void ReturnCells::SortLooks() {
+  scans_begin_.assign(cells_.size() + 1, 0);
+  for (const auto& look : looks_) ++scans_begin_[look.first + 1];
+  for (std::size_t k = 0; k < cells_.size(); ++k) {
+    scans_begin_[k + 1] += scans_begin_[k];
+  }
+  scans_.resize(looks_.size());
+  std::vector<std::size_t> next(scans_begin_.begin(), scans_begin_.end() - 1);
+  for (const auto& [cell, scan] : looks_) scans_[next[cell]++] = scan;
+}
+
 void ReturnCells::FillBuckets() {
-  bucket_of_.clear();
+  bucket_of_.Clear();
   buckets_.clear();
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     Cell& cell = cells_[i];
     cell.mean = cell.sum / cell.returns;
-    const auto inserted = bucket_of_.try_emplace(
-        BucketKey(cell.mean, 0, 0), static_cast<int>(buckets_.size()));
-    if (inserted.second) {
+    const int next = static_cast<int>(buckets_.size());
+    cell.bucket = bucket_of_.FindOrAdd(BucketKey(cell.mean, 0, 0), next);
+    if (cell.bucket == next) {
       buckets_.emplace_back();
       buckets_.back().middle =
           bucket_size_ * ((cell.mean / bucket_size_).array().floor() + 0.5);
     }
-    cell.bucket = inserted.first->second;
     buckets_[cell.bucket].entries.push_back({cell.mean, static_cast<int>(i)});
   }
   num_slots_ = 0;
@@ -92,8 +98,7 @@ std::array<int, 9> ReturnCells::BucketsAround(
   int k = 0;
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
-      const auto found = bucket_of_.find(BucketKey(point, dx, dy));
-      around[k++] = found == bucket_of_.end() ? -1 : found->second;
+      around[k++] = bucket_of_.Find(BucketKey(point, dx, dy));
     }
   }
   return around;

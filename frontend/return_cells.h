@@ -1,19 +1,19 @@
 #ifndef PLUMBLINE_FRONTEND_RETURN_CELLS_H_
 #define PLUMBLINE_FRONTEND_RETURN_CELLS_H_
 
+#include <plumbline/frontend/cell_index.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <unordered_map>
+#include <limits>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
-
-/// Key of a cell of a grid for hash tables.
-std::int64_t CellKey(std::int64_t column, std::int64_t row);
 
 /// Total least squares line through points with weights, m.
 struct LineFit {
@@ -53,8 +53,8 @@ class ReturnCells {
     /// Towards the lasers that saw it.
     Eigen::Vector2d view = Eigen::Vector2d::Zero();
     int returns = 0;
-    /// Scans that saw it, ascending.
-    std::vector<std::size_t> scans;
+    /// The last scan that saw it; none before the first.
+    std::size_t last_scan = std::numeric_limits<std::size_t>::max();
     /// Direction of the surface; zero where it is not straight.
     Eigen::Vector2d direction = Eigen::Vector2d::Zero();
     /// Larger for straighter surroundings; 0 where they are not straight.
@@ -107,6 +107,12 @@ class ReturnCells {
 
   /// The cells in the order in which they were first seen.
   const std::vector<Cell>& cells() const { return cells_; }
+  /// The scans that saw a cell, ascending: [first, second). To be asked for
+  /// after Finish.
+  std::pair<const std::size_t*, const std::size_t*> ScansOf(int index) const {
+    return {scans_.data() + scans_begin_[index],
+            scans_.data() + scans_begin_[index + 1]};
+  }
   /// Side of the buckets in which searches look, m.
   double bucket_size() const { return bucket_size_; }
 
@@ -245,6 +251,7 @@ class ReturnCells {
   std::int64_t BucketKey(const Eigen::Vector2d& point, int dx, int dy) const;
   // The bucket of a point and those beside it; -1 for one without cells.
   std::array<int, 9> BucketsAround(const Eigen::Vector2d& point) const;
+  void SortLooks();
   void FillBuckets();
   void DropStrays(double least_share);
   void FitDirections();
@@ -267,9 +274,14 @@ class ReturnCells {
   const double normal_radius_;
   const double bucket_size_;
   std::vector<Cell> cells_;
-  std::unordered_map<std::int64_t, int> cell_of_;
+  CellIndex cell_of_;
+  // Each scan with each cell that it saw, as they came in, and once sorted by
+  // cells: those of cell k begin at scans_begin_[k].
+  std::vector<std::pair<int, std::size_t>> looks_;
+  std::vector<std::size_t> scans_;
+  std::vector<std::size_t> scans_begin_;
   std::vector<Bucket> buckets_;
-  std::unordered_map<std::int64_t, int> bucket_of_;
+  CellIndex bucket_of_;
   // Buckets that hold cells which have been used.
   std::vector<int> used_up_;
   std::size_t num_slots_ = 0;

@@ -1,3 +1,4 @@
+#include <plumbline/frontend/beam_directions.h>
 #include <plumbline/frontend/scan_points.h>
 
 #include <Eigen/Geometry>
@@ -82,15 +83,17 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
   points->clear();
   const int beams = static_cast<int>(scan.ranges.size());
   const PoseTransform from_laser(scan.laser_offset);
+  // Scans of one laser mostly come in a row.
+  thread_local BeamDirections beam_directions;
+  const std::vector<Eigen::Vector2d>& directions = beam_directions.Of(scan);
   for (int i = 0; i < beams; ++i) {
     const double range = scan.ranges[i];
     if (!(range >= options.minimum_range) || range > options.usable_range) {
       continue;
     }
-    const double angle = scan.Bearing(static_cast<std::size_t>(i));
     ScanPoint point;
-    point.position = from_laser.Point(
-        Eigen::Vector2d(range * std::cos(angle), range * std::sin(angle)));
+    point.position =
+        from_laser.Point(range * directions[static_cast<std::size_t>(i)]);
     point.normal.setZero();
     point.range = range;
     point.beam = i;
@@ -140,7 +143,6 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
       sxy += d.x() * d.y();
       syy += d.y() * d.y();
     }
-    const double direction = 0.5 * std::atan2(2.0 * sxy, sxx - syy);
     const double half_trace = 0.5 * (sxx + syy);
     const double radical = std::hypot(0.5 * (sxx - syy), sxy);
     const double across = std::max(0.0, half_trace - radical) / count;
@@ -149,6 +151,7 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
         across > 0.1 * along) {
       continue;
     }
+    const double direction = 0.5 * std::atan2(2.0 * sxy, sxx - syy);
     Eigen::Vector2d normal(-std::sin(direction), std::cos(direction));
     if (normal.dot(laser - point.position) < 0.0) normal = -normal;
     point.normal = normal;

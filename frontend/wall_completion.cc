@@ -1,5 +1,6 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/wall.h>
+#include <plumbline/frontend/cell_index.h>
 #include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/return_cells.h>
 #include <plumbline/frontend/wall_completion.h>
@@ -11,7 +12,6 @@
 #include <cstdint>
 #include <initializer_list>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 
 namespace plumbline {
@@ -65,7 +65,11 @@ class WallIndex {
           static_cast<std::int64_t>(std::floor(wall.At(t).y() / kIndexCell));
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
-          std::vector<int>& cell = cells_[CellKey(column + dx, row + dy)];
+          const int next = static_cast<int>(cells_.size());
+          const int number =
+              cell_of_.FindOrAdd(CellKey(column + dx, row + dy), next);
+          if (number == next) cells_.emplace_back();
+          std::vector<int>& cell = cells_[number];
           if (cell.empty() || cell.back() != i) cell.push_back(i);
         }
       }
@@ -85,8 +89,8 @@ class WallIndex {
         CellKey(static_cast<std::int64_t>(std::floor(point.x() / kIndexCell)),
                 static_cast<std::int64_t>(std::floor(point.y() / kIndexCell)));
     if (!last->is_known || key != last->key) {
-      const auto found = cells_.find(key);
-      *last = {true, key, found == cells_.end() ? nullptr : &found->second};
+      const int found = cell_of_.Find(key);
+      *last = {true, key, found < 0 ? nullptr : &cells_[found]};
     }
     if (last->walls == nullptr) return false;
     for (const int index : *last->walls) {
@@ -106,7 +110,8 @@ class WallIndex {
   const double reach_;
   std::size_t num_known_ = 0;
   std::vector<IndexedWall> walls_;
-  std::unordered_map<std::int64_t, std::vector<int>> cells_;
+  CellIndex cell_of_;
+  std::vector<std::vector<int>> cells_;
 };
 
 double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -552,8 +557,8 @@ class Completion {
   int CountScans(const std::vector<int>& cells) const {
     std::vector<std::size_t> scans;
     for (const int index : cells) {
-      const std::vector<std::size_t>& own = returns_.cells()[index].scans;
-      scans.insert(scans.end(), own.begin(), own.end());
+      const auto [first, last] = returns_.ScansOf(index);
+      scans.insert(scans.end(), first, last);
     }
     std::sort(scans.begin(), scans.end());
     return static_cast<int>(std::unique(scans.begin(), scans.end()) -

@@ -2,6 +2,7 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/wall.h>
+#include <plumbline/frontend/cell_index.h>
 #include <plumbline/frontend/wall_votes.h>
 
 #include <algorithm>
@@ -49,29 +50,32 @@ class WallGrid {
               (wall.begin + (wall.end - wall.begin) * i / std::max(1, along)) *
                   wall.direction +
               (2.0 * j / across - 1.0) * options.max_offset * wall.normal();
-          std::vector<int>& cell = cells_[Key(point)];
+          const int next = static_cast<int>(cells_.size());
+          const int number = cell_of_.FindOrAdd(Key(point), next);
+          if (number == next) cells_.emplace_back();
+          std::vector<int>& cell = cells_[number];
           if (cell.empty() || cell.back() != index) cell.push_back(index);
         }
       }
     }
   }
 
-  using Cell = std::pair<std::int64_t, std::int64_t>;
-
-  static Cell Key(const Eigen::Vector2d& point) {
-    return {static_cast<std::int64_t>(std::floor(point.x() / kCell)),
-            static_cast<std::int64_t>(std::floor(point.y() / kCell))};
+  // Of the cell that a point lies in.
+  static std::int64_t Key(const Eigen::Vector2d& point) {
+    return CellKey(static_cast<std::int64_t>(std::floor(point.x() / kCell)),
+                   static_cast<std::int64_t>(std::floor(point.y() / kCell)));
   }
   // Null where no wall is.
-  const std::vector<int>* In(const Cell& cell) const {
-    const auto found = cells_.find(cell);
-    return found == cells_.end() ? nullptr : &found->second;
+  const std::vector<int>* In(std::int64_t cell) const {
+    const int found = cell_of_.Find(cell);
+    return found < 0 ? nullptr : &cells_[found];
   }
   const GridWall& wall(int index) const { return walls_[index]; }
 
  private:
   std::vector<GridWall> walls_;
-  std::map<Cell, std::vector<int>> cells_;
+  CellIndex cell_of_;
+  std::vector<std::vector<int>> cells_;
 };
 
 }  // namespace
@@ -97,12 +101,12 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
     std::map<FeatureId, WallVote> of_wall;
     WallVote* last = nullptr;
     // Neighbouring returns mostly fall into one cell.
-    WallGrid::Cell cell = WallGrid::Key(poses[k].head<2>());
+    std::int64_t cell = WallGrid::Key(poses[k].head<2>());
     const std::vector<int>* near = grid.In(cell);
     for (const ScanPoint& point : places[k].returns) {
       if (point.normal.squaredNorm() == 0.0) continue;
       const Eigen::Vector2d position = transform.Point(point.position);
-      const WallGrid::Cell own = WallGrid::Key(position);
+      const std::int64_t own = WallGrid::Key(position);
       if (own != cell) {
         cell = own;
         near = grid.In(cell);

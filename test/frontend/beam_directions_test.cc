@@ -2,6 +2,9 @@
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/beam_directions.h>
 
+#include <cmath>
+#include <vector>
+
 namespace plumbline {
 namespace {
 
@@ -30,6 +33,23 @@ TEST(BeamDirectionsTest, FollowTheLaser) {
   expect({{1.0, 0.0}, {0.0, -1.0}, {-1.0, 0.0}});
   scan.ranges.pop_back();
   expect({{1.0, 0.0}, {0.0, -1.0}});
+}
+
+// Bearings are stored in single precision; their sines and cosines are not.
+TEST(BeamDirectionsTest, BearingsAreTakenInDoublePrecision) {
+  BeamDirections beams;
+  Scan scan;
+  for (int i = 0; i < 50; ++i) {
+    scan.ranges.push_back(1.0f);
+    scan.bearings.push_back(-1.3f + 0.05f * static_cast<float>(i));
+  }
+  const std::vector<Eigen::Vector2d>& directions = beams.Of(scan);
+  ASSERT_EQ(directions.size(), scan.ranges.size());
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const double bearing = scan.Bearing(i);
+    EXPECT_EQ(directions[i].x(), std::cos(bearing)) << i;
+    EXPECT_EQ(directions[i].y(), std::sin(bearing)) << i;
+  }
 }
 
 }  // namespace

@@ -40,7 +40,11 @@ TEST(ReturnCellsTest, ReturnsOfOneCellAreGathered) {
   EXPECT_EQ(cell.returns, 3);
   EXPECT_NEAR((cell.mean - Vector2d(1.02, 2.02)).norm(), 0.0, 1e-12);
   EXPECT_NEAR((cell.view - Vector2d(-2.0, -1.0)).norm(), 0.0, 1e-12);
-  EXPECT_THAT(cell.scans, ElementsAre(3u, 5u));
+  const auto [first, last] = returns.ScansOf(0);
+  EXPECT_THAT(std::vector<std::size_t>(first, last), ElementsAre(3u, 5u));
+  const auto [first_beside, last_beside] = returns.ScansOf(1);
+  EXPECT_THAT(std::vector<std::size_t>(first_beside, last_beside),
+              ElementsAre(5u));
 }
 
 // Negative numbers cannot be shifted: sanitizers look at this one (test/fuzz).

@@ -127,6 +127,9 @@ constexpr double kRoundTolerance = 1e-4;
 constexpr double kMedianOf2 = 1.386;
 constexpr double kMedianOf3 = 2.366;
 
+// Exceeded by one in a hundred of chi-squares with three degrees of freedom.
+constexpr double kOutlierOf3 = 11.34;
+
 // How much larger than 1 the variance of unit weight of a group of links is, of
 // which so large a share is redundant. `expected`: median of their chi-square.
 double VarianceFactor(std::vector<double> chi_squares, double expected,
@@ -438,6 +441,33 @@ void JointAdjustment::EstimateVariances() {
   }
   Reweigh();
   Solve(/*is_last=*/true);
+}
+
+double JointAdjustment::Misfit() const {
+  const double scale = options_.loss_scale * options_.loss_scale;
+  double squares = 0.0;
+  for (const auto& [id, information] : motions_) {
+    const Constraint& motion = graph_->GetConstraint(id);
+    squares += scale * std::log1p(ChiSquare(*graph_, motion.features[0],
+                                            motion.features[1], motion.expected,
+                                            information) /
+                                  scale);
+  }
+  for (const ScanRelation& relation : relations_) {
+    squares += scale * std::log1p(ChiSquare(*graph_, poses_[relation.from],
+                                            poses_[relation.to], relation.mean,
+                                            relation.information) /
+                                  scale);
+  }
+  return squares;
+}
+
+bool JointAdjustment::FitsBetterThan(double misfit,
+                                     std::int64_t num_relations) const {
+  const double scale = options_.loss_scale * options_.loss_scale;
+  const double outlier = scale * std::log1p(kOutlierOf3 / scale);
+  const auto more = static_cast<double>(num_relations - this->num_relations());
+  return Misfit() + outlier * more < misfit;
 }
 
 void ReportVoteVariances(double excess, const Registry& registry,

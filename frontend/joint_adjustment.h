@@ -156,6 +156,17 @@ class JointAdjustment {
   /// returns to others go then. Throws Error when a solve fails.
   void Adjust();
 
+  /// How badly what was measured fits the poses as they stand: refined odometry
+  /// and the matches of scans, each as uncertain as it was said to be, with the
+  /// loss of the adjustment. In units of chi-square.
+  double Misfit() const;
+
+  /// Whether these poses fit what was measured better than others, from another
+  /// start, of which these two numbers are known. A match that there is in one
+  /// and not in the other counts there as an outlier: what has come apart fits
+  /// better, too.
+  bool FitsBetterThan(double misfit, std::int64_t num_relations) const;
+
   /// The key poses as they stand (KeyPosesOfPlaces).
   std::vector<Pose2> KeyPoses() const;
 

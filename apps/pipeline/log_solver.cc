@@ -828,16 +828,26 @@ void LogSolver::AdjustPoses(Context* context) {
       PosesByMotions(result.records, context->keys);
   const bool is_bent = IsBent(context->keys, by_odometry);
   AdjustPosesFrom(is_bent ? by_odometry : context->keys, context);
-  if (HasContradictions(context)) {
+  const bool has_contradictions = HasContradictions(context);
+  if (has_contradictions || HasOpenWays(context)) {
     // A start that is far off ends in a wrong place: the better of two stands.
     const MapAgreement agreement = AgreementOf(*context);
+    const double misfit = context->adjustment->Misfit();
+    const std::int64_t relations = context->adjustment->num_relations();
     StateWriter kept;
     Exchange(kept, registry_, *graph_);
     context->adjustment->WriteState(&kept);
     std::vector<Pose2> trajectory = result.trajectory;
     AdjustPosesFrom(is_bent ? context->keys : by_odometry, context);
-    if (!context->IsStopped() &&
-        !AgreementOf(*context).IsBetterThan(agreement)) {
+    // Where scans agree everywhere, as in a round corridor, what was measured
+    // between them decides.
+    const MapAgreement now = AgreementOf(*context);
+    const bool is_better =
+        has_contradictions
+            ? now.IsBetterThan(agreement)
+            : now.contradicting <= agreement.contradicting &&
+                  context->adjustment->FitsBetterThan(misfit, relations);
+    if (!context->IsStopped() && !is_better) {
       const std::string bytes = kept.bytes();
       StateReader reader(bytes);
       context->adjustment.reset();
@@ -881,6 +891,15 @@ bool LogSolver::HasContradictions(Context* context) const {
   const auto [keys, poses] = KeyScans(context->result);
   return !FindContradictions(context->scans, keys, poses, options_.check,
                              [context] { return context->IsStopped(); })
+              .empty();
+}
+
+bool LogSolver::HasOpenWays(Context* context) const {
+  if (!options_.check_map || context->IsStopped()) return false;
+  const auto [keys, poses] = KeyScans(context->result);
+  return !FindOpenWays(context->scans, keys, poses,
+                       OptionsOfOpenWays(options_.check),
+                       [context] { return context->IsStopped(); })
               .empty();
 }
 

@@ -318,8 +318,10 @@ class LogSolver {
   // The poses alone by all scans, from these of the key scans.
   void AdjustPosesFrom(const std::vector<Pose2>& start, Context* context);
   // Whether what the robot saw contradicts itself; false when the map is not to
-  // be checked. How far it agrees with itself.
+  // be checked. Whether lengths hang on odometry; likewise. How far it agrees
+  // with itself.
   bool HasContradictions(Context* context) const;
+  bool HasOpenWays(Context* context) const;
   MapAgreement AgreementOf(const Context& context) const;
   void MakeWalls(Context* context);
   void AdjustWalls(Context* context);

@@ -187,6 +187,8 @@ struct LogSolver::Context {
   double first_length = 0.0;
   // Of the second map (JointAdjustment::vote_variance_excess).
   double vote_excess = 1.0;
+  // Not once the adjusted poses were looked through for them in vain.
+  bool may_have_open_ways = true;
 
   Context(const std::vector<Scan>& all_scans, const RunControl& run_control)
       : scans(all_scans), control(run_control) {}
@@ -681,7 +683,8 @@ void LogSolver::ExchangeState(Archive& archive, Stage* stage,
                               Context* context) {
   ExchangeAll(archive, *stage, context->result, context->keys, context->places,
               context->first_map, context->first_trajectory,
-              context->first_length, context->vote_excess, em_before_, trace_,
+              context->first_length, context->vote_excess,
+              context->may_have_open_ways, em_before_, trace_,
               break_log_.records());
   Exchange(archive, registry_, *graph_);
 }
@@ -897,10 +900,12 @@ bool LogSolver::HasContradictions(Context* context) const {
 bool LogSolver::HasOpenWays(Context* context) const {
   if (!options_.check_map || context->IsStopped()) return false;
   const auto [keys, poses] = KeyScans(context->result);
-  return !FindOpenWays(context->scans, keys, poses,
-                       OptionsOfOpenWays(options_.check),
-                       [context] { return context->IsStopped(); })
-              .empty();
+  context->may_have_open_ways =
+      !FindOpenWays(context->scans, keys, poses,
+                    OptionsOfOpenWays(options_.check),
+                    [context] { return context->IsStopped(); })
+           .empty();
+  return context->may_have_open_ways;
 }
 
 MapAgreement LogSolver::AgreementOf(const Context& context) const {
@@ -1087,9 +1092,12 @@ void LogSolver::CheckMap(Context* context) const {
              "wall: that was moved, or the map is wrong",
              &result);
   }
-  AddOpenWays(FindOpenWays(context->scans, keys, poses,
-                           OptionsOfOpenWays(options_.check), stop),
-              &result);
+  // The second map moves poses by centimetres: what is in sight stays the same.
+  if (context->may_have_open_ways || result.second_map_refused) {
+    AddOpenWays(FindOpenWays(context->scans, keys, poses,
+                             OptionsOfOpenWays(options_.check), stop),
+                &result);
+  }
   std::stable_sort(result.loose.begin(), result.loose.end(),
                    [](const LooseTrack& a, const LooseTrack& b) {
                      return a.begin < b.begin;

@@ -18,20 +18,20 @@ using testing::Noise;
 using testing::WallEnds;
 
 // A way through a building as it is, with odometry that errs.
-struct Drive {
+struct SeenDrive {
   std::vector<Scan> scans;
   std::vector<int> keys;
   std::vector<Pose2> poses;
 };
 
 // `sigma`: error of odometry after a metre, m.
-Drive DriveAlong(const std::vector<WallEnds>& walls,
-                 const std::vector<Pose2>& poses, double sigma) {
+SeenDrive DriveAlong(const std::vector<WallEnds>& walls,
+                     const std::vector<Pose2>& poses, double sigma) {
   Laser laser;
   laser.sigma = 0.01;
   laser.maximum_range = 12.0;
   Noise noise(5);
-  Drive drive;
+  SeenDrive drive;
   drive.poses = poses;
   Pose2 odometry = poses.front();
   for (std::size_t k = 0; k < poses.size(); ++k) {
@@ -78,7 +78,8 @@ std::vector<WallEnds> WithNiches(std::vector<WallEnds> walls) {
 }
 
 TEST(FindOpenWaysTest, ACorridorWithNothingInSightHangsOnOdometry) {
-  const Drive drive = DriveAlong(RoomAndCorridor(), Straight(-8.0, 70.0), 0.05);
+  const SeenDrive drive =
+      DriveAlong(RoomAndCorridor(), Straight(-8.0, 70.0), 0.05);
   const std::vector<OpenWay> ways =
       FindOpenWays(drive.scans, drive.keys, drive.poses, {});
   ASSERT_EQ(ways.size(), 1u);
@@ -101,13 +102,14 @@ TEST(FindOpenWaysTest, ACorridorWithNothingInSightHangsOnOdometry) {
 }
 
 TEST(FindOpenWaysTest, ACorridorWithNichesDoesNot) {
-  const Drive drive =
+  const SeenDrive drive =
       DriveAlong(WithNiches(RoomAndCorridor()), Straight(-8.0, 70.0), 0.05);
   EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}).empty());
 }
 
 TEST(FindOpenWaysTest, AShortCorridorDoesNot) {
-  const Drive drive = DriveAlong(RoomAndCorridor(), Straight(-8.0, 5.0), 0.01);
+  const SeenDrive drive =
+      DriveAlong(RoomAndCorridor(), Straight(-8.0, 5.0), 0.01);
   EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}).empty());
 }
 
@@ -133,7 +135,7 @@ TEST(FindOpenWaysTest, ARoundCorridorHangsOnOdometry) {
     poses.emplace_back(position.x(), position.y(),
                        NormalizeAngle(angle + 0.5 * kPi));
   }
-  const Drive drive = DriveAlong(walls, poses, 0.05);
+  const SeenDrive drive = DriveAlong(walls, poses, 0.05);
   const std::vector<OpenWay> ways =
       FindOpenWays(drive.scans, drive.keys, drive.poses, {});
   ASSERT_FALSE(ways.empty());
@@ -143,7 +145,8 @@ TEST(FindOpenWaysTest, ARoundCorridorHangsOnOdometry) {
 }
 
 TEST(FindOpenWaysTest, EndsWhenItIsTold) {
-  const Drive drive = DriveAlong(RoomAndCorridor(), Straight(-8.0, 70.0), 0.05);
+  const SeenDrive drive =
+      DriveAlong(RoomAndCorridor(), Straight(-8.0, 70.0), 0.05);
   int asked = 0;
   EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}, [&asked] {
                 return ++asked > 0;

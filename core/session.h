@@ -17,12 +17,10 @@ namespace plumbline {
 struct SessionOptions {
   /// Weighting of structure constraints: a LossType's name.
   std::string delta_mode = "frozen";
-  /// Minimizer of global solves. "resident" (ResidentMinimizer), which is
-  /// plumbline_solve's default, too, keeps the analysis of the graph between
-  /// them and works on one thread; "ceres" makes it anew. Both end within the
-  /// same tolerances of a minimum; which one of several may differ. Small and
-  /// local solves are Ceres' in any case.
-  std::string minimizer = "resident";
+  /// "resident" (ResidentMinimizer) keeps the analysis of the graph between
+  /// global solves, "ceres" makes it anew. Small and local solves are Ceres' in
+  /// any case.
+  std::string minimizer = "ceres";
   int max_iterations = 50;
   /// Relative change of the cost at which a solve ends.
   double function_tolerance = 1e-8;

@@ -190,10 +190,7 @@ class Recovery {
     AddConstraints(graph, scratch, &transaction);
     const std::vector<ConstraintId> ids =
         measured.Apply(std::move(transaction)).constraints;
-    SessionOptions options;
-    // A few solves at most: an analysis that is kept gains nothing.
-    options.minimizer = "ceres";
-    SolverSession session(&measured, registry_, options);
+    SolverSession session(&measured, registry_, SessionOptions());
     for (int round = 0; round < options_.rounds; ++round) {
       const SolveReport report = session.SolveGlobal();
       if (!report.usable) {

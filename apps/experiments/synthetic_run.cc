@@ -36,8 +36,6 @@ std::unique_ptr<SolverSession> MakeSession(const SyntheticRunOptions& options,
                                            Graph* graph) {
   SessionOptions session;
   session.delta_mode = options.delta_mode;
-  // What the tables of experiments were measured with.
-  session.minimizer = "ceres";
   // The error of the distances alone is that of their optimum, which a start
   // far from it takes more than the usual number of steps to reach.
   session.max_iterations = 200;

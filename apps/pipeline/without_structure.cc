@@ -44,10 +44,7 @@ std::map<FeatureId, Feature> SolveWithoutStructure(const Graph& graph,
 
   Graph measured;
   measured.Apply(std::move(transaction));
-  SessionOptions options;
-  // Solved once: an analysis that is kept gains nothing.
-  options.minimizer = "ceres";
-  SolverSession session(&measured, registry, options);
+  SolverSession session(&measured, registry, SessionOptions());
   if (!session.SolveGlobal().usable) return {};
   std::map<FeatureId, Feature> result;
   const std::vector<const Feature*> solved = std::as_const(measured).Features();

@@ -1,6 +1,7 @@
 #include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/information.h>
 #include <plumbline/core/registry.h>
+#include <plumbline/detectors/heading_drift.h>
 #include <plumbline/detectors/map_directions.h>
 
 #include <Eigen/Cholesky>
@@ -8,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <set>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -99,6 +100,45 @@ Difference DirectionOf(const Graph& graph, const Constraint& constraint) {
   return difference;
 }
 
+// A link of the network, and the features whose directions it ties.
+struct DirectionLink {
+  FeatureId from = kNoId;
+  FeatureId to = kNoId;
+  Difference difference;
+  bool is_sighting = false;
+};
+
+// Adds to what was measured between poses what it lacks by systematic errors.
+void CorrectDrift(const Graph& graph, std::vector<DirectionLink>* links) {
+  std::map<FeatureId, std::size_t> order;
+  for (const DirectionLink& link : *links) {
+    for (const FeatureId id : {link.from, link.to}) {
+      if (graph.GetFeature(id).type->Is(FeatureRole::kPose)) order[id] = 0;
+    }
+  }
+  std::vector<double> headings;
+  for (auto& [id, place] : order) {
+    place = headings.size();
+    headings.push_back(graph.GetFeature(id).parameters[kDirection]);
+  }
+  HeadingDrift drift(std::move(headings));
+  const auto is_between_poses = [&](const DirectionLink& link) {
+    return !link.is_sighting && order.count(link.from) > 0 &&
+           order.count(link.to) > 0;
+  };
+  for (const DirectionLink& link : *links) {
+    if (!is_between_poses(link)) continue;
+    const std::size_t from = order[link.from];
+    if (order[link.to] != from + 1) continue;
+    drift.AddTurn(from, link.difference.angle, link.difference.information);
+  }
+  drift.Estimate();
+  for (DirectionLink& link : *links) {
+    if (!is_between_poses(link)) continue;
+    link.difference.angle += drift.Between(order[link.from], order[link.to]);
+  }
+}
+
 }  // namespace
 
 MapDirections CollectDirections(const Graph& graph,
@@ -120,6 +160,7 @@ MapDirections CollectDirections(const Graph& graph,
           feature->id, result.network.AddNode(feature->parameters[kDirection]));
     }
   }
+  std::vector<DirectionLink> links;
   for (const auto& [id, node] : result.nodes) {
     for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
       const Constraint& constraint = graph.GetConstraint(constraint_id);
@@ -137,9 +178,15 @@ MapDirections CollectDirections(const Graph& graph,
       const bool is_sighting = !constraint.type->Is(RelationRole::kPose);
       result.constraints.push_back(constraint_id);
       result.has_sightings = result.has_sightings || is_sighting;
-      result.network.AddLink(node, second->second, difference.angle, variance,
-                             false, is_sighting ? kSighted : kRelative);
+      links.push_back({id, second->first, difference, is_sighting});
     }
+  }
+  CorrectDrift(graph, &links);
+  for (const DirectionLink& link : links) {
+    result.network.AddLink(result.nodes.at(link.from), result.nodes.at(link.to),
+                           link.difference.angle,
+                           1.0 / link.difference.information, false,
+                           link.is_sighting ? kSighted : kRelative);
   }
   if (!result.has_sightings) return result;
   // Variances as the residuals show them to be. Relations between features were

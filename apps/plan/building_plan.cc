@@ -1,6 +1,7 @@
 #include <plumbline/plan/arrangement.h>
 #include <plumbline/plan/building_plan.h>
 #include <plumbline/plan/drawn_lines.h>
+#include <plumbline/plan/rooms_with_doors.h>
 #include <plumbline/plan/unseen_walls.h>
 
 #include <algorithm>
@@ -285,6 +286,27 @@ PlanWall WallBetween(const DrawnLine& on, const Sides& sides, int first,
     wall.right += has_left == has_right ? 0.5 * missing : !has_right * missing;
   }
   return wall;
+}
+
+// How lines of walls divide the plane.
+struct Division {
+  std::vector<DrawnLine> drawn;
+  Arrangement arrangement;
+  std::vector<int> region;
+};
+
+Division Divide(const std::vector<WallLine>& lines, const SpaceGrid& space,
+                const BuildingPlanOptions& options) {
+  Division division;
+  division.drawn = DrawLines(lines, options.reach);
+  MeasureLines(space, options.doors, &division.drawn);
+  division.arrangement = Arrange(division.drawn, space);
+  division.region = FindRegions(division.arrangement, options.regions);
+  return division;
+}
+
+void Append(const std::vector<WallLine>& more, std::vector<WallLine>* lines) {
+  lines->insert(lines->end(), more.begin(), more.end());
 }
 
 bool Cross(const Vector2d& a, const Vector2d& b, const Vector2d& c,
@@ -587,27 +609,36 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
         .push_back(lines[i]);
   }
   lines = std::move(long_lines);
-  std::vector<DrawnLine> drawn = DrawLines(lines, options.reach);
-  MeasureLines(space, options.doors, &drawn);
-  const std::vector<WallLine> partitions =
-      FindPartitions(short_lines, drawn, space, options.reach);
-  if (!partitions.empty()) {
-    lines.insert(lines.end(), partitions.begin(), partitions.end());
-    drawn = DrawLines(lines, options.reach);
-    MeasureLines(space, options.doors, &drawn);
+  Division division = Divide(lines, space, options);
+  const Partitions partitions =
+      FindPartitions(short_lines, division.drawn, space, options.reach);
+  if (!partitions.sure.empty()) {
+    Append(partitions.sure, &lines);
+    division = Divide(lines, space, options);
   }
-  Arrangement arrangement = Arrange(drawn, space);
-  std::vector<int> region = FindRegions(arrangement, options.regions);
+  if (!partitions.likely.empty()) {
+    std::vector<WallLine> with = lines;
+    Append(partitions.likely, &with);
+    const Division trial = Divide(with, space, options);
+    const std::vector<int> kept = LinesBetweenRoomsWithDoors(
+        trial.arrangement, trial.region, static_cast<int>(lines.size()),
+        static_cast<int>(with.size()));
+    if (!kept.empty()) {
+      for (const int line : kept) {
+        lines.push_back(with[static_cast<std::size_t>(line)]);
+      }
+      division = Divide(lines, space, options);
+    }
+  }
   for (int i = 0; i < kUnseenRounds; ++i) {
     const std::vector<WallLine> unseen =
-        FindUnseenWalls(arrangement, region, drawn, space, options.unseen);
+        FindUnseenWalls(division.arrangement, division.region, division.drawn,
+                        space, options.unseen);
     if (unseen.empty()) break;
-    lines.insert(lines.end(), unseen.begin(), unseen.end());
-    drawn = DrawLines(lines, options.reach);
-    MeasureLines(space, options.doors, &drawn);
-    arrangement = Arrange(drawn, space);
-    region = FindRegions(arrangement, options.regions);
+    Append(unseen, &lines);
+    division = Divide(lines, space, options);
   }
+  const auto& [drawn, arrangement, region] = division;
 
   BuildingPlan plan;
   std::vector<int> room_of_face;

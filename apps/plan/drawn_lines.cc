@@ -54,6 +54,10 @@ constexpr double kAtTheEnd = 0.4;
 constexpr double kMostSeenThrough = 0.05;
 // Metres of wall in a partition that may have doors.
 constexpr double kLeastPartition = 1.5;
+// Metres of wall in what may be a partition between two rooms with doors of
+// their own, and the share of it that nobody looked through.
+constexpr double kLeastLikelyPartition = 1.0;
+constexpr double kLikelyShare = 0.5;
 
 // Where two lines meet: along each.
 bool Crossing(const WallLine& a, const WallLine& b, double* t_a, double* t_b) {
@@ -517,10 +521,10 @@ double WayToWall(const WallLine& line, double from, int sign,
 
 }  // namespace
 
-std::vector<WallLine> FindPartitions(const std::vector<WallLine>& lines,
-                                     const std::vector<DrawnLine>& drawn,
-                                     const SpaceGrid& space, double reach) {
-  std::vector<WallLine> found;
+Partitions FindPartitions(const std::vector<WallLine>& lines,
+                          const std::vector<DrawnLine>& drawn,
+                          const SpaceGrid& space, double reach) {
+  Partitions found;
   for (const WallLine& line : lines) {
     if (!line.is_aligned) continue;
     const double before = WayToWall(line, line.begin, -1, drawn, reach);
@@ -538,7 +542,10 @@ std::vector<WallLine> FindPartitions(const std::vector<WallLine>& lines,
     const bool is_wall = line.weight >= kLeastPartition &&
                          static_cast<double>(wall) >= kWallThere * all;
     if (is_wall || static_cast<double>(open) <= kMostSeenThrough * all) {
-      found.push_back(line);
+      found.sure.push_back(line);
+    } else if (line.weight >= kLeastLikelyPartition &&
+               static_cast<double>(open) <= (1.0 - kLikelyShare) * all) {
+      found.likely.push_back(line);
     }
   }
   return found;

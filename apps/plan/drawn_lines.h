@@ -64,14 +64,23 @@ constexpr double kBesideWall = 0.1;
 std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
                                  double reach);
 
-/// Those of `lines` in a direction of the building that reach from wall to wall
-/// and are wall for the most part, or without a place that was seen through: a
-/// partition of which little was seen, at grazing angles or behind furniture,
-/// while furniture itself leaves gaps to the walls beside it. `drawn` has the
-/// profiles of the lines that are known to be walls.
-std::vector<WallLine> FindPartitions(const std::vector<WallLine>& lines,
-                                     const std::vector<DrawnLine>& drawn,
-                                     const SpaceGrid& space, double reach);
+/// Lines with little wall that may divide rooms.
+struct Partitions {
+  /// In a direction of the building, from wall to wall, and wall for the most
+  /// part or without a place that was seen through: a partition of which little
+  /// was seen, at grazing angles or behind furniture, while furniture itself
+  /// leaves gaps to the walls beside it.
+  std::vector<WallLine> sure;
+  /// Those of which no more than half was seen through: a row of cupboards, or
+  /// a wall of which cupboards hide most. What else speaks for a wall decides.
+  std::vector<WallLine> likely;
+};
+
+/// The partitions among `lines`. `drawn` has the profiles of the lines that are
+/// known to be walls.
+Partitions FindPartitions(const std::vector<WallLine>& lines,
+                          const std::vector<DrawnLine>& drawn,
+                          const SpaceGrid& space, double reach);
 
 /// Fills the profiles of all lines.
 ///

@@ -33,6 +33,8 @@ constexpr double kLeastLength = 2.0;
 constexpr double kLeastCorridor = 5.0;
 // Corners nearer to each other are one, m.
 constexpr double kSameCorner = 2e-3;
+// What is narrower lies between two lines of one wall or along furniture, m.
+constexpr double kSliver = 0.5;
 // Regions that touch in no more than a corner are no neighbors, m.
 constexpr double kLeastBorder = 0.1;
 
@@ -105,6 +107,10 @@ double Through(const BorderLengths& border, double width,
   return options.least_wall_share - border.Of(Mark::kWall) / border.length();
 }
 
+bool IsNarrow(const Polygon& polygon, double width) {
+  return Offset(polygon, -0.5 * width).empty();
+}
+
 // Regions and what lies between them while they grow.
 class Regions {
  public:
@@ -117,6 +123,7 @@ class Regions {
       extents_[i].area = arrangement.faces[i].Area();
       extents_[i].perimeter = arrangement.faces[i].Perimeter();
       extents_[i].free = arrangement.free[i];
+      is_sliver_.push_back(IsNarrow(arrangement.faces[i], kSliver));
     }
     for (const ArrangementEdge& edge : arrangement.edges) {
       if (edge.right < 0 || edge.left == edge.right) continue;
@@ -131,33 +138,12 @@ class Regions {
 
   const std::vector<int>& region() const { return region_; }
 
-  // Joins across borders that are open, the most open first.
+  // Joins across borders that are open, the most open first. What lies between
+  // two lines close together goes first: the border beside it is short until
+  // then, and may be open where the wall as a whole is not.
   void JoinOpen(const RegionOptions& options) {
-    // Then by number.
-    using Pair = std::tuple<double, int, int>;
-    std::set<Pair> queue;
-    const auto key = [&](const BorderLengths& border, int a, int b) {
-      return Pair(AreApart(border, a, b, options) ? 1.0 : -Openness(border),
-                  std::min(a, b), std::max(a, b));
-    };
-    for (std::size_t a = 0; a < borders_.size(); ++a) {
-      for (const auto& [b, border] : borders_[a]) {
-        queue.insert(key(border.all, static_cast<int>(a), b));
-      }
-    }
-    while (!queue.empty()) {
-      const auto [closed, a, b] = *queue.begin();
-      if (closed >= options.holds_apart) break;
-      for (const int end : {a, b}) {
-        for (const auto& [c, border] : BordersOf(end)) {
-          queue.erase(key(border.all, end, c));
-        }
-      }
-      Join(a, b);
-      for (const auto& [c, border] : BordersOf(a)) {
-        queue.insert(key(border.all, a, c));
-      }
-    }
+    JoinOpen(options, /*only_slivers=*/true);
+    JoinOpen(options, /*only_slivers=*/false);
   }
 
   // Joins across openings as wide as the wider space: a narrow one may be the
@@ -190,8 +176,48 @@ class Regions {
   }
 
  private:
+  void JoinOpen(const RegionOptions& options, bool only_slivers) {
+    // Then by number.
+    using Pair = std::tuple<double, int, int>;
+    std::set<Pair> queue;
+    const auto key = [&](const BorderLengths& border, int a, int b) {
+      const bool is_left = AreApart(border, a, b, options) ||
+                           (only_slivers && !IsSliver(a) && !IsSliver(b));
+      return Pair(is_left ? 1.0 : -Openness(border), std::min(a, b),
+                  std::max(a, b));
+    };
+    for (std::size_t a = 0; a < borders_.size(); ++a) {
+      for (const auto& [b, border] : borders_[a]) {
+        queue.insert(key(border.all, static_cast<int>(a), b));
+      }
+    }
+    while (!queue.empty()) {
+      const auto [closed, a, b] = *queue.begin();
+      // Slivers with walls on both sides are pockets (FillPockets).
+      if (closed >= (only_slivers ? 0.0 : options.holds_apart)) break;
+      if (closed >= options.doors_hold_apart && HaveOwnDoors(a, b)) {
+        // It comes back with other borders when one of them grows.
+        queue.erase(queue.begin());
+        continue;
+      }
+      for (const int end : {a, b}) {
+        for (const auto& [c, border] : BordersOf(end)) {
+          queue.erase(key(border.all, end, c));
+        }
+      }
+      Join(a, b);
+      for (const auto& [c, border] : BordersOf(a)) {
+        queue.insert(key(border.all, a, c));
+      }
+    }
+  }
+
   std::map<int, Border>& BordersOf(int region) {
     return borders_[static_cast<std::size_t>(region)];
+  }
+
+  bool IsSliver(int region) const {
+    return is_sliver_[static_cast<std::size_t>(region)];
   }
 
   // Both were seen, but nobody looked from one into the other: two rooms, even
@@ -204,8 +230,21 @@ class Regions {
                options.min_area;
   }
 
+  // Each has a door to one and the same third, as offices along a corridor do.
+  bool HaveOwnDoors(int a, int b) {
+    const std::map<int, Border>& others = BordersOf(b);
+    const auto& around = BordersOf(a);
+    return std::any_of(around.begin(), around.end(), [&](const auto& entry) {
+      if (entry.second.all.Of(Mark::kDoor) < kLeastOpening) return false;
+      const auto other = others.find(entry.first);
+      return other != others.end() &&
+             other->second.all.Of(Mark::kDoor) >= kLeastOpening;
+    });
+  }
+
   // b goes into a.
   void Join(int a, int b) {
+    is_sliver_[static_cast<std::size_t>(a)] = IsSliver(a) && IsSliver(b);
     Extent& extent = extents_[static_cast<std::size_t>(a)];
     const Extent& more = extents_[static_cast<std::size_t>(b)];
     extent.area += more.area;
@@ -225,11 +264,9 @@ class Regions {
   std::vector<int> region_;
   std::vector<std::map<int, Border>> borders_;
   std::vector<Extent> extents_;
+  // Narrow faces that have not joined any others.
+  std::vector<bool> is_sliver_;
 };
-
-bool IsNarrow(const Polygon& polygon, double width) {
-  return Offset(polygon, -0.5 * width).empty();
-}
 
 // Which faces lie where their region is wider than a corridor.
 std::vector<bool> WideFaces(const Arrangement& arrangement,

@@ -15,6 +15,8 @@ struct RegionOptions {
   /// Regions are joined when their border separates them by less than this
   /// (WallProfile::holds, mean over the border).
   double holds_apart = 0.3;
+  /// The same for regions that have a door each to one and the same third.
+  double doors_hold_apart = 0.1;
   /// Regions with a lower share of wall than this between them are one: an
   /// opening as wide as a corridor is no door.
   double least_wall_share = 0.2;

@@ -455,6 +455,23 @@ TEST(BuildingPlanTest, AShortPartitionWithADoorKeepsRoomsApart) {
 
 // A room with one wall that is an arc, whose chords are all shorter than a wall
 // must be.
+// A short wall and a cupboard beside it reach half way through a room: two
+// rooms when each half has a door to the corridor, one when there is one door.
+TEST(BuildingPlanTest, APartitionBetweenTwoDoorsKeepsRoomsApart) {
+  const auto rooms = [](bool has_two_doors) {
+    Drawing drawing(14.0, 12.0);
+    drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 13.0, 8.0);
+    drawing.Free(2.0, 2.9, 2.9, 3.3);
+    if (has_two_doors) drawing.Free(10.0, 2.9, 10.9, 3.3);
+    drawing.Fill(6.95, 4.9, 7.05, 6.9, Space::kOccupied);
+    drawing.Fill(6.5, 6.9, 7.5, 7.9, Space::kOccupied);
+    drawing.Fill(6.55, 6.95, 7.45, 7.85, Space::kUnknown);
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms(true), 3u);
+  EXPECT_EQ(rooms(false), 2u);
+}
+
 TEST(BuildingPlanTest, ChordsOfAnArcCloseARoom) {
   const auto arc = [](double y) {
     return -2.0 + std::sqrt(36.0 - (y - 5.0) * (y - 5.0));

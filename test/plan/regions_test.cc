@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/plan/regions.h>
 
+#include <algorithm>
 #include <vector>
 
 namespace plumbline {
@@ -102,6 +103,86 @@ TEST(RegionsTest, ACorridorGoesOnThoughItsPartsShareAWall) {
   const std::vector<int> apart = regions(0.9);
   EXPECT_NE(apart[0], apart[1]);
   EXPECT_EQ(apart[1], apart[2]);
+}
+
+void AddFace(const Ring& ring, Arrangement* arrangement) {
+  Polygon polygon;
+  polygon.shell = ring;
+  arrangement->faces.push_back(polygon);
+  arrangement->free.push_back(polygon.Area());
+  arrangement->unknown.push_back(0.0);
+}
+
+// `holds` is a mean over the edge, `door` m of it are a door.
+void AddEdge(const Vector2d& begin, const Vector2d& end, int left, int right,
+             double holds, double door, Arrangement* arrangement) {
+  ArrangementEdge edge;
+  edge.begin = begin;
+  edge.end = end;
+  edge.left = left;
+  edge.right = right;
+  const double open = std::max(0.0, 0.5 * (1.0 - holds) * edge.length() - door);
+  edge.lengths.metres[static_cast<std::size_t>(Mark::kDoor)] = door;
+  edge.lengths.metres[static_cast<std::size_t>(Mark::kOpen)] = open;
+  edge.lengths.metres[static_cast<std::size_t>(Mark::kWall)] =
+      edge.length() - open - door;
+  edge.lengths.holds = holds * edge.length();
+  arrangement->edges.push_back(edge);
+}
+
+// Two rooms side by side with a border that holds less than others, and a
+// corridor below both: with a door each they stay two.
+TEST(RegionsTest, RoomsWithADoorEachStayApart) {
+  const auto are_apart = [](double holds, double second_door) {
+    Arrangement arrangement;
+    AddFace({{0.0, 2.0}, {5.0, 2.0}, {5.0, 7.0}, {0.0, 7.0}}, &arrangement);
+    AddFace({{5.0, 2.0}, {10.0, 2.0}, {10.0, 7.0}, {5.0, 7.0}}, &arrangement);
+    AddFace({{0.0, 0.0}, {10.0, 0.0}, {10.0, 2.0}, {5.0, 2.0}, {0.0, 2.0}},
+            &arrangement);
+    AddEdge({0.0, 2.0}, {5.0, 2.0}, 0, 2, 0.9, 0.9, &arrangement);
+    AddEdge({5.0, 2.0}, {10.0, 2.0}, 1, 2, 0.9, second_door, &arrangement);
+    AddEdge({5.0, 2.0}, {5.0, 7.0}, 0, 1, holds, 0.0, &arrangement);
+    AddEdge({5.0, 7.0}, {0.0, 7.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 7.0}, {0.0, 2.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 2.0}, {10.0, 7.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 7.0}, {5.0, 7.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 2.0}, {0.0, 0.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 0.0}, {10.0, 0.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 0.0}, {10.0, 2.0}, 2, -1, 1.0, 0.0, &arrangement);
+    const std::vector<int> region = FindRegions(arrangement);
+    return region[0] != region[1];
+  };
+  EXPECT_TRUE(are_apart(0.2, 0.9));
+  EXPECT_FALSE(are_apart(0.2, 0.0));
+  EXPECT_FALSE(are_apart(0.0, 0.9));
+  EXPECT_TRUE(are_apart(0.4, 0.0));
+}
+
+// Half of the wall between two rooms is open; before the other half stands a
+// cupboard, whose front is a line of its own. The cupboard belongs to the room
+// on its open side, and then the wall is whole.
+TEST(RegionsTest, WhatStandsBeforeAWallIsPartOfItsRoomFirst) {
+  Arrangement arrangement;
+  AddFace({{0.0, 0.0}, {4.0, 0.0}, {4.0, 2.0}, {4.0, 4.0}, {0.0, 4.0}},
+          &arrangement);
+  AddFace({{4.0, 0.0}, {4.3, 0.0}, {4.3, 2.0}, {4.0, 2.0}}, &arrangement);
+  AddFace(
+      {{4.3, 0.0}, {8.0, 0.0}, {8.0, 4.0}, {4.0, 4.0}, {4.0, 2.0}, {4.3, 2.0}},
+      &arrangement);
+  AddEdge({4.0, 0.0}, {4.0, 2.0}, 0, 1, 1.0, 0.0, &arrangement);
+  AddEdge({4.0, 2.0}, {4.0, 4.0}, 0, 2, -0.35, 0.0, &arrangement);
+  AddEdge({4.3, 0.0}, {4.3, 2.0}, 1, 2, -0.2, 0.0, &arrangement);
+  AddEdge({4.3, 2.0}, {4.0, 2.0}, 1, 2, -0.2, 0.0, &arrangement);
+  AddEdge({0.0, 0.0}, {4.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+  AddEdge({4.0, 4.0}, {0.0, 4.0}, 0, -1, 1.0, 0.0, &arrangement);
+  AddEdge({0.0, 4.0}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+  AddEdge({4.0, 0.0}, {4.3, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
+  AddEdge({4.3, 0.0}, {8.0, 0.0}, 2, -1, 1.0, 0.0, &arrangement);
+  AddEdge({8.0, 0.0}, {8.0, 4.0}, 2, -1, 1.0, 0.0, &arrangement);
+  AddEdge({8.0, 4.0}, {4.0, 4.0}, 2, -1, 1.0, 0.0, &arrangement);
+  const std::vector<int> region = FindRegions(arrangement);
+  EXPECT_EQ(region[1], region[2]);
+  EXPECT_NE(region[0], region[2]);
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include <plumbline/core/disjoint_sets.h>
 #include <plumbline/plan/arrangement.h>
 #include <plumbline/plan/building_plan.h>
 #include <plumbline/plan/drawn_lines.h>
@@ -40,6 +41,11 @@ constexpr double kNicheShare = 0.6;
 // Walls without a trace are looked for again in the parts of a region, up to so
 // many times.
 constexpr int kUnseenRounds = 3;
+// Rooms with an opening of this between them are reached from each other, m:
+// the leaf of a door may hide much of it.
+constexpr double kLeastWay = 0.25;
+// Share of a room's width that makes an opening one of its whole width.
+constexpr double kWholeWidth = 0.6;
 // Doors between the same rooms nearer to each other than this are one, m.
 constexpr double kSameDoor = 0.8;
 // Walls with nearly one direction, by its cosine, whose middles are so near to
@@ -204,13 +210,63 @@ std::vector<PlanRoom> RoomsOf(const Arrangement& arrangement,
   return sorted;
 }
 
-// Long and narrow, as a rectangle of the same area and perimeter would be.
-PlanRoom::Kind KindOf(const Polygon& outline) {
+// Of a rectangle with the same area and perimeter, the shorter one first, m.
+std::pair<double, double> SidesOfRectangle(const Polygon& outline) {
   const double half = 0.25 * outline.Perimeter();
-  const double area = outline.Area();
-  const double root = std::sqrt(std::max(0.0, half * half - area));
-  const double width = half - root;
-  return half + root >= kCorridorRatio * width && width <= kCorridorWidth
+  const double root = std::sqrt(std::max(0.0, half * half - outline.Area()));
+  return {half - root, half + root};
+}
+
+// Drops rooms that open in their whole width to what is no room, while no way
+// through doors and openings leads to them from a room that the robot was in.
+// For a robot that drove outside these are alleys between houses and gaps
+// between cars; within a building they are the parts of rooms that were seen
+// through a door.
+void DropUnreached(const Arrangement& arrangement, std::vector<PlanRoom>* rooms,
+                   std::vector<int>* room_of_face) {
+  const auto room_of = [&](int face) {
+    return face < 0 ? -1 : (*room_of_face)[static_cast<std::size_t>(face)];
+  };
+  DisjointSets linked(rooms->size());
+  std::map<std::pair<int, int>, double> openings;
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    const auto sides = std::minmax({room_of(edge.left), room_of(edge.right)});
+    if (sides.first == sides.second) continue;
+    openings[sides] +=
+        edge.lengths.Of(Mark::kOpen) + edge.lengths.Of(Mark::kDoor);
+  }
+  std::vector<bool> is_open(rooms->size(), false);
+  for (const auto& [sides, width] : openings) {
+    if (sides.first < 0) {
+      const auto room = static_cast<std::size_t>(sides.second);
+      is_open[room] =
+          width >= kWholeWidth * SidesOfRectangle((*rooms)[room].outline).first;
+    } else if (width >= kLeastWay) {
+      linked.Join(static_cast<std::size_t>(sides.first),
+                  static_cast<std::size_t>(sides.second));
+    }
+  }
+  std::vector<bool> is_reached(rooms->size(), false);
+  for (std::size_t i = 0; i < rooms->size(); ++i) {
+    if ((*rooms)[i].is_entered) is_reached[linked.Find(i)] = true;
+  }
+  std::vector<int> index;
+  std::vector<PlanRoom> kept;
+  for (std::size_t i = 0; i < rooms->size(); ++i) {
+    const bool is_kept = is_reached[linked.Find(i)] || !is_open[i];
+    index.push_back(is_kept ? static_cast<int>(kept.size()) : -1);
+    if (is_kept) kept.push_back(std::move((*rooms)[i]));
+  }
+  for (int& room : *room_of_face) {
+    if (room >= 0) room = index[static_cast<std::size_t>(room)];
+  }
+  *rooms = std::move(kept);
+}
+
+// Long and narrow.
+PlanRoom::Kind KindOf(const Polygon& outline) {
+  const auto [width, length] = SidesOfRectangle(outline);
+  return length >= kCorridorRatio * width && width <= kCorridorWidth
              ? PlanRoom::Kind::kCorridor
              : PlanRoom::Kind::kRoom;
 }
@@ -489,16 +545,32 @@ void DropDoubleDoors(std::vector<PlanDoor>* doors) {
   *doors = std::move(kept);
 }
 
-// Which rooms and doors the robot drove through, and which rooms are
-// neighbors.
+// Marks the rooms that the robot was in; returns whether it was in one of them
+// for the most part of its way.
+bool MarkEntered(const std::vector<Pose2>& path, std::vector<PlanRoom>* rooms) {
+  int inside = 0;
+  int outside = 0;
+  std::size_t last = 0;  // where it was before
+  for (const Pose2& pose : path) {
+    const Vector2d here = pose.head<2>();
+    if (!here.allFinite()) continue;
+    bool is_inside = false;
+    for (std::size_t i = 0; i < rooms->size() && !is_inside; ++i) {
+      const std::size_t which = (last + i) % rooms->size();
+      is_inside = (*rooms)[which].outline.Contains(here);
+      if (is_inside) last = which;
+    }
+    if (is_inside) (*rooms)[last].is_entered = true;
+    ++(is_inside ? inside : outside);
+  }
+  return inside >= outside;
+}
+
+// Which doors the robot drove through, and which rooms are neighbors.
 void TakePath(const std::vector<Pose2>& path, BuildingPlan* plan) {
   for (std::size_t i = 0; i < path.size(); ++i) {
     const Vector2d here = path[i].head<2>();
-    if (!here.allFinite()) continue;
-    for (PlanRoom& room : plan->rooms) {
-      if (!room.is_entered) room.is_entered = room.outline.Contains(here);
-    }
-    if (i == 0) continue;
+    if (i == 0 || !here.allFinite()) continue;
     const Vector2d before = path[i - 1].head<2>();
     for (PlanDoor& door : plan->doors) {
       if (!door.is_driven) {
@@ -644,6 +716,9 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
   std::vector<int> room_of_face;
   plan.rooms =
       RoomsOf(arrangement, region, drawn, space, options, &room_of_face);
+  if (!MarkEntered(path, &plan.rooms)) {
+    DropUnreached(arrangement, &plan.rooms, &room_of_face);
+  }
   for (PlanRoom& room : plan.rooms) room.kind = KindOf(room.outline);
   const std::vector<Sides> sides = SidesOf(arrangement, room_of_face, drawn);
   for (std::size_t i = 0; i < drawn.size(); ++i) {

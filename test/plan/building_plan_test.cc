@@ -572,5 +572,24 @@ TEST(BuildingPlanTest, AWallAndACarAreNoRoom) {
   EXPECT_TRUE(PlanOf(open).rooms.empty());
 }
 
+// Two houses with an alley between them, open to the street: no room when a
+// robot drove along the street, while what a robot in a building sees through a
+// door is one.
+TEST(BuildingPlanTest, AlleysBetweenHousesAreNoRooms) {
+  Drawing street(40.0, 24.0);
+  street.Free(1, 1, 39, 11);
+  street.Fill(2, 11, 16, 11.05, Space::kOccupied);
+  street.Fill(20, 11, 38, 11.05, Space::kOccupied);
+  street.Free(16, 11, 20, 19);
+  street.Fill(15.95, 11, 16, 19, Space::kOccupied);
+  street.Fill(20, 11, 20.05, 19, Space::kOccupied);
+  EXPECT_EQ(PlanOf(street).rooms.size(), 1u);
+  EXPECT_TRUE(PlanOf(street, {Pose2(4.0, 6.0, 0.0), Pose2(36.0, 6.0, 0.0)})
+                  .rooms.empty());
+  EXPECT_EQ(PlanOf(TwoRooms(), {Pose2(2.0, 2.0, 0.0), Pose2(12.0, 2.0, 0.0)})
+                .rooms.size(),
+            3u);
+}
+
 }  // namespace
 }  // namespace plumbline

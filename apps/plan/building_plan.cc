@@ -38,6 +38,13 @@ constexpr int kRaysAside = 3;
 // of its width.
 constexpr double kSameDepth = 0.1;
 constexpr double kNicheShare = 0.6;
+// A wall that stands within a room is so long at least, m, and was seen from
+// both sides along this share: so far before its faces, m, is free floor, near
+// them and deeper than a cupboard.
+constexpr double kLeastStanding = 1.5;
+constexpr double kSeenFromBoth = 0.5;
+constexpr double kBeforeFace = 0.2;
+constexpr double kBeforeCupboard = 0.6;
 // Walls without a trace are looked for again in the parts of a region, up to so
 // many times.
 constexpr int kUnseenRounds = 3;
@@ -528,6 +535,52 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
   }
 }
 
+// Walls that end within a room and divide nothing: thin, and seen from both
+// sides, while the edge of a piece of furniture is seen from one.
+void AddStandingWalls(const DrawnLine& on, const Sides& sides,
+                      const SpaceGrid& space, BuildingPlan* plan) {
+  const WallProfile& profile = on.profile;
+  const auto stands_at = [&](int i) {
+    return profile.At(i) == Mark::kWall &&
+           profile.in_row[static_cast<std::size_t>(i)] &&
+           sides.left[static_cast<std::size_t>(i)] == Sides::kNone;
+  };
+  // The room on one side (1: left), -1 when there is no free floor before the
+  // face that is deeper than a cupboard.
+  const auto room_beside = [&](int i, int side) {
+    const double face = side > 0 ? on.line.high : -on.line.low;
+    const auto before = [&](double depth) {
+      return Vector2d(on.line.At(profile.MiddleOf(i)) +
+                      side * (face + depth) * on.line.normal());
+    };
+    if (space.At(before(kBeforeFace)) != Space::kFree ||
+        space.At(before(kBeforeCupboard)) != Space::kFree) {
+      return -1;
+    }
+    for (std::size_t k = 0; k < plan->rooms.size(); ++k) {
+      if (plan->rooms[k].outline.Contains(before(kBeforeFace)) &&
+          plan->rooms[k].outline.Contains(before(kBeforeCupboard))) {
+        return static_cast<int>(k);
+      }
+    }
+    return -1;
+  };
+  for (int i = 0; i < profile.size();) {
+    int j = i;
+    while (j < profile.size() && stands_at(j)) ++j;
+    int seen = 0;
+    for (int k = i; k < j; ++k) {
+      const int left = room_beside(k, 1);
+      seen += left >= 0 && left == room_beside(k, -1);
+    }
+    if ((j - i) * WallProfile::kStep >= kLeastStanding &&
+        seen >= kSeenFromBoth * (j - i)) {
+      plan->walls.push_back(WallBetween(on, sides, i, j, space));
+    }
+    i = std::max(j, i + 1);
+  }
+}
+
 // Doors that two lines close together found twice.
 void DropDoubleDoors(std::vector<PlanDoor>* doors) {
   std::vector<PlanDoor> kept;
@@ -723,6 +776,9 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
   const std::vector<Sides> sides = SidesOf(arrangement, room_of_face, drawn);
   for (std::size_t i = 0; i < drawn.size(); ++i) {
     ReadLine(drawn[i], sides[i], space, options, &plan);
+    if (drawn[i].line.is_wall) {
+      AddStandingWalls(drawn[i], sides[i], space, &plan);
+    }
   }
   plan.walls = WithoutDoubles(plan.walls);
   DropDoubleDoors(&plan.doors);

@@ -572,6 +572,19 @@ TEST(BuildingPlanTest, AWallAndACarAreNoRoom) {
   EXPECT_TRUE(PlanOf(open).rooms.empty());
 }
 
+// A wall that ends in the middle of a room divides nothing, but is drawn; the
+// front of a cupboard is not.
+TEST(BuildingPlanTest, WallsThatEndWithinARoomAreDrawn) {
+  Drawing drawing = TwoRooms();
+  drawing.Fill(9.45, 3.2, 9.55, 5.4, Space::kOccupied);
+  drawing.Fill(12.4, 4.4, 12.45, 7.0, Space::kOccupied);
+  drawing.Fill(12.45, 4.4, 13.05, 7.0, Space::kUnknown);
+  const BuildingPlan plan = PlanOf(drawing);
+  EXPECT_EQ(plan.rooms.size(), 3u);
+  EXPECT_TRUE(IsWallAt(plan, {9.5, 4.3}));
+  EXPECT_FALSE(IsWallAt(plan, {12.42, 5.5}));
+}
+
 // Two houses with an alley between them, open to the street: no room when a
 // robot drove along the street, while what a robot in a building sees through a
 // door is one.

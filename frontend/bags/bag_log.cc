@@ -4,7 +4,8 @@
 #include <plumbline/frontend/bags/bag_log.h>
 #include <plumbline/frontend/bags/bag_messages.h>
 #include <plumbline/frontend/bags/bag_sources.h>
-#include <plumbline/frontend/scan_sweep.h>
+#include <plumbline/frontend/bags/odometry_clock.h>
+#include <plumbline/frontend/bags/scan_maker.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,45 +17,14 @@ namespace plumbline {
 namespace {
 
 constexpr double kNanoseconds = 1e9;  // in a second
-// A reading is no return from this far below the maximum range on, m.
-constexpr double kMaximumRangeMargin = 0.001;
-// Stated maximum ranges beyond it are taken for none, m.
-constexpr double kAbsurdMaximumRange = 1000.0;
-constexpr double kDefaultMaximumRange = 80.0;
-// Of more readings every second, third, ... is used.
-constexpr std::size_t kMostBeamsUsed = 10000;
 // Scans that were recorded out of order are put in order so far, s and scans.
 // Who sets a clock back by more means it.
 constexpr double kOrderSeconds = 1.0;
 constexpr std::size_t kOrderScans = 100;
 // Odometry farther from a scan than this, s, is worth a word.
 constexpr double kFarOdometry = 1.0;
-// Nobody takes longer over a scan, s, nor than from one scan to the next, but
-// for what clocks differ by.
-constexpr double kLongestScan = 1.0;
-constexpr double kLongestSweep = 1.2;
-// Poses that a turn of the laser is sampled with.
-constexpr int kSweepSamples = 16;
 // cos of the angle by which a laser's plane may be out of level.
 const double kLevel = std::cos(DegToRad(20.0));
-
-std::string SecondsText(std::int64_t nanoseconds) {
-  char text[40];
-  const bool is_negative = nanoseconds < 0;
-  const auto size = is_negative ? 0 - static_cast<std::uint64_t>(nanoseconds)
-                                : static_cast<std::uint64_t>(nanoseconds);
-  std::snprintf(text, sizeof text, "%s%llu.%09llu", is_negative ? "-" : "",
-                static_cast<unsigned long long>(size / 1000000000),
-                static_cast<unsigned long long>(size % 1000000000));
-  return text;
-}
-
-// LaserScan has its ranges as floats. Of all that this float may stand for the
-// one with few digits is meant.
-double RoundRange(double range) {
-  const double round = std::round(range * 1e4) / 1e4;
-  return static_cast<float>(round) == static_cast<float>(range) ? round : range;
-}
 
 // Makes the scans of a log from those of a bag.
 class ScanPlacer {
@@ -72,6 +42,8 @@ class ScanPlacer {
   void Place() {
     SortScans();
     ChooseBase();
+    FindMounts();
+    AgreeOnClock();
     PlaceScans();
     Examine();
   }
@@ -101,17 +73,8 @@ class ScanPlacer {
     }
   }
 
-  // The laser on the robot; whether it is upside down.
-  struct Mount {
-    Pose2 pose = Pose2::Zero();
-    bool is_upside_down = false;
-    bool is_known = false;
-    bool is_tilted = false;
-    bool is_moving = false;
-  };
-
-  Mount MountAt(std::size_t frame, std::int64_t time) const {
-    Mount mount;
+  LaserMount MountAt(std::size_t frame, std::int64_t time) const {
+    LaserMount mount;
     Pose3 pose;
     if (sources_.base.empty() || frames_[frame].empty() ||
         !tree_.LookupAnyWay(sources_.base, frames_[frame], time, &pose)) {
@@ -157,28 +120,81 @@ class ScanPlacer {
     sources_.base = chain[top];
   }
 
-  // The laser on the robot, by frame.
-  std::vector<Mount> FindMounts() {
-    std::vector<Mount> mounts;
+  void FindMounts() {
     bool any_known = false;
     for (std::size_t f = 0; f < frames_.size(); ++f) {
-      Mount mount = MountAt(f, scans_.front().stamp);
+      LaserMount mount = MountAt(f, scans_.front().stamp);
       for (const std::string& name : tree_.ChainOf(frames_[f])) {
         if (name == sources_.base) break;
         mount.is_moving |= tree_.IsMoving(name);
       }
       mount.is_moving &= mount.is_known;
       any_known |= mount.is_known;
-      mounts.push_back(mount);
+      mounts_.push_back(mount);
       NoteMount(mount, frames_[f]);
     }
     if (any_known) messages_->NoteTransformsUsed("place of the laser");
-    return mounts;
+  }
+
+  // Odometry, or the turn rates, by the clock of the scans.
+  void AgreeOnClock() {
+    const std::int64_t difference = sources_.clock_difference;
+    if (difference == 0) return;
+    const bool is_motion = sources_.motion.is_known();
+    const ClockChoice choice = ChooseClock(
+        options_, scans_, [this](const BagScan& scan) { return MountOf(scan); },
+        is_motion ? sources_.motion : MotionOfTurnRates(), difference);
+    if (choice.is_told && choice.difference == 0) return;
+    const auto seconds = [](std::int64_t nanoseconds) {
+      return static_cast<double>(nanoseconds) / kNanoseconds;
+    };
+    char text[200];
+    if (choice.difference == 0) {
+      std::snprintf(text, sizeof text,
+                    " was recorded %.3f s %s after its time stamps than the "
+                    "scans after theirs; they do not tell whether clocks "
+                    "differ, and the time stamps are believed",
+                    std::abs(seconds(difference)),
+                    difference < 0 ? "sooner" : "later");
+    } else {
+      std::snprintf(text, sizeof text,
+                    " is stamped by another clock than the scans: %.3f s are "
+                    "added",
+                    seconds(choice.difference));
+    }
+    log_->notes.push_back(
+        (is_motion ? log_->odometry_source : log_->yaw_rate_source) + text);
+    sources_.motion.MoveBy(choice.difference);
+    for (TimedYawRate& rate : log_->yaw_rates) {
+      rate.timestamp += seconds(choice.difference);
+    }
+  }
+
+  BagMotion MotionOfTurnRates() const {
+    std::vector<BagPose> poses;
+    double before = 0.0;
+    double heading = 0.0;
+    for (const TimedYawRate& rate : log_->yaw_rates) {
+      if (!poses.empty()) heading += rate.rate * (rate.timestamp - before);
+      before = rate.timestamp;
+      BagPose pose;
+      pose.stamp = pose.received = static_cast<std::int64_t>(
+          std::llround(rate.timestamp * kNanoseconds));
+      pose.pose = Pose2(0.0, 0.0, NormalizeAngle(heading));
+      poses.push_back(pose);
+    }
+    BagMotion motion;
+    motion.SetPoses(std::move(poses));
+    return motion;
+  }
+
+  LaserMount MountOf(const BagScan& scan) const {
+    const LaserMount& mount = mounts_[scan.frame];
+    return mount.is_moving ? MountAt(scan.frame, scan.stamp) : mount;
   }
 
   void PlaceScans() {
-    const std::vector<Mount> mounts = FindMounts();
-    period_ = TimeBetweenScans();
+    ScanMaker maker(options_, &sources_.motion, scans_);
     const BagScan* before = nullptr;
     std::vector<float> ranges_before;
     std::int64_t far = 0;
@@ -190,9 +206,7 @@ class ScanPlacer {
         continue;
       }
       before = &raw;
-      Mount mount = mounts[raw.frame];
-      if (mount.is_moving) mount = MountAt(raw.frame, raw.stamp);
-      Scan scan = MakeScan(raw, mount);
+      Scan scan = maker.Make(raw, MountOf(raw), &skips_);
       if (static_cast<double>(sources_.motion.DistanceTo(raw.stamp)) >
           kFarOdometry * kNanoseconds) {
         ++far;
@@ -207,24 +221,11 @@ class ScanPlacer {
           " scans are more than 1 s from the next odometry: they are placed "
           "by what is nearest");
     }
+    impossible_sweeps_ = maker.impossible_sweeps();
+    undone_ = maker.undone();
   }
 
-  // Median, s; 0 where nothing is known.
-  double TimeBetweenScans() const {
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < scans_.size(); ++i) {
-      const auto step =
-          static_cast<double>(scans_[i].stamp - scans_[i - 1].stamp);
-      if (step > 0.0) steps.push_back(step / kNanoseconds);
-    }
-    if (steps.empty()) return 0.0;
-    const auto middle =
-        steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    return *middle;
-  }
-
-  void NoteMount(const Mount& mount, const std::string& frame) {
+  void NoteMount(const LaserMount& mount, const std::string& frame) {
     if (!mount.is_known) {
       log_->notes.push_back(
           "tf does not say where the laser's frame '" + frame + "' is" +
@@ -245,92 +246,6 @@ class ScanPlacer {
                            const std::vector<float>& b) {
     return a.size() == b.size() &&
            std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
-  }
-
-  Scan MakeScan(const BagScan& raw, const Mount& mount) {
-    const LaserScanMessage& message = raw.message;
-    Scan scan;
-    scan.timestamp = SecondsOf(raw.stamp);
-    scan.timestamp_text = SecondsText(raw.stamp);
-    scan.line = raw.position;
-    scan.odometry = sources_.motion.At(raw.stamp);
-    scan.laser_offset = mount.pose;
-    scan.maximum_range =
-        options_.laser_max_range ? *options_.laser_max_range
-        : message.range_max > 0.0 && message.range_max <= kAbsurdMaximumRange
-            ? RoundRange(message.range_max)
-            : kDefaultMaximumRange;
-    const double least =
-        message.range_min > 0.0 && message.range_min < scan.maximum_range
-            ? message.range_min
-            : 0.0;
-    const std::size_t n = message.ranges.size();
-    const std::size_t stride = (n + kMostBeamsUsed - 1) / kMostBeamsUsed;
-    if (stride > 1) {
-      skips_.Add(
-          "beams of a scan of more than 10000: every second, "
-          "third, ... is used",
-          raw.position);
-    }
-    for (std::size_t i = 0; i < n; i += stride) {
-      const float range = message.ranges[i];
-      // Infinite where nothing was near enough, and not a number, compare so.
-      const bool is_return = range > 0.0f &&
-                             range >= static_cast<float>(least) &&
-                             range < scan.maximum_range - kMaximumRangeMargin;
-      scan.ranges.push_back(is_return ? range : 0.0f);
-    }
-    scan.start_angle = message.angle_min;
-    scan.angle_step = message.angle_increment * static_cast<double>(stride);
-    UndoMotion(raw, mount, stride, &scan);
-    // Beams run counterclockwise from here on.
-    if (mount.is_upside_down) {
-      scan.start_angle = -scan.start_angle;
-      scan.angle_step = -scan.angle_step;
-      for (float& bearing : scan.bearings) bearing = -bearing;
-    }
-    if (scan.angle_step < 0.0) {
-      std::reverse(scan.ranges.begin(), scan.ranges.end());
-      std::reverse(scan.bearings.begin(), scan.bearings.end());
-      scan.start_angle +=
-          scan.angle_step * static_cast<double>(scan.ranges.size() - 1);
-      scan.angle_step = -scan.angle_step;
-    }
-    return scan;
-  }
-
-  // A laser that turns with the robot sees each beam from another place: puts
-  // the returns where they are seen from the place of the time stamp, which is
-  // that of the first beam.
-  void UndoMotion(const BagScan& raw, const Mount& mount, std::size_t stride,
-                  Scan* scan) {
-    const double step =
-        raw.message.time_increment * static_cast<double>(stride);
-    const std::size_t n = scan->ranges.size();
-    const double duration = step * static_cast<double>(n - 1);
-    if (!sources_.motion.is_known() || !(std::abs(duration) > 0.0)) return;
-    if (!(std::abs(duration) <= kLongestScan) ||
-        (period_ > 0.0 && std::abs(duration) > kLongestSweep * period_)) {
-      ++impossible_sweeps_;
-      return;
-    }
-    // Of the laser, seen from where it was at first, evenly in time.
-    std::vector<Pose2> places;
-    // Upside down, the laser sees the robot's motion mirrored.
-    const double side = mount.is_upside_down ? -1.0 : 1.0;
-    for (int k = 0; k <= kSweepSamples; ++k) {
-      const auto time =
-          raw.stamp + static_cast<std::int64_t>(std::llround(
-                          duration * kNanoseconds * k / kSweepSamples));
-      Pose2 place =
-          Compose(Inverse(mount.pose),
-                  Compose(Between(scan->odometry, sources_.motion.At(time)),
-                          mount.pose));
-      place[1] *= side;
-      place[2] *= side;
-      places.push_back(place);
-    }
-    if (UndoSweep(places, scan)) ++undone_;
   }
 
   void Examine() {
@@ -376,7 +291,8 @@ class ScanPlacer {
   SkipCounter skips_;
   std::int64_t undone_ = 0;
   std::int64_t impossible_sweeps_ = 0;
-  double period_ = 0.0;
+  // By frame.
+  std::vector<LaserMount> mounts_;
 };
 
 void AppendReports(const std::vector<SkipReport>& reports, Log* log) {

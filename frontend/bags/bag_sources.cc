@@ -198,7 +198,7 @@ class SourceChooser {
     }
   }
 
-  // Which clock counts, and how the other sources' differ.
+  // Which times count, and by how much the other sources' may differ.
   void UseClock() {
     std::int64_t delay = 0;
     const bool is_stamped = DelayOf(messages_->scans, &delay);
@@ -227,19 +227,7 @@ class SourceChooser {
           kClockDifference * kNanoseconds) {
         return;
       }
-      for (auto& message : *messages) {
-        // Of damaged messages the sum may be too large.
-        if (__builtin_add_overflow(message.stamp, difference, &message.stamp)) {
-          message.stamp = message.received;
-        }
-        message.stamp = std::clamp(message.stamp, -kMostTime, kMostTime);
-      }
-      char text[160];
-      std::snprintf(text, sizeof text,
-                    "is stamped by another clock than the scans: %.3f s are "
-                    "added",
-                    static_cast<double>(difference) / kNanoseconds);
-      log_->notes.push_back(topic + " " + text);
+      sources_.clock_difference = difference;
     };
     if (odometry_ != nullptr) {
       align(odometry_->seen.name, &odometry_->poses);
@@ -299,6 +287,17 @@ void BagMotion::SetPoses(std::vector<BagPose> poses) {
   std::stable_sort(
       poses_.begin(), poses_.end(),
       [](const BagPose& a, const BagPose& b) { return a.stamp < b.stamp; });
+}
+
+void BagMotion::MoveBy(std::int64_t difference) {
+  for (BagPose& pose : poses_) {
+    // Of damaged messages the sum may be too large.
+    if (__builtin_add_overflow(pose.stamp, difference, &pose.stamp)) {
+      pose.stamp = pose.received;
+    }
+    pose.stamp = std::clamp(pose.stamp, -kMostTime, kMostTime);
+  }
+  SetPoses(std::move(poses_));
 }
 
 Pose2 BagMotion::At(std::int64_t time) const {

@@ -19,6 +19,10 @@ class BagMotion {
   /// Poses of a topic or a transform, in any order.
   void SetPoses(std::vector<BagPose> poses);
 
+  /// Adds a time, ns, to those of all poses. What has no such time is taken as
+  /// it was recorded.
+  void MoveBy(std::int64_t difference);
+
   /// Whether there is any odometry.
   bool is_known() const { return !poses_.empty(); }
 
@@ -40,14 +44,18 @@ struct BagSources {
   /// Name of the robot's own frame, as odometry has it; may be empty.
   std::string base;
   BagMotion motion;
+  /// By how much longer odometry, or the turn rates, took from the time stamp
+  /// to being recorded than the scans did, ns, where that is more than half a
+  /// second: the clocks may differ by that, or the scans were only late.
+  std::int64_t clock_difference = 0;
 };
 
 /// Chooses the topics or transforms that scans, odometry and turn rates come
-/// from (frontend/bags.md), and brings their times to the scans' clock. Notes
-/// the choice in the figures of the topics and in the log; moves poses and turn
-/// rates out of `messages`, which must outlive the result. Throws Error, with a
-/// list of what is there, when there is no scan, or more than one topic that
-/// could be meant and no option says which.
+/// from (frontend/bags.md), with times of recording where there is no time
+/// stamp. Notes the choice in the figures of the topics and in the log; moves
+/// poses and turn rates out of `messages`, which must outlive the result.
+/// Throws Error, with a list of what is there, when there is no scan, or more
+/// than one topic that could be meant and no option says which.
 BagSources ChooseBagSources(const std::string& name,
                             const LaserOptions& options, BagMessages* messages,
                             Log* log);

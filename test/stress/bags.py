@@ -128,14 +128,14 @@ def cast(walls, circles, x, y, dx, dy):
     return nearest
 
 
-def drift(poses, noise):
-    """Odometry: 2 % too far, 3 % too much turn, and noise."""
+def drift(poses, noise, wheel):
+    """Odometry: 2 % too far or as `wheel` has it, 3 % too much turn, and noise."""
     odometry = np.zeros_like(poses)
     odometry[0] = 3.0, -2.0, 1.0
     for i in range(1, len(poses)):
         step = poses[i] - poses[i - 1]
         cos, sin = np.cos(poses[i - 1, 2]), np.sin(poses[i - 1, 2])
-        ahead = 1.02 * (cos * step[0] + sin * step[1])
+        ahead = wheel * (cos * step[0] + sin * step[1])
         aside = -sin * step[0] + cos * step[1]
         turn = 1.03 * step[2] + 0.002 * ahead
         turn += 0.006 * noise.normal() * np.sqrt(abs(ahead) + abs(step[2]))
@@ -163,6 +163,10 @@ def parse():
     parser.add_argument("--beams", type=int, default=360)
     parser.add_argument("--start", type=float, default=0.0, help="degrees")
     parser.add_argument("--clockwise", action="store_true")
+    parser.add_argument("--view", type=float, default=360.0,
+                        help="angle that beams are spread over, degrees")
+    parser.add_argument("--range_max", type=float,
+                        help="that messages state, m; by default the reach")
     parser.add_argument("--reach", type=float, default=12.0, help="m")
     parser.add_argument("--noise", type=float, default=0.01, help="m")
     parser.add_argument("--strays", type=float, default=0.0,
@@ -189,6 +193,10 @@ def parse():
     parser.add_argument("--two_lasers", action="store_true")
     parser.add_argument("--clock", type=float, default=0.0,
                         help="by how much odometry's clock is ahead, s")
+    parser.add_argument("--scan_delay", type=float, default=0.0,
+                        help="by how much scans are recorded late, s")
+    parser.add_argument("--recorder_clock", type=float, default=0.0,
+                        help="by how much the recorder's clock is ahead, s")
     parser.add_argument("--clock_jump", type=float, default=0.0,
                         help="by how much all clocks jump half way, s")
     parser.add_argument("--odometry_until", type=float, default=1.0,
@@ -196,6 +204,10 @@ def parse():
     parser.add_argument("--odometry_from", type=float, default=0.0,
                         help="share of the drive before which there is none")
     parser.add_argument("--odometry_rate", type=float, default=30.0, help="Hz")
+    parser.add_argument("--wheel", type=float, default=1.02,
+                        help="metres that odometry has for one")
+    parser.add_argument("--bits", type=float, default=0.0,
+                        help="share of scans of which two beams are left")
     parser.add_argument("--nan_odometry", type=float, default=0.0,
                         help="share of odometry whose quaternion is no number")
     parser.add_argument("--odometry_reset", type=float, default=1.0,
@@ -241,7 +253,7 @@ def main():
         return EPOCH + time + (options.clock_jump if time > end / 2 else 0.0)
 
     STAMP = (lambda time: 0.0) if options.zero_stamps else clock
-    RECORDED = clock
+    RECORDED = lambda time: clock(time) + options.recorder_clock
 
     def poses_at(times):
         return np.stack([np.interp(times, drive[:, 0], drive[:, i])
@@ -250,7 +262,7 @@ def main():
     bag = Bag()
     period = 1.0 / options.rate
     beams = options.beams
-    step = 2.0 * np.pi / beams * (-1 if options.clockwise else 1)
+    step = np.radians(options.view) / beams * (-1 if options.clockwise else 1)
     start, yaw = np.radians(options.start), np.radians(options.yaw)
     per_beam = options.sweep * period * 0.999 / beams
     side = -1 if options.upside_down else 1
@@ -276,11 +288,15 @@ def main():
         number = round((time - 0.5) / period)
         stuck = number % options.stuck_stamps * period
         message = Cdr().header(time - stuck, frame)
-        message.put("f", start, start + step * (beams - 1), step,
+        if options.bits > noise_of_order.random():
+            ranges = ranges[:2]
+        count = len(ranges)
+        message.put("f", start, start + step * (count - 1), step,
                     per_beam if options.time_increment else 0.0, period, 0.15,
-                    options.reach)
-        message.put("I", beams).numbers("f", ranges).put("I", 0)
-        late = period + 0.01
+                    options.reach if options.range_max is None
+                    else options.range_max)
+        message.put("I", count).numbers("f", ranges).put("I", 0)
+        late = period + 0.01 + options.scan_delay
         if options.out_of_order > noise_of_order.random():
             late += 1.5 * period
         kind = "PointCloud2" if options.point_cloud else "LaserScan"
@@ -293,7 +309,7 @@ def main():
         time = 0.5
         while time < end - 1.0:
             x, y, heading = poses_at(time)
-            stamp = (RECORDED(time + period + 0.01)
+            stamp = (RECORDED(time + period + 0.01 + options.scan_delay)
                      if options.zero_stamps else clock(time))
             reference.write(f"{stamp:.9f} {x:.6f} {y:.6f} 0 0 0 "
                             f"{np.sin(heading / 2):.9f} "
@@ -306,7 +322,7 @@ def main():
 
     times = np.arange(0.0, end, 1.0 / options.odometry_rate)
     true = poses_at(times)
-    odometry = drift(true, noise)
+    odometry = drift(true, noise, options.wheel)
     after = times > options.odometry_reset * end
     if after.any():
         first = odometry[after][0]

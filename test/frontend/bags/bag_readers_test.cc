@@ -568,6 +568,88 @@ TEST(BagLogTest, ClocksThatDifferAreAligned) {
   EXPECT_THAT(log.notes, Contains(HasSubstr("another clock")));
 }
 
+// A robot in an office, a scan a second.
+const Simulation& SlowDrive() {
+  static const Simulation* const simulation = [] {
+    SimulatorOptions options;
+    options.laser = Laser();
+    options.drive.scan_rate = 1.0;
+    options.progress = [](double share) { return share < 0.3; };
+    return new Simulation(Simulate(MakeWorld("office", 3, 0.5), options, 3));
+  }();
+  return *simulation;
+}
+
+// Records the scans of a slow drive `late` ns after their time stamps, and
+// stamps odometry by a clock that is `ahead` ns ahead.
+Log ReadSlowDrive(std::int64_t late, std::int64_t ahead,
+                  bool has_returns = true) {
+  std::vector<BagRecord> records =
+      SimulatedMessages(SlowDrive(), Laser(), kRos1);
+  std::string why;
+  for (BagRecord& record : records) {
+    if (record.topic == "/scan") {
+      record.time += late;
+      if (has_returns) continue;
+      LaserScanMessage scan;
+      EXPECT_TRUE(DecodeLaserScan(record.data, kRos1, &scan, &why)) << why;
+      for (float& range : scan.ranges) range = 0.0f;
+      record.data = EncodeLaserScan(scan, kRos1);
+    } else if (record.topic == "/odom") {
+      OdometryMessage odometry;
+      EXPECT_TRUE(DecodeOdometry(record.data, kRos1, &odometry, &why)) << why;
+      odometry.header.stamp += ahead;
+      record.data = EncodeOdometry(odometry, kRos1);
+    }
+  }
+  return ReadBytes(MakeRosbag1(records));
+}
+
+// The laser of a slow robot takes a second to a scan, which is recorded in the
+// end: its time stamps are right nevertheless, as the scans themselves say.
+TEST(BagLogTest, ScansThatAreRecordedLateKeepTheirTimes) {
+  const Log right = ReadSlowDrive(0, 0);
+  ASSERT_GT(right.scans.size(), 30u);
+  for (const std::int64_t late :
+       {kSecond + kSecond / 100, 2 * kSecond, -2 * kSecond}) {
+    SCOPED_TRACE(late);
+    const Log log = ReadSlowDrive(late, 0);
+    ASSERT_EQ(log.scans.size(), right.scans.size());
+    for (std::size_t i = 0; i < log.scans.size(); ++i) {
+      ASSERT_EQ(log.scans[i].odometry, right.scans[i].odometry) << i;
+    }
+    EXPECT_THAT(log.notes, Not(Contains(HasSubstr("clock"))));
+  }
+}
+
+// Scans say better than times of recording by how much clocks differ.
+TEST(BagLogTest, ScansTellByHowMuchClocksDiffer) {
+  const Log right = ReadSlowDrive(0, 0);
+  for (const std::int64_t ahead : {3 * kSecond, -100 * kSecond}) {
+    SCOPED_TRACE(ahead);
+    const Log log = ReadSlowDrive(kSecond, ahead);
+    ASSERT_EQ(log.scans.size(), right.scans.size());
+    EXPECT_THAT(log.notes, Contains(HasSubstr("another clock")));
+    double most = 0.0;
+    for (std::size_t i = 0; i < log.scans.size(); ++i) {
+      most = std::max(
+          most,
+          (log.scans[i].odometry - right.scans[i].odometry).head<2>().norm());
+    }
+    EXPECT_LT(most, 0.05);
+  }
+}
+
+// What cannot be told is said; time stamps that overlap are believed.
+TEST(BagLogTest, ClocksThatNothingTellsApartAreLeft) {
+  const Log right = ReadSlowDrive(0, 0);
+  const Log log = ReadSlowDrive(2 * kSecond, 0, false);
+  ASSERT_EQ(log.scans.size(), right.scans.size());
+  EXPECT_EQ(log.scans[20].odometry, right.scans[20].odometry);
+  EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("2.000 s sooner"),
+                                        HasSubstr("believed"))));
+}
+
 TEST(BagLogTest, YawRatesServeWhereThereIsNoOdometry) {
   std::vector<BagRecord> records;
   for (int i = 0; i < 5; ++i) {

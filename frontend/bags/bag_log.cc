@@ -21,6 +21,9 @@ constexpr double kNanoseconds = 1e9;  // in a second
 // Who sets a clock back by more means it.
 constexpr double kOrderSeconds = 1.0;
 constexpr std::size_t kOrderScans = 100;
+// Odometry is left out where the time stamps of more than this share of the
+// scans came twice.
+constexpr double kMostTwice = 0.1;
 // Odometry farther from a scan than this, s, is worth a word.
 constexpr double kFarOdometry = 1.0;
 // cos of the angle by which a laser's plane may be out of level.
@@ -43,6 +46,7 @@ class ScanPlacer {
     SortScans();
     ChooseBase();
     FindMounts();
+    LeaveAmbiguousOdometry();
     AgreeOnClock();
     PlaceScans();
     Examine();
@@ -134,6 +138,50 @@ class ScanPlacer {
       NoteMount(mount, frames_[f]);
     }
     if (any_known) messages_->NoteTransformsUsed("place of the laser");
+  }
+
+  // A clock that is set back in the middle of the log goes through the same
+  // times twice, and which odometry belongs to which scan is lost.
+  void LeaveAmbiguousOdometry() {
+    if (!sources_.motion.is_known() && log_->yaw_rates.empty()) return;
+    const std::size_t twice = ScansOfTimesThatCameTwice();
+    if (twice == 0) return;
+    std::string note = "the clock was set back: the time stamps of " +
+                       std::to_string(twice) + " of " +
+                       std::to_string(scans_.size()) + " scans came twice";
+    if (static_cast<double>(twice) <=
+        kMostTwice * static_cast<double>(scans_.size())) {
+      log_->notes.push_back(note + ", and their odometry may be another's");
+      return;
+    }
+    log_->notes.push_back(note +
+                          ": odometry is not used, since it may be another's");
+    sources_.motion = BagMotion();
+    sources_.clock_difference = 0;
+    log_->yaw_rates.clear();
+    log_->yaw_rate_source.clear();
+    log_->odometry_source.clear();
+  }
+
+  std::size_t ScansOfTimesThatCameTwice() const {
+    // From one setting back to the next, ns.
+    std::vector<std::pair<std::int64_t, std::int64_t>> spans;
+    for (std::size_t i = 0; i < scans_.size(); ++i) {
+      const std::int64_t stamp = scans_[i].stamp;
+      if (i == 0 || static_cast<double>(scans_[i - 1].stamp - stamp) >
+                        kOrderSeconds * kNanoseconds) {
+        spans.emplace_back(stamp, stamp);
+      }
+      spans.back().first = std::min(spans.back().first, stamp);
+      spans.back().second = std::max(spans.back().second, stamp);
+    }
+    if (spans.size() == 1) return 0;
+    return static_cast<std::size_t>(
+        std::count_if(scans_.begin(), scans_.end(), [&](const BagScan& scan) {
+          return std::count_if(spans.begin(), spans.end(), [&](const auto& s) {
+                   return s.first <= scan.stamp && scan.stamp <= s.second;
+                 }) > 1;
+        }));
   }
 
   // Odometry, or the turn rates, by the clock of the scans.

@@ -65,12 +65,14 @@ class Bag:
 
     def add(self, time, topic, kind, message):
         index = self.topics.setdefault(topic, (len(self.topics) + 1, kind))[0]
-        self.messages.append((round(RECORDED(time) * 1e9), index,
+        self.messages.append((time, round(RECORDED(time) * 1e9), index,
                               bytes(message.data)))
 
     def write(self, folder, files):
         os.makedirs(folder, exist_ok=True)
+        # As they arrive, whatever the recorder's clock says.
         self.messages.sort(key=lambda message: message[0])
+        self.messages = [message[1:] for message in self.messages]
         names = [f"bag_{i}.db3" for i in range(files)]
         for i, name in enumerate(names):
             cut = [len(self.messages) * k // files for k in (i, i + 1)]

@@ -640,6 +640,34 @@ TEST(BagLogTest, ScansTellByHowMuchClocksDiffer) {
   }
 }
 
+// A clock that is set back goes through the same times twice: odometry of the
+// two is not mixed up.
+TEST(BagLogTest, OdometryOfTimesThatCameTwiceIsNotUsed) {
+  const auto read = [](int jump_at, std::int64_t back) {
+    std::vector<BagRecord> records;
+    for (int i = 0; i < 100; ++i) {
+      const std::int64_t time =
+          kBagStart + i * kSecond / 10 - (i < jump_at ? 0 : back);
+      records.push_back(OdometryRecord(time, Pose2(0.1 * i, 0.0, 0.0), kRos1));
+      records.push_back(Record(PlainScan(time), kRos1));
+    }
+    return ReadBytes(MakeRosbag1(records));
+  };
+  Log log = read(50, 3 * kSecond);
+  EXPECT_EQ(log.scans.size(), 100u);
+  EXPECT_FALSE(log.has_odometry);
+  EXPECT_EQ(log.odometry_source, "");
+  EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("clock was set back"),
+                                        HasSubstr("not used"))));
+  // Few of them, and times that came once.
+  log = read(97, 2 * kSecond);
+  EXPECT_TRUE(log.has_odometry);
+  EXPECT_THAT(log.notes, Contains(HasSubstr("clock was set back")));
+  log = read(50, 500 * kSecond);
+  EXPECT_NEAR(log.scans[70].odometry[0], 7.0, 1e-9);
+  EXPECT_THAT(log.notes, Not(Contains(HasSubstr("clock was set back"))));
+}
+
 // What cannot be told is said; time stamps that overlap are believed.
 TEST(BagLogTest, ClocksThatNothingTellsApartAreLeft) {
   const Log right = ReadSlowDrive(0, 0);

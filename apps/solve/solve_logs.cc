@@ -85,6 +85,34 @@ std::vector<Summary::LogInput> DescribeLogs(
   return logs;
 }
 
+// Parts of one recording, given one by one, lack what only the first of them
+// has, as the place of the laser: a log that begins within this, s, of another
+// one's end, by the same topics, looks like one.
+constexpr double kGapOfParts = 2.0;
+
+// A word where a bag seems to go on with another one.
+void TellParts(const std::vector<std::unique_ptr<OpenInput>>& inputs,
+               const std::vector<Log>& logs, Summary* summary) {
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    for (std::size_t j = 0; j < logs.size(); ++j) {
+      if (i == j || logs[i].position_unit != "message" ||
+          logs[i].scan_message != logs[j].scan_message ||
+          logs[i].odometry_source != logs[j].odometry_source) {
+        continue;
+      }
+      const double gap =
+          logs[j].scans.front().timestamp - logs[i].scans.back().timestamp;
+      if (!(gap >= 0.0 && gap <= kGapOfParts)) continue;
+      const std::string note =
+          "begins where " + inputs[i]->log.name +
+          " ends: parts of one recording are better given together, as the "
+          "folder that holds them";
+      Remark("%s: %s", inputs[j]->log.name.c_str(), note.c_str());
+      summary->notes.push_back(TitleOf(inputs[j]->log.name) + ": " + note);
+    }
+  }
+}
+
 // Reads all logs; each has odometry in the end.
 std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
                           const LogSolverOptions& options, RunClock* clock,
@@ -102,6 +130,7 @@ std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
     AddNotes(TitleOf(name), of_log, summary);
     logs.push_back(std::move(log));
   }
+  TellParts(inputs, logs, summary);
   return logs;
 }
 

@@ -3,6 +3,7 @@
 #include <plumbline/core/text_file.h>
 #include <plumbline/frontend/bags/chunk_unpacker.h>
 #include <plumbline/frontend/bags/mcap.h>
+#include <plumbline/frontend/bags/rosbag1.h>
 #include <plumbline/frontend/bags/rosbag2.h>
 #include <sqlite3.h>
 #include <unistd.h>
@@ -13,6 +14,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <sstream>
 #include <utility>
@@ -267,6 +269,9 @@ bool IsBagFile(const std::string& name) {
          EndsWith(name, ".db3.zstd") || EndsWith(name, ".mcap.zstd");
 }
 
+// A bag of ROS 1, as its recorder names it.
+bool IsRosbag1File(const std::string& name) { return EndsWith(name, ".bag"); }
+
 // bag_2.db3 before bag_10.db3.
 bool NumbersInOrder(const std::string& a, const std::string& b) {
   std::size_t i = 0;
@@ -357,23 +362,66 @@ Metadata ParseMetadata(const std::string& text) {
   return metadata;
 }
 
-std::vector<std::string> BagFilesIn(const std::string& folder) {
+std::vector<std::string> FilesIn(
+    const std::string& folder,
+    const std::function<bool(const std::string&)>& is_one) {
   std::vector<std::string> names;
   std::error_code error;
   for (fs::directory_iterator i(folder, error), end; !error && i != end;
        i.increment(error)) {
     const std::string name = i->path().filename().string();
-    if (IsBagFile(name)) names.push_back(name);
+    if (is_one(name)) names.push_back(name);
   }
   std::sort(names.begin(), names.end(), NumbersInOrder);
   return names;
+}
+
+// The number behind the last underscore, as in drive_0.bag and
+// drive_2024-05-01-10-20-30_1.bag; -1 when there is none.
+int PartNumber(const std::string& name) {
+  const std::size_t end = name.rfind('.');
+  const std::size_t begin = name.rfind('_', end);
+  if (begin == std::string::npos) return -1;
+  int number = -1;
+  const char* const last = name.data() + end;
+  const auto [stop, failure] =
+      std::from_chars(name.data() + begin + 1, last, number);
+  return failure == std::errc() && stop == last ? number : -1;
+}
+
+// The bags of ROS 1 in a folder that one recording was split into. Throws Error
+// when they are anything else: drives that have nothing to do with each other
+// are not one log.
+std::vector<std::string> PartsOfRosbag1In(const std::string& folder) {
+  std::vector<std::string> names = FilesIn(folder, IsRosbag1File);
+  std::stable_sort(names.begin(), names.end(),
+                   [](const std::string& a, const std::string& b) {
+                     return PartNumber(a) < PartNumber(b);
+                   });
+  for (std::size_t i = 0; names.size() > 1 && i < names.size(); ++i) {
+    if (PartNumber(names[i]) == static_cast<int>(i)) continue;
+    throw Error(folder, 0,
+                "holds ROS 1 bags that are not, by their names, the parts of "
+                "one recording",
+                "the parts and nothing else, ..._0.bag, ..._1.bag and so on; "
+                "or bags of several drives one by one, with commas between");
+  }
+  return names;
+}
+
+bool IsRosbag2(const std::string& folder) {
+  std::error_code error;
+  return fs::exists(fs::path(folder) / "metadata.yaml", error) ||
+         !FilesIn(folder, IsBagFile).empty();
 }
 
 class Rosbag2Folder : public BagSource {
  public:
   Rosbag2Folder(const std::string& path, std::function<bool()> stop,
                 std::function<void(std::int64_t, std::int64_t)> progress)
-      : BagSource("ROS 2 bag (folder)"),
+      : BagSource(FilesIn(path, IsRosbag1File).empty() || IsRosbag2(path)
+                      ? "ROS 2 bag (folder)"
+                      : "ROS 1 bag (folder)"),
         folder_(path),
         stop_(std::move(stop)),
         progress_(std::move(progress)) {
@@ -397,10 +445,12 @@ class Rosbag2Folder : public BagSource {
         Skip(
             "metadata.yaml that names no files: those that are there are read");
       }
-    } else {
+    } else if (IsRosbag2(path)) {
       Skip("metadata.yaml that is not there: the files are read by name");
+    } else {
+      files_ = PartsOfRosbag1In(path);
     }
-    if (files_.empty()) files_ = BagFilesIn(path);
+    if (files_.empty()) files_ = FilesIn(path, IsBagFile);
     for (const std::string& file : files_) {
       const auto size = fs::file_size(PathOf(file), error);
       if (!error) size_ += static_cast<std::int64_t>(size);
@@ -411,7 +461,8 @@ class Rosbag2Folder : public BagSource {
                   first_error_.empty()
                       ? std::string("holds no bag")
                       : "no file of it can be read: " + first_error_,
-                  "a ROS 2 bag: metadata.yaml and .db3 or .mcap files");
+                  "a ROS 2 bag: metadata.yaml and .db3 or .mcap files; or the "
+                  ".bag files that a ROS 1 bag was split into");
     }
   }
 
@@ -491,6 +542,8 @@ class Rosbag2Folder : public BagSource {
           source_ = OpenRosbag2Sqlite(input_.get());
         } else if (LooksLikeMcap(prefix)) {
           source_ = OpenMcap(input_.get());
+        } else if (LooksLikeRosbag1(prefix) && IsRosbag1File(path)) {
+          source_ = OpenRosbag1(input_.get());
         } else {
           throw Error(path, 0, "is neither an SQLite database nor MCAP",
                       "a file of a ROS 2 bag");
@@ -543,8 +596,7 @@ std::unique_ptr<BagSource> OpenRosbag2Sqlite(InputStream* input) {
 bool LooksLikeRosbag2Folder(const std::string& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) return false;
-  return fs::exists(fs::path(path) / "metadata.yaml", error) ||
-         !BagFilesIn(path).empty();
+  return IsRosbag2(path) || !FilesIn(path, IsRosbag1File).empty();
 }
 
 std::unique_ptr<BagSource> OpenRosbag2Folder(

@@ -23,11 +23,14 @@ bool LooksLikeSqlite(std::string_view prefix);
 std::unique_ptr<BagSource> OpenRosbag2Sqlite(InputStream* input);
 
 /// Whether the folder `path` is a ROS 2 bag: has a metadata.yaml, or files
-/// that end in .db3 or .mcap (or these and .zstd).
+/// that end in .db3 or .mcap (or these and .zstd). Or holds bags of ROS 1,
+/// files that end in .bag.
 bool LooksLikeRosbag2Folder(const std::string& path);
 
 /// The messages of a ROS 2 bag: the files that metadata.yaml names, one after
 /// another, or without one all that are there in the order of their names.
+/// Or those of a folder of ROS 1 bags, which have to be the parts of one
+/// recording by their names (..._0.bag, ..._1.bag and so on).
 /// `stop` and `progress` (may be empty) are those of InputStream, the latter
 /// over all files. Throws Error when there is none, or none can be read.
 std::unique_ptr<BagSource> OpenRosbag2Folder(

@@ -1,7 +1,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <plumbline/apps/evaluation/relations.h>
+#include <plumbline/apps/simulation/bag_writer.h>
+#include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/synthetic_worlds.h>
+#include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/core/sha256.h>
@@ -935,6 +938,29 @@ TEST_F(SolveTest, ALiveReportChangesNothing) {
       Solve(log, "out", "--live_dir=" + (folder_ / "out/.").string(), &output),
       2);
   EXPECT_THAT(output, HasSubstr("is the folder of --output_dir"));
+}
+
+// The parts of one recording, one by one: a part lacks what another one has.
+TEST_F(SolveTest, PartsOfOneBagAreSaid) {
+  const LaserModel laser;
+  SimulatorOptions options;
+  options.progress = [](double share) { return share < 0.1; };
+  const std::vector<BagRecord> records =
+      SimulatedMessages(Simulate(MakeWorld("office", 3, 0.5), options, 3),
+                        laser, MessageEncoding::kRos1);
+  const auto middle =
+      records.begin() + static_cast<std::ptrdiff_t>(records.size() / 2);
+  const std::string first =
+      Write("d_0.bag", MakeRosbag1({records.begin(), middle}));
+  const std::string second =
+      Write("d_1.bag", MakeRosbag1({middle, records.end()}));
+  std::string output;
+  ASSERT_EQ(
+      Solve(second + "," + first, "parts", "--outputs=trajectory.tum", &output),
+      0)
+      << output;
+  EXPECT_THAT(output, HasSubstr(second + ": begins where " + first + " ends"));
+  EXPECT_THAT(output, Not(HasSubstr(first + ": begins where")));
 }
 
 // Said, since a reader of the command would think otherwise.

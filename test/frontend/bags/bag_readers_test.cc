@@ -640,6 +640,50 @@ TEST(BagLogTest, ScansTellByHowMuchClocksDiffer) {
   }
 }
 
+// rosbag record --split; where tf_static and the like came once.
+TEST(BagLogTest, FolderOfTheRos1BagsThatOneWasSplitInto) {
+  const std::vector<BagRecord> records =
+      SimulatedMessages(Drive(), Laser(), kRos1);
+  const Log whole = ReadBytes(MakeRosbag1(records));
+  ASSERT_FALSE(whole.scans.empty());
+  const Folder folder;
+  const auto split = [&](const std::vector<std::string>& names) {
+    const std::string path = folder / names[0];
+    fs::create_directory(path);
+    const std::size_t n = names.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto at = [&](std::size_t part) {
+        return records.begin() +
+               static_cast<std::ptrdiff_t>(records.size() * part / n);
+      };
+      WriteText(path + "/" + names[i], MakeRosbag1({at(i), at(i + 1)}));
+    }
+    return path;
+  };
+  for (const std::string& path :
+       {split({"d_10-59_0.bag", "d_11-10_1.bag", "d_01-30_2.bag"}),
+        split({"drive.bag"})}) {
+    SCOPED_TRACE(path);
+    const Log log = ReadPath(path);
+    EXPECT_EQ(log.format, "ROS 1 bag (folder)");
+    EXPECT_THAT(log.skipped, IsEmpty());
+    ASSERT_EQ(log.scans.size(), whole.scans.size());
+    EXPECT_EQ(log.scans.back().odometry, whole.scans.back().odometry);
+    EXPECT_EQ(log.scans.back().laser_offset, whole.scans.back().laser_offset);
+  }
+  // Drives of their own, and parts of which one lacks.
+  for (const std::string& path :
+       {split({"monday.bag", "tuesday.bag"}), split({"e_0.bag", "e_2.bag"})}) {
+    SCOPED_TRACE(path);
+    try {
+      ReadPath(path);
+      ADD_FAILURE() << "not refused";
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("parts of one recording"));
+    }
+  }
+}
+
 // A clock that is set back goes through the same times twice: odometry of the
 // two is not mixed up.
 TEST(BagLogTest, OdometryOfTimesThatCameTwiceIsNotUsed) {

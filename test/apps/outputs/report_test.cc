@@ -742,6 +742,26 @@ TEST_F(ReportInBrowserTest, Rooms) {
   EXPECT_THAT(browser_->complaints(), IsEmpty());
 }
 
+// What the robot saw beyond the last wall of the map is to be seen, too.
+TEST_F(ReportInBrowserTest, RoomsBeyondTheWallsAreInView) {
+  MakeCorridor(3);
+  Report report = MakeReport();
+  BuildingPlan plan = TwoRooms();
+  double top = 0.0;
+  for (Eigen::Vector2d& corner : plan.rooms[1].outline.shell) {
+    corner.y() += 25.0;
+    top = std::max(top, corner.y());
+  }
+  report.building = &plan;
+  Open(report);
+  EXPECT_LT((top - browser_->Evaluate("plumbline.view.y").get<double>()) *
+                browser_->Evaluate("plumbline.view.scale").get<double>(),
+            browser_->Evaluate("document.getElementById('map').clientHeight")
+                    .get<double>() /
+                2.0);
+  EXPECT_THAT(browser_->complaints(), IsEmpty());
+}
+
 TEST_F(ReportInBrowserTest, NothingToShow) {
   Open(MakeReport());
   EXPECT_THAT(browser_->complaints(), IsEmpty());

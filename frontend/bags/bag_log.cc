@@ -223,12 +223,15 @@ class ScanPlacer {
     double before = 0.0;
     double heading = 0.0;
     for (const TimedYawRate& rate : log_->yaw_rates) {
-      if (!poses.empty()) heading += rate.rate * (rate.timestamp - before);
+      const double turn = rate.rate * (rate.timestamp - before);
+      if (!poses.empty() && std::isfinite(turn)) {
+        heading = NormalizeAngle(heading + turn);
+      }
       before = rate.timestamp;
       BagPose pose;
       pose.stamp = pose.received = static_cast<std::int64_t>(
           std::llround(rate.timestamp * kNanoseconds));
-      pose.pose = Pose2(0.0, 0.0, NormalizeAngle(heading));
+      pose.pose = Pose2(0.0, 0.0, heading);
       poses.push_back(pose);
     }
     BagMotion motion;

@@ -72,6 +72,8 @@ class PolarView {
 
  private:
   static int Cell(double angle) {
+    // Of absurd odometry.
+    if (!std::isfinite(angle)) return 0;
     const int cell = static_cast<int>(
         std::floor((NormalizeAngle(angle) + kPi) / (2.0 * kPi) * kDirections));
     return std::clamp(cell, 0, kDirections - 1);
@@ -91,6 +93,10 @@ class ClockSearch {
         motion_(motion) {}
 
   ClockChoice Choose(std::int64_t difference) {
+    // Of damaged stamps: times moved by more do not fit their type.
+    if (difference > kMostTime || difference < -kMostTime) {
+      return {OverlapsAsStamped() ? 0 : difference, false};
+    }
     ChoosePairs(difference);
     const std::vector<double> as_stamped = SharesAt(0);
     std::vector<double> moved = SharesAt(difference);

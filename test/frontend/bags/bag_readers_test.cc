@@ -5,6 +5,7 @@
 #include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/bags/bag_log.h>
+#include <plumbline/frontend/bags/bag_messages.h>
 #include <plumbline/frontend/bags/mcap.h>
 #include <plumbline/frontend/bags/rosbag1.h>
 #include <plumbline/frontend/bags/rosbag2.h>
@@ -637,6 +638,30 @@ TEST(BagLogTest, ScansTellByHowMuchClocksDiffer) {
           (log.scans[i].odometry - right.scans[i].odometry).head<2>().norm());
     }
     EXPECT_LT(most, 0.05);
+  }
+}
+
+// Stamps and poses of damaged messages, as far apart as they can be.
+TEST(BagLogTest, AbsurdClocksAndPosesAreSurvived) {
+  for (const std::int64_t received : {std::int64_t{0}, kMostTime}) {
+    for (const double place : {0.0, 1e300}) {
+      std::vector<BagRecord> records;
+      for (int i = 0; i < 60; ++i) {
+        const std::int64_t time = kBagStart + i * kSecond / 2;
+        LaserScanMessage scan = PlainScan(time);
+        scan.ranges.assign(200, 3.0f);
+        scan.angle_increment = 0.01;
+        records.push_back(Record(scan, kRos1));
+        records.push_back(OdometryRecord(
+            time, Pose2(i % 2 == 0 ? place : -place, i, 0.3 * i), kRos1));
+        records.back().time = received;
+      }
+      const Log log = ReadBytes(MakeRosbag1(records));
+      EXPECT_EQ(log.scans.size(), 60u);
+      for (const Scan& scan : log.scans) {
+        EXPECT_TRUE(scan.odometry.allFinite());
+      }
+    }
   }
 }
 

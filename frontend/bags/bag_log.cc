@@ -241,7 +241,8 @@ class ScanPlacer {
 
   LaserMount MountOf(const BagScan& scan) const {
     const LaserMount& mount = mounts_[scan.frame];
-    return mount.is_moving ? MountAt(scan.frame, scan.stamp) : mount;
+    return mount.is_moving ? MountAt(scan.frame, scan.stamp - scan.set_back)
+                           : mount;
   }
 
   void PlaceScans() {

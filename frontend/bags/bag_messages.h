@@ -37,6 +37,9 @@ struct BagScan {
   std::int64_t stamp = 0;
   /// Time at which it was recorded.
   std::int64_t received = 0;
+  /// By how much `stamp` is ahead of what the sender wrote, ns: the clock was
+  /// set back by that before, and times are to go on.
+  std::int64_t set_back = 0;
   /// Number of the message in the bag, from 1.
   int position = 0;
   /// Index of its frame in BagMessages::frames.

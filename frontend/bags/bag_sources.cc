@@ -16,6 +16,11 @@ constexpr double kNanoseconds = 1e9;  // in a second
 // were recorded the delays differ by less, s, or their clocks do.
 constexpr double kClockDifference = 0.5;
 
+// A clock that goes back by more, s, was set back; scans and odometry agree on
+// by how much to that. More often than this nobody does it.
+constexpr double kSetBack = 1.0;
+constexpr std::size_t kMostSetBack = 10;
+
 template <typename T>
 T MedianOf(std::vector<T> values) {
   const auto middle =
@@ -40,6 +45,37 @@ bool DelayOf(const std::vector<Raw>& messages, std::int64_t* delay) {
   }
   *delay = MedianOf(std::move(delays));
   return true;
+}
+
+// Where a clock was set back: the messages before which it was, and by how much
+// they are earlier than the one before, ns.
+struct SetBack {
+  std::size_t index = 0;
+  std::int64_t by = 0;
+};
+template <typename Raw>
+std::vector<SetBack> SetBacksOf(const std::vector<Raw>& messages) {
+  std::vector<SetBack> found;
+  for (std::size_t i = 1; i < messages.size(); ++i) {
+    const std::int64_t by = messages[i - 1].stamp - messages[i].stamp;
+    if (static_cast<double>(by) > kSetBack * kNanoseconds) {
+      found.push_back({i, by});
+    }
+  }
+  return found;
+}
+
+// Adds to the times after the clock was set back what it was set back by.
+template <typename Raw, typename Add>
+void LetTimesGoOn(const std::vector<SetBack>& places,
+                  const std::vector<std::int64_t>& by,
+                  std::vector<Raw>* messages, const Add& add) {
+  std::int64_t sum = 0;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < messages->size(); ++i) {
+    while (next < places.size() && places[next].index == i) sum += by[next++];
+    add(sum, &(*messages)[i]);
+  }
 }
 
 // Whether poses are not all the same.
@@ -231,6 +267,7 @@ class SourceChooser {
     };
     if (odometry_ != nullptr) {
       align(odometry_->seen.name, &odometry_->poses);
+      LetTimesGoOnWhereBothWereSetBack();
       sources_.motion.SetPoses(std::move(odometry_->poses));
     } else if (!transforms_.empty()) {
       align(log_->odometry_source, &transforms_);
@@ -239,6 +276,48 @@ class SourceChooser {
       TakeYawRates(align);
     }
     for (BagStream& stream : messages_->streams) stream.poses = {};
+  }
+
+  // One clock stamps scans and odometry and was set back: a time that came
+  // twice is another one for both.
+  void LetTimesGoOnWhereBothWereSetBack() {
+    std::vector<BagScan>& scans = messages_->scans;
+    std::vector<BagPose>& poses = odometry_->poses;
+    const std::vector<SetBack> of_scans = SetBacksOf(scans);
+    const std::vector<SetBack> of_poses = SetBacksOf(poses);
+    if (of_scans.empty() || of_scans.size() > kMostSetBack ||
+        of_scans.size() != of_poses.size()) {
+      return;
+    }
+    std::vector<std::int64_t> steps;
+    for (std::size_t i = 1; i < poses.size(); ++i) {
+      steps.push_back(poses[i].stamp - poses[i - 1].stamp);
+    }
+    const std::int64_t step = MedianOf(std::move(steps));
+    std::vector<std::int64_t> by;
+    double sum = 0.0;
+    for (std::size_t k = 0; k < of_scans.size(); ++k) {
+      const auto of_one = static_cast<double>(of_scans[k].by);
+      const auto of_other = static_cast<double>(of_poses[k].by);
+      if (std::abs(of_one - of_other) > kSetBack * kNanoseconds) return;
+      by.push_back(of_poses[k].by + std::max<std::int64_t>(step, 0));
+      sum += of_other + static_cast<double>(step);
+    }
+    // Of damaged stamps the sums might not fit their type.
+    if (sum > static_cast<double>(kMostTime) / 4.0) return;
+    LetTimesGoOn(of_poses, by, &poses, [](std::int64_t more, BagPose* pose) {
+      pose->stamp = std::min(pose->stamp + more, kMostTime);
+    });
+    LetTimesGoOn(of_scans, by, &scans, [](std::int64_t more, BagScan* scan) {
+      scan->set_back = std::min(more, kMostTime - scan->stamp);
+      scan->stamp += scan->set_back;
+    });
+    char text[120];
+    std::snprintf(text, sizeof text,
+                  "the clock was set back by %.3f s in all: odometry is that "
+                  "of the same time",
+                  sum / kNanoseconds);
+    log_->notes.push_back(text);
   }
 
   template <typename Align>

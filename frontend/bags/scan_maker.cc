@@ -68,8 +68,8 @@ Scan ScanMaker::Make(const BagScan& raw, const LaserMount& mount,
                      SkipCounter* skips) {
   const LaserScanMessage& message = raw.message;
   Scan scan;
-  scan.timestamp = SecondsOf(raw.stamp);
-  scan.timestamp_text = SecondsText(raw.stamp);
+  scan.timestamp = SecondsOf(raw.stamp - raw.set_back);
+  scan.timestamp_text = SecondsText(raw.stamp - raw.set_back);
   scan.line = raw.position;
   scan.odometry = motion_->At(raw.stamp);
   scan.laser_offset = mount.pose;

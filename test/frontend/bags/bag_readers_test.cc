@@ -709,30 +709,54 @@ TEST(BagLogTest, FolderOfTheRos1BagsThatOneWasSplitInto) {
   }
 }
 
-// A clock that is set back goes through the same times twice: odometry of the
-// two is not mixed up.
-TEST(BagLogTest, OdometryOfTimesThatCameTwiceIsNotUsed) {
-  const auto read = [](int jump_at, std::int64_t back) {
-    std::vector<BagRecord> records;
-    for (int i = 0; i < 100; ++i) {
-      const std::int64_t time =
-          kBagStart + i * kSecond / 10 - (i < jump_at ? 0 : back);
-      records.push_back(OdometryRecord(time, Pose2(0.1 * i, 0.0, 0.0), kRos1));
-      records.push_back(Record(PlainScan(time), kRos1));
+// A drive of 10 s whose clock is set back, with odometry or transforms.
+Log ReadSetBack(int jump_at, std::int64_t back, bool is_tf) {
+  std::vector<BagRecord> records;
+  for (int i = 0; i < 200; ++i) {
+    const std::int64_t time =
+        kBagStart + i * kSecond / 20 - (i < jump_at ? 0 : back);
+    const Pose2 pose(0.05 * i, 0.0, 0.0);
+    records.push_back(
+        is_tf ? TfRecord(Transform(time, "odom", "laser", pose), kRos1)
+              : OdometryRecord(time, pose, kRos1));
+    if (i % 2 == 0) records.push_back(Record(PlainScan(time), kRos1));
+  }
+  return ReadBytes(MakeRosbag1(records));
+}
+
+// A clock that is set back goes through the same times twice. Where odometry
+// comes in the order of the bag, that of the same time is meant.
+TEST(BagLogTest, OdometryOfTheSameTimeWhereTheClockWasSetBack) {
+  for (const std::int64_t back :
+       {2 * kSecond, 3 * kSecond, 8 * kSecond, 500 * kSecond}) {
+    SCOPED_TRACE(back);
+    const Log log = ReadSetBack(101, back, false);
+    ASSERT_EQ(log.scans.size(), 100u);
+    for (std::size_t i = 0; i < log.scans.size(); ++i) {
+      ASSERT_NEAR(log.scans[i].odometry[0], 0.1 * static_cast<double>(i), 1e-9)
+          << i;
     }
-    return ReadBytes(MakeRosbag1(records));
-  };
-  Log log = read(50, 3 * kSecond);
+    // As stamped.
+    EXPECT_NEAR(log.scans[60].timestamp,
+                SecondsOf(kBagStart + 6 * kSecond - back), 1e-6);
+    EXPECT_EQ(log.time_reversals, 1);
+    EXPECT_THAT(log.notes, Contains(HasSubstr("clock was set back")));
+  }
+}
+
+// Transforms are in the order of their time: whose they are is lost.
+TEST(BagLogTest, TransformsOfTimesThatCameTwiceAreNotUsed) {
+  Log log = ReadSetBack(100, 3 * kSecond, true);
   EXPECT_EQ(log.scans.size(), 100u);
   EXPECT_FALSE(log.has_odometry);
   EXPECT_EQ(log.odometry_source, "");
   EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("clock was set back"),
                                         HasSubstr("not used"))));
   // Few of them, and times that came once.
-  log = read(97, 2 * kSecond);
+  log = ReadSetBack(194, 2 * kSecond, true);
   EXPECT_TRUE(log.has_odometry);
   EXPECT_THAT(log.notes, Contains(HasSubstr("clock was set back")));
-  log = read(50, 500 * kSecond);
+  log = ReadSetBack(100, 500 * kSecond, true);
   EXPECT_NEAR(log.scans[70].odometry[0], 7.0, 1e-9);
   EXPECT_THAT(log.notes, Not(Contains(HasSubstr("clock was set back"))));
 }

@@ -157,7 +157,7 @@ class ScanPlacer {
     log_->notes.push_back(note +
                           ": odometry is not used, since it may be another's");
     sources_.motion = BagMotion();
-    sources_.clock_difference = 0;
+    sources_.clock_difference = sources_.recording_delay = 0;
     log_->yaw_rates.clear();
     log_->yaw_rate_source.clear();
     log_->odometry_source.clear();
@@ -186,13 +186,17 @@ class ScanPlacer {
 
   // Odometry, or the turn rates, by the clock of the scans.
   void AgreeOnClock() {
-    const std::int64_t difference = sources_.clock_difference;
+    const bool is_delay = sources_.clock_difference == 0;
+    const std::int64_t difference =
+        is_delay ? sources_.recording_delay : sources_.clock_difference;
     if (difference == 0) return;
     const bool is_motion = sources_.motion.is_known();
     const ClockChoice choice = ChooseClock(
         options_, scans_, [this](const BagScan& scan) { return MountOf(scan); },
         is_motion ? sources_.motion : MotionOfTurnRates(), difference);
-    if (choice.is_told && choice.difference == 0) return;
+    if ((choice.is_told || is_delay) && choice.difference == 0) return;
+    // What was not stamped is not late unless scans say so.
+    if (!choice.is_told && is_delay) return;
     const auto seconds = [](std::int64_t nanoseconds) {
       return static_cast<double>(nanoseconds) / kNanoseconds;
     };
@@ -206,8 +210,10 @@ class ScanPlacer {
                     difference < 0 ? "sooner" : "later");
     } else {
       std::snprintf(text, sizeof text,
-                    " is stamped by another clock than the scans: %.3f s are "
-                    "added",
+                    is_delay ? ": %.3f s are added, since the scans were "
+                               "recorded that much after they were taken"
+                             : " is stamped by another clock than the scans: "
+                               "%.3f s are added",
                     seconds(choice.difference));
     }
     log_->notes.push_back(

@@ -265,6 +265,7 @@ class SourceChooser {
       }
       sources_.clock_difference = difference;
     };
+    if (!is_stamped) sources_.recording_delay = TimeBetweenScans();
     if (odometry_ != nullptr) {
       align(odometry_->seen.name, &odometry_->poses);
       LetTimesGoOnWhereBothWereSetBack();
@@ -276,6 +277,16 @@ class SourceChooser {
       TakeYawRates(align);
     }
     for (BagStream& stream : messages_->streams) stream.poses = {};
+  }
+
+  // The median, ns; 0 where there is none.
+  std::int64_t TimeBetweenScans() const {
+    std::vector<std::int64_t> steps;
+    for (std::size_t i = 1; i < messages_->scans.size(); ++i) {
+      steps.push_back(messages_->scans[i].stamp -
+                      messages_->scans[i - 1].stamp);
+    }
+    return steps.empty() ? 0 : MedianOf(std::move(steps));
   }
 
   // One clock stamps scans and odometry and was set back: a time that came

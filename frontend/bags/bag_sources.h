@@ -48,6 +48,9 @@ struct BagSources {
   /// to being recorded than the scans did, ns, where that is more than half a
   /// second: the clocks may differ by that, or the scans were only late.
   std::int64_t clock_difference = 0;
+  /// Where scans have the times at which they were recorded: by how much later
+  /// than measured that may be, ns, which is how long a scan takes. Else 0.
+  std::int64_t recording_delay = 0;
 };
 
 /// Chooses the topics or transforms that scans, odometry and turn rates come

@@ -761,6 +761,32 @@ TEST(BagLogTest, TransformsOfTimesThatCameTwiceAreNotUsed) {
   EXPECT_THAT(log.notes, Not(Contains(HasSubstr("clock was set back"))));
 }
 
+// Of a laser that nobody stamps the times of recording are known only, which
+// are those of the ends of its scans.
+TEST(BagLogTest, ScansWithoutStampsTellWhenTheyWereTaken) {
+  const Log right = ReadSlowDrive(0, 0);
+  std::vector<BagRecord> records =
+      SimulatedMessages(SlowDrive(), Laser(), kRos1);
+  std::string why;
+  for (BagRecord& record : records) {
+    if (record.topic != "/scan") continue;
+    LaserScanMessage scan;
+    ASSERT_TRUE(DecodeLaserScan(record.data, kRos1, &scan, &why)) << why;
+    scan.header.stamp = 0;
+    record.data = EncodeLaserScan(scan, kRos1);
+    record.time += kSecond;
+  }
+  const Log log = ReadBytes(MakeRosbag1(records));
+  ASSERT_EQ(log.scans.size(), right.scans.size());
+  EXPECT_THAT(log.notes, Contains(HasSubstr("after they were taken")));
+  for (std::size_t i = 0; i < log.scans.size(); ++i) {
+    ASSERT_LT(
+        (log.scans[i].odometry - right.scans[i].odometry).head<2>().norm(),
+        0.05)
+        << i;
+  }
+}
+
 // What cannot be told is said; time stamps that overlap are believed.
 TEST(BagLogTest, ClocksThatNothingTellsApartAreLeft) {
   const Log right = ReadSlowDrive(0, 0);

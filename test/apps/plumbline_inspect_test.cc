@@ -192,7 +192,7 @@ TEST_F(InspectTest, RefusalsSayWhatIsThere) {
                                          "7zXZ\0\0",
                                          7)),
             "compressed data is corrupt or breaks off"},
-           {Write("old.bag", "#ROSBAG V1.2\n"), "1.2"}}) {
+           {Write("old.rosbag", "#ROSBAG V1.2\n"), "1.2"}}) {
     SCOPED_TRACE(path);
     const nlohmann::json json = Json(path, 2);
     EXPECT_THAT(json["refused"].get<std::string>(), HasSubstr(why));

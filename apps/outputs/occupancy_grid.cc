@@ -249,15 +249,18 @@ void OccupancyGrid::ForgetUnreachable() {
   SeenCells seen;
   seen.width = width_;
   seen.height = height_;
-  seen.cells.reserve(static_cast<std::size_t>(width_) * height_);
+  seen.cells.resize(static_cast<std::size_t>(width_) * height_,
+                    SeenCells::kUnknown);
   std::string line;
   for (int row = 0; row < height_; ++row) {
     Row(row, &line);
-    for (const char pixel : line) {
-      const auto value = static_cast<std::uint8_t>(pixel);
-      seen.cells.push_back(value == kFree       ? SeenCells::kFree
-                           : value == kOccupied ? SeenCells::kOccupied
-                                                : SeenCells::kUnknown);
+    std::uint8_t* const cells =
+        &seen.cells[static_cast<std::size_t>(row) * width_];
+    for (int column = 0; column < width_; ++column) {
+      const auto value = static_cast<std::uint8_t>(line[column]);
+      cells[column] = value == kFree       ? SeenCells::kFree
+                      : value == kOccupied ? SeenCells::kOccupied
+                                           : SeenCells::kUnknown;
     }
   }
   const auto cells = [this](double metres) {

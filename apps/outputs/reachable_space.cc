@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 
 namespace plumbline {
 namespace {
+
+// Cells of a row that are passed over together.
+constexpr int kBlock = 64;
 
 // 1 for cells of a raster that have something, 0 for the others.
 struct Marks {
@@ -27,59 +31,97 @@ struct Marks {
   std::vector<std::uint8_t> cells;
 };
 
+// How far the nearest marked cell in its row is, up to `far`, for all cells of
+// a row: run by run of marked and of other cells.
+void FillNearest(const std::uint8_t* marks, int width, int far,
+                 std::uint8_t* nearest) {
+  const auto find = [&](int begin, int value) {
+    const void* const found = std::memchr(marks + begin, value, width - begin);
+    return found == nullptr
+               ? width
+               : static_cast<int>(static_cast<const std::uint8_t*>(found) -
+                                  marks);
+  };
+  std::fill(nearest, nearest + width, static_cast<std::uint8_t>(far));
+  for (int begin = find(0, 1), last = 0; begin < width;) {
+    for (int i = std::max(last, begin - far); i < begin; ++i) {
+      nearest[i] = std::min(nearest[i], static_cast<std::uint8_t>(begin - i));
+    }
+    last = find(begin, 0);
+    std::fill(nearest + begin, nearest + last, std::uint8_t{0});
+    for (int i = last; i < std::min(width, last + far); ++i) {
+      nearest[i] = static_cast<std::uint8_t>(i - last + 1);
+    }
+    begin = last < width ? find(last, 1) : width;
+  }
+}
+
 // Cells with a marked one within `radius`, from middle to middle.
 Marks Around(const Marks& marks, int radius) {
   const int far = std::min(radius, 254) + 1;
-  // How far the nearest in its row is, up to `far`.
   Marks nearest(marks.width, marks.height);
+  // Most of a raster is far from all marks: blocks of cells of a row say where.
+  const int blocks = (marks.width + kBlock - 1) / kBlock;
+  std::vector<std::uint8_t> is_near(
+      static_cast<std::size_t>(blocks) * marks.height, 0);
+  const auto end_of = [&](int block) {
+    return std::min(marks.width, (block + 1) * kBlock);
+  };
   for (int row = 0; row < marks.height; ++row) {
-    const std::size_t begin = marks.IndexOf(0, row);
-    int distance = far;
-    const auto visit = [&](std::size_t i, bool is_first) {
-      distance = marks.cells[i] != 0 ? 0 : std::min(far, distance + 1);
-      if (is_first || distance < nearest.cells[i]) {
-        nearest.cells[i] = static_cast<std::uint8_t>(distance);
+    std::uint8_t* const own = &nearest.cells[marks.IndexOf(0, row)];
+    FillNearest(&marks.cells[marks.IndexOf(0, row)], marks.width, far, own);
+    for (int block = 0; block < blocks; ++block) {
+      std::uint8_t least = own[block * kBlock];
+      for (int i = block * kBlock; i < end_of(block); ++i) {
+        least = std::min(least, own[i]);
       }
-    };
-    const auto width = static_cast<std::size_t>(marks.width);
-    for (std::size_t i = 0; i < width; ++i) visit(begin + i, true);
-    distance = far;
-    for (std::size_t i = width; i-- > 0;) visit(begin + i, false);
+      is_near[static_cast<std::size_t>(row) * blocks + block] = least < far;
+    }
   }
   Marks around(marks.width, marks.height);
-  for (int step = 1 - far; step < far; ++step) {
-    const auto wide = static_cast<int>(
-        std::floor(std::sqrt((far - 1) * (far - 1) - step * step)));
-    const int first = std::max(0, -step);
-    const int last = std::min(marks.height, marks.height - step);
-    for (int row = first; row < last; ++row) {
+  for (int row = 0; row < marks.height; ++row) {
+    std::uint8_t* const to = &around.cells[marks.IndexOf(0, row)];
+    const int first = std::max(1 - far, -row);
+    const int last = std::min(far, marks.height - row);
+    for (int step = first; step < last; ++step) {
+      const auto wide = static_cast<std::uint8_t>(
+          std::floor(std::sqrt((far - 1) * (far - 1) - step * step)));
       const std::uint8_t* const from =
           &nearest.cells[marks.IndexOf(0, row + step)];
-      std::uint8_t* const to = &around.cells[marks.IndexOf(0, row)];
-      for (int i = 0; i < marks.width; ++i) to[i] |= from[i] <= wide;
+      const std::uint8_t* const near =
+          &is_near[static_cast<std::size_t>(row + step) * blocks];
+      for (int block = 0; block < blocks; ++block) {
+        if (near[block] == 0) continue;
+        const int end = end_of(block);
+        for (int i = block * kBlock; i < end; ++i) {
+          to[i] |= static_cast<std::uint8_t>(from[i] <= wide);
+        }
+      }
     }
   }
   return around;
 }
 
-// Marks the unknown cells of a row or column of `count` cells, `step` apart,
-// that lie between free ones and are no more than the gap there.
-void BridgeGaps(const SeenCells& seen, std::size_t begin, std::size_t step,
-                int count, const std::function<int(int)>& gap, Marks* open) {
-  int last = -1;  // the last known cell, when it is free
-  for (int i = 0; i < count; ++i) {
-    const std::uint8_t here =
-        seen.cells[begin + static_cast<std::size_t>(i) * step];
-    if (here == SeenCells::kUnknown) continue;
-    const bool is_free = here == SeenCells::kFree;
-    if (is_free && last >= 0 && i - last > 1 && i - last - 1 <= gap(i)) {
-      for (int k = last + 1; k < i; ++k) {
-        open->cells[begin + static_cast<std::size_t>(k) * step] = 1;
-      }
+// Bridges the unknown cells of a row or column that lie between free ones and
+// are no more than the gap there.
+class GapBridge {
+ public:
+  // Takes the cells in turn; calls `open(k)` with the places of those that are
+  // bridged before this one.
+  template <typename Gap, typename Open>
+  void Take(int place, std::uint8_t cell, const Gap& gap, const Open& open) {
+    if (cell == SeenCells::kUnknown) return;
+    const bool is_free = cell == SeenCells::kFree;
+    if (is_free && last_ >= 0 && place - last_ > 1 &&
+        place - last_ - 1 <= gap()) {
+      for (int k = last_ + 1; k < place; ++k) open(k);
     }
-    last = is_free ? i : -1;
+    last_ = is_free ? place : -1;
   }
-}
+
+ private:
+  int last_ = -1;  // the last known cell, when it is free
+};
 
 Marks OpenCells(const SeenCells& seen, const ReachOptions& options) {
   Marks open(seen.width, seen.height);
@@ -87,15 +129,19 @@ Marks OpenCells(const SeenCells& seen, const ReachOptions& options) {
     open.cells[i] = seen.cells[i] == SeenCells::kFree;
   }
   if (!options.gap) return open;
+  // Columns side by side: memory is visited in its order.
+  std::vector<GapBridge> columns(static_cast<std::size_t>(seen.width));
   for (int row = 0; row < seen.height; ++row) {
-    BridgeGaps(
-        seen, open.IndexOf(0, row), 1, seen.width,
-        [&](int column) { return options.gap(column, row); }, &open);
-  }
-  for (int column = 0; column < seen.width; ++column) {
-    BridgeGaps(
-        seen, open.IndexOf(column, 0), static_cast<std::size_t>(seen.width),
-        seen.height, [&](int row) { return options.gap(column, row); }, &open);
+    GapBridge along;
+    const std::uint8_t* const cells = &seen.cells[open.IndexOf(0, row)];
+    for (int column = 0; column < seen.width; ++column) {
+      const auto gap = [&] { return options.gap(column, row); };
+      along.Take(column, cells[column], gap,
+                 [&](int k) { open.cells[open.IndexOf(k, row)] = 1; });
+      columns[static_cast<std::size_t>(column)].Take(
+          row, cells[column], gap,
+          [&](int k) { open.cells[open.IndexOf(column, k)] = 1; });
+    }
   }
   return open;
 }

@@ -37,8 +37,11 @@ class HeadingDrift {
   /// by way of them.
   double Between(std::size_t from, std::size_t to) const;
 
+  /// See Estimate.
   static constexpr std::size_t kHalfWindow = 32;
+  /// See Estimate.
   static constexpr std::size_t kFewestSteps = 16;
+  /// See Estimate.
   static constexpr double kSignificance = 3.0;
 
  private:

@@ -193,8 +193,13 @@ void OccupancyGrid::AddScan(const Scan& scan, const Pose2& pose) {
     const double x = start[0] + range * (c * beam[0] - s * beam[1]);
     const double y = start[1] + range * (s * beam[0] + c * beam[1]);
     if (!(std::abs(x) < kFarthestCell && std::abs(y) < kFarthestCell)) continue;
-    rays_.push_back({static_cast<int>(std::floor(x)),
-                     static_cast<int>(std::floor(y)), is_hit});
+    const Ray ray = {static_cast<int>(std::floor(x)),
+                     static_cast<int>(std::floor(y)), is_hit};
+    // Near walls several beams end in one cell, and count it once.
+    if (rays_.empty() || ray.column != rays_.back().column ||
+        ray.row != rays_.back().row || ray.is_hit != rays_.back().is_hit) {
+      rays_.push_back(ray);
+    }
   }
   for (const Ray& ray : rays_) {
     if (!ray.is_hit || ray.column < 0 || ray.row < 0 || ray.column >= width_ ||

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <functional>
+#include <cstdint>
 #include <utility>
 
 namespace plumbline {
@@ -72,16 +72,22 @@ Right InformationFactor::SolveAt(
   const int* rows = factor.innerIndexPtr();
   const double* values = factor.valuePtr();
   RowMajor x = RowMajor::Zero(size_, right.cols());
-  std::vector<bool> is_on_way(static_cast<std::size_t>(size_), false);
-  std::vector<int> way;
+  std::vector<std::uint8_t> is_on_way(static_cast<std::size_t>(size_), 0);
   const auto climb = [&](const InformationRows& block) {
     for (int r = block.begin; r < block.begin + block.count; ++r) {
-      for (int j = position[r]; j >= 0 && !is_on_way[j];
+      for (int j = position[r]; j >= 0 && is_on_way[j] == 0;
            j = starts[j] < starts[j + 1] ? rows[starts[j]] : -1) {
-        is_on_way[j] = true;
-        way.push_back(j);
+        is_on_way[j] = 1;
       }
     }
+  };
+  // Ascending, without sorting: ways that join are the worst case of that.
+  const auto columns_on_way = [&] {
+    std::vector<int> way;
+    for (int j = 0; j < size_; ++j) {
+      if (is_on_way[j] != 0) way.push_back(j);
+    }
+    return way;
   };
   for (const InformationRows& block : sources) {
     for (int r = block.begin; r < block.begin + block.count; ++r) {
@@ -89,7 +95,7 @@ Right InformationFactor::SolveAt(
     }
     climb(block);
   }
-  std::sort(way.begin(), way.end());
+  std::vector<int> way = columns_on_way();
   for (const int j : way) {
     for (int p = starts[j]; p < starts[j + 1]; ++p) {
       x.row(rows[p]) -= values[p] * x.row(j);
@@ -97,8 +103,9 @@ Right InformationFactor::SolveAt(
   }
   for (const int j : way) x.row(j) /= pivots[j];
   for (const InformationRows& block : wanted) climb(block);
-  std::sort(way.begin(), way.end(), std::greater<int>());
-  for (const int j : way) {
+  way = columns_on_way();
+  for (auto k = way.rbegin(); k != way.rend(); ++k) {
+    const int j = *k;
     for (int p = starts[j]; p < starts[j + 1]; ++p) {
       x.row(j) -= values[p] * x.row(rows[p]);
     }

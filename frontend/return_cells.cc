@@ -1,3 +1,4 @@
+#include <plumbline/frontend/principal_axis.h>
 #include <plumbline/frontend/return_cells.h>
 
 #include <algorithm>
@@ -11,11 +12,10 @@ void LineFit::Solve(Eigen::Vector2d* mean, Eigen::Vector2d* direction,
   const double sxx = xx / n - mean->x() * mean->x();
   const double sxy = xy / n - mean->x() * mean->y();
   const double syy = yy / n - mean->y() * mean->y();
-  const double angle = 0.5 * std::atan2(2.0 * sxy, sxx - syy);
-  const double radical = std::hypot(0.5 * (sxx - syy), sxy);
-  *direction = {std::cos(angle), std::sin(angle)};
-  *across = std::max(0.0, 0.5 * (sxx + syy) - radical);
-  *along = 0.5 * (sxx + syy) + radical;
+  const PrincipalAxis axis = PrincipalAxisOf(sxx, sxy, syy);
+  *direction = axis.direction;
+  *across = axis.across;
+  *along = axis.along;
 }
 
 void ReturnCells::Clear() {

@@ -1,4 +1,5 @@
 #include <plumbline/frontend/beam_directions.h>
+#include <plumbline/frontend/principal_axis.h>
 #include <plumbline/frontend/scan_points.h>
 
 #include <Eigen/Geometry>
@@ -143,16 +144,14 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
       sxy += d.x() * d.y();
       syy += d.y() * d.y();
     }
-    const double half_trace = 0.5 * (sxx + syy);
-    const double radical = std::hypot(0.5 * (sxx - syy), sxy);
-    const double across = std::max(0.0, half_trace - radical) / count;
-    const double along = (half_trace + radical) / count;
+    const PrincipalAxis axis = PrincipalAxisOf(sxx, sxy, syy);
+    const double across = axis.across / count;
+    const double along = axis.along / count;
     if (across > options.normal_tolerance * options.normal_tolerance ||
         across > 0.1 * along) {
       continue;
     }
-    const double direction = 0.5 * std::atan2(2.0 * sxy, sxx - syy);
-    Eigen::Vector2d normal(-std::sin(direction), std::cos(direction));
+    Eigen::Vector2d normal(-axis.direction.y(), axis.direction.x());
     if (normal.dot(laser - point.position) < 0.0) normal = -normal;
     point.normal = normal;
   }

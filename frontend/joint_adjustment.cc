@@ -40,6 +40,20 @@ void AddReturns(const std::vector<ScanPoint>& points, const Pose2& pose,
   }
 }
 
+// Of the scans [begin, end), within reach.
+std::size_t CountReturns(const std::vector<Scan>& scans, std::size_t begin,
+                         std::size_t end, const ScanPointsOptions& options) {
+  std::size_t count = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    for (const float range : scans[i].ranges) {
+      if (range >= options.minimum_range && range <= options.usable_range) {
+        ++count;
+      }
+    }
+  }
+  return count;
+}
+
 std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
                                 const std::vector<RefinedScan>& refined,
                                 const std::vector<KeyScanRecord>& records,
@@ -53,6 +67,12 @@ std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
     Pose2 key = Pose2::Zero();
     const std::size_t last =
         p + 1 < begins.size() ? begins[p + 1] : records.size();
+    if (begins[p] < last) {
+      place.returns.reserve(CountReturns(
+          scans, records[begins[p]].scan,
+          last < records.size() ? records[last].scan : refined.size(),
+          options.points));
+    }
     for (std::size_t k = begins[p]; k < last; ++k) {
       if (k > begins[p]) key = Compose(key, records[k].motion.mean);
       const std::size_t begin = records[k].scan;
@@ -496,7 +516,7 @@ void JointAdjustment::Adjust() {
       }
       Vote();
       Reweigh();
-      Solve(round + 1 == options_.rounds);
+      Solve(/*is_last=*/false);
     }
     const std::vector<Pose2> after = PlacePoses();
     double moved = 0.0;
@@ -506,6 +526,8 @@ void JointAdjustment::Adjust() {
     if (moved <= options_.settled_distance || (stop_ && stop_())) break;
     if (pass + 1 < options_.max_passes) Match();
   }
+  // What lies between two matchings need not be exact.
+  if (!(stop_ && stop_())) Solve(/*is_last=*/true);
   DropWallsWithoutVotes();
 }
 

@@ -89,13 +89,15 @@ std::vector<Summary::LogInput> DescribeLogs(
 // has, as the place of the laser: a log that begins within this, s, of another
 // one's end, by the same topics, looks like one.
 constexpr double kGapOfParts = 2.0;
+// What places in a bag are counted in (Log::position_unit).
+constexpr char kBagPositions[] = "message";
 
 // A word where a bag seems to go on with another one.
 void TellParts(const std::vector<std::unique_ptr<OpenInput>>& inputs,
                const std::vector<Log>& logs, Summary* summary) {
   for (std::size_t i = 0; i < logs.size(); ++i) {
     for (std::size_t j = 0; j < logs.size(); ++j) {
-      if (i == j || logs[i].position_unit != "message" ||
+      if (i == j || logs[i].position_unit != kBagPositions ||
           logs[i].scan_message != logs[j].scan_message ||
           logs[i].odometry_source != logs[j].odometry_source) {
         continue;

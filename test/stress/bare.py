@@ -11,12 +11,7 @@ returns nothing, between posts every 3 m) and plain.world (a straight corridor
 of 60 m with rooms at its ends, driven there and back).
 """
 
-import os
-import sys
-
-
-def wall(a, b, thickness=0.12):
-    return "wall %.4f %.4f %.4f %.4f %.2f" % (*a, *b, thickness)
+from world_file import path, rectangle, wall, write_worlds
 
 
 def row(y, begin, end, doors):
@@ -26,16 +21,6 @@ def row(y, begin, end, doors):
         lines.append(wall((at, y), (door - 0.45, y)))
         at = door + 0.45
     return lines + [wall((at, y), (end, y))]
-
-
-def rectangle(x, y, width, height):
-    corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height),
-               (x, y)]
-    return [wall(a, b) for a, b in zip(corners, corners[1:])]
-
-
-def path(points):
-    return "path " + " ".join("%.3f %.3f" % point for point in points)
 
 
 def parallel():
@@ -77,14 +62,5 @@ def plain():
     return lines + [path(points)]
 
 
-def main():
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    for world in (parallel, hall, glass, plain):
-        with open(os.path.join(sys.argv[1], world.__name__ + ".world"),
-                  "w") as file:
-            file.write("\n".join(world()) + "\n")
-
-
 if __name__ == "__main__":
-    main()
+    write_worlds((parallel, hall, glass, plain), __doc__)

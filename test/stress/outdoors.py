@@ -8,25 +8,11 @@ nothing.world (no returns at all), trees.world, poles.world, cars.world (two
 rows of parked cars) and street.world (two rows of houses with alleys).
 """
 
-import os
 import random
-import sys
+
+from world_file import path, rectangle, wall, write_worlds
 
 SQUARE = [(0, 0), (20, 0), (20, 15), (0, 15), (0, 0)]
-
-
-def wall(a, b):
-    return "wall %.4f %.4f %.4f %.4f 0.12" % (*a, *b)
-
-
-def rectangle(x, y, width, height):
-    corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height),
-               (x, y)]
-    return [wall(a, b) for a, b in zip(corners, corners[1:])]
-
-
-def path(points):
-    return "path " + " ".join("%.3f %.3f" % point for point in points)
 
 
 def room():
@@ -87,15 +73,6 @@ def street():
     return lines + [path([(-25, 0), (50, 0), (50, 3), (-25, 3)])]
 
 
-def main():
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    for world in (room, corridor, open_corridor, nothing, trees, poles, cars,
-                  street):
-        with open(os.path.join(sys.argv[1], world.__name__ + ".world"),
-                  "w") as file:
-            file.write("\n".join(world()) + "\n")
-
-
 if __name__ == "__main__":
-    main()
+    write_worlds((room, corridor, open_corridor, nothing, trees, poles, cars,
+                  street), __doc__)

@@ -63,7 +63,7 @@ endforeach()
 # Pages, under each other as in the source so that their links hold, and
 # examples: projects that build against the installed package.
 set(documents ${CMAKE_INSTALL_DATAROOTDIR}/doc/libplumbline-dev)
-foreach(page README.md core/graph_files.md core/method.md core/plugins.md factors/relations.md
+foreach(page README.md core/graph_files.md core/house.md core/method.md core/plugins.md factors/relations.md
         frontend/bags.md apps/pipeline/known_beforehand.md apps/plan/plan.md
         apps/evaluation/evaluation.md
         datasets/README.md datasets/RESULTS.md datasets/sweeps/README.md)

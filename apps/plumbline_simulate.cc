@@ -8,10 +8,12 @@
 #include <plumbline/apps/cli/progress.h>
 #include <plumbline/apps/simulation/bag_writer.h>
 #include <plumbline/apps/simulation/bent_world.h>
+#include <plumbline/apps/simulation/building.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/stress.h>
 #include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/apps/simulation/world.h>
+#include <plumbline/apps/simulation/world_file.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>

@@ -70,7 +70,7 @@ DEFINE_string(launcher, "local",
 PLUMBLINE_FLAG_CHOICES(launcher, "local", "parallel", "slurm");
 DEFINE_int32(jobs, 0,
              "Runs at a time: on this machine (local), on each host "
-             "(parallel), on the cluster (slurm); 0: a run a core, on the "
+             "(parallel), on the cluster (slurm); 0: one run per core, on the "
              "cluster no limit");
 PLUMBLINE_FLAG_RANGE(jobs, 0, 100000);
 DEFINE_string(hosts, "",

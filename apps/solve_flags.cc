@@ -196,6 +196,10 @@ DEFINE_string(features, "segments",
 PLUMBLINE_FLAG_CHOICES(features, "segments", "points");
 DEFINE_bool(odometry_refinement, true,
             "Match each scan to what was seen last before association");
+DEFINE_bool(range_offset, true,
+            "Find by how much the laser's ranges are all too long or too "
+            "short, from how scans that follow each other match, and take it "
+            "out");
 DEFINE_double(link_radius, 10.0,
               "Feature links are kept so far around the robot, m");
 PLUMBLINE_FLAG_RANGE(link_radius, 0.5, 1000.0);
@@ -350,6 +354,7 @@ EmOptions EmOptionsFromFlags(RawFeatures features) {
 // All that is done with scans.
 void TakeFrontEndFlags(LogSolverOptions* options) {
   options->odometry.match_scans = FLAGS_odometry_refinement;
+  options->range_offset = FLAGS_range_offset;
   options->odometry.points.usable_range = FLAGS_usable_range;
   options->builder.link_radius = FLAGS_link_radius;
   options->builder.association_depth = FLAGS_association_depth;
@@ -404,8 +409,8 @@ std::vector<FlagGroup> SolveFlagGroups() {
        {"delta_threshold", "delta_mode", "full_weight_test", "em_every",
         "em_max_iterations", "minimizer"}},
       {"Front-end",
-       {"features", "odometry_refinement", "link_radius", "association_depth",
-        "global_association", "refine", "usable_range"}},
+       {"features", "range_offset", "odometry_refinement", "link_radius",
+        "association_depth", "global_association", "refine", "usable_range"}},
       {"Bags", {"scan_topic", "odometry_topic"}},
       {"Laser", {"laser_start_angle", "laser_step", "laser_max_range"}},
       {"Running",
@@ -449,6 +454,7 @@ std::vector<std::string> LogFlags() {
           "checkpoint_every",
           "em_every",
           "features",
+          "range_offset",
           "odometry_refinement",
           "link_radius",
           "start_pose",

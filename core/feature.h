@@ -40,6 +40,10 @@ struct FeatureType;   // core/registry.h
 ///                                  m, m, rad, m, m; half its size along theta
 ///                                  and across
 ///   orientation  theta             rad
+///   corridor     d, alpha, w       m, rad, m; its axis relative to `anchor`,
+///   and
+///                                  half its width
+///   thickness    w                 m
 ///
 /// The name of a type and of its parameters are in the type, and in the files;
 /// code asks for its traits and its frame, not for its name.

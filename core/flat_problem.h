@@ -19,7 +19,7 @@ namespace plumbline {
 /// every residual.
 class AddressIndex {
  public:
-  /// Forgets all, with room for so many.
+  /// Forgets everything, with room for this many.
   void Clear(std::size_t expected_size);
 
   /// The number of the address; a new one gets `next`.

@@ -57,7 +57,7 @@ class NamedTypes final : public PluginList {
     return reference;
   }
 
-  /// Null when there is none of this name.
+  /// Null when no type has this name.
   const Type* Find(const std::string& name) const {
     const auto it = types_.find(name);
     return it == types_.end() ? nullptr : it->second.get();
@@ -73,7 +73,7 @@ class NamedTypes final : public PluginList {
     return nullptr;
   }
 
-  /// Throws Error that lists the known names when there is none of this name.
+  /// Throws Error that lists the known names when no type has this name.
   const Type& Get(const std::string& name) const {
     const Type* type = Find(name);
     if (type != nullptr) return *type;

@@ -145,7 +145,7 @@ struct RelationType {
       make_cost;
   /// For a relation of two features whose expected value tells all of the
   /// second, given the first: sets the second's parameters so that the residual
-  /// is zero. Null when there is no such.
+  /// is zero. Null for every other relation.
   std::function<void(const Eigen::VectorXd& expected, const Feature& first,
                      Feature* second)>
       place_second;
@@ -182,8 +182,8 @@ struct DetectorParameter {
   std::string unit = {};
   /// Meaning, in one line.
   std::string description = {};
-  /// The name is that of a list and has a number behind it, from 0: "angle_0",
-  /// "angle_1", ... None is there by default.
+  /// The name is that of a list, and a number from 0 follows it: "angle_0",
+  /// "angle_1", ... Empty by default.
   bool is_list = false;
 };
 
@@ -205,7 +205,7 @@ struct DetectorType {
   std::function<std::unique_ptr<StructureDetector>(const DetectorParameters&)>
       make;
 
-  /// The parameters that are no lists, at their defaults.
+  /// The parameters other than lists, at their defaults.
   DetectorParameters defaults() const;
   /// Whether it reads features of the type.
   bool Reads(const FeatureType& type) const;
@@ -285,7 +285,7 @@ class Registry {
   std::vector<const PluginList*> lists() const;
 
  private:
-  /// Throws Error when one of them is no word, or is taken.
+  /// Throws Error when one of them is not a word, or is taken.
   void CheckTags(std::vector<std::string> tags) const;
 
   // The list of a kind that is not core's, made when it is missing. Two kinds

@@ -34,8 +34,8 @@ struct SessionOptions {
   int num_threads = 1;
   /// Taking constraints out costs next to nothing, whatever the size of the
   /// graph. False: making the session and global solves are cheaper, and every
-  /// constraint taken out costs a pass over all; for graphs from which none or
-  /// few are.
+  /// constraint taken out costs a pass over all of them; for graphs that lose
+  /// few or none.
   bool fast_removal = true;
 };
 

@@ -34,7 +34,7 @@ struct CorridorOptions {
   /// Distance of the two sides, m: from a duct to a hall.
   double min_width = 0.8;
   double max_width = 4.0;
-  /// A corridor is at least so long, m, and so many times as long as wide.
+  /// Least length of a corridor, m, and least ratio of length to width.
   double min_length = 4.0;
   double min_ratio = 3.5;
   /// Part of each side that faces cover, at least, and the widest opening

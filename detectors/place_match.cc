@@ -140,7 +140,7 @@ class Matcher {
     const std::vector<bool> is_paired = WallsToPair();
     Try(Vector3d::Zero());
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
-      Try(Solve({candidates_[i]}));
+      Try(Solve(std::array<Candidate, 1>{candidates_[i]}));
       if (!is_paired[candidates_[i].second]) continue;
       for (std::size_t j = 0; j < i; ++j) {
         if (!is_paired[candidates_[j].second]) continue;
@@ -149,7 +149,7 @@ class Matcher {
                               first_[candidates_[j].first].angle));
         if (cross < std::sin(kParallel)) continue;
         if (candidates_[i].second == candidates_[j].second) continue;
-        Try(Solve({candidates_[i], candidates_[j]}));
+        Try(Solve(std::array<Candidate, 2>{candidates_[i], candidates_[j]}));
       }
     }
     result.outcome = PlaceMatch::Outcome::kNothingFits;
@@ -266,8 +266,10 @@ class Matcher {
     return is_paired;
   }
 
-  // Most probable displacement when these pairs are one wall each.
-  Vector3d Solve(const std::vector<Candidate>& pairs) const {
+  // Most probable displacement when these pairs, a range of candidates, are one
+  // wall each.
+  template <typename Pairs>
+  Vector3d Solve(const Pairs& pairs) const {
     Vector3d displacement = Vector3d::Zero();
     const double sigma_offset = 0.5 * options_.tolerance;
     for (int round = 0; round < kSolverRounds; ++round) {
@@ -303,9 +305,14 @@ class Matcher {
     return displacement;
   }
 
-  Explanation Explain(const Vector3d& displacement) const {
-    Explanation explanation;
-    std::vector<Line> lines;
+  // Holds until the next call: nothing is allocated anew for each of many.
+  const Explanation& Explain(const Vector3d& displacement) {
+    Explanation& explanation = explanation_;
+    explanation.matches.clear();
+    explanation.best.clear();
+    std::vector<Line>& lines = lines_;
+    lines.clear();
+    std::vector<WallMatch>& found = found_;
     double conflicts = 0.0;
     const Mover mover(pivot_, displacement);
     for (std::size_t j = 0; j < second_.size(); ++j) {
@@ -313,7 +320,7 @@ class Matcher {
       const ComparedWall moved = mover.Move(second_[j]);
       double least = options_.tolerance;
       double in_conflict = 0.0;
-      std::vector<WallMatch> found;
+      found.clear();
       for (const int i : by_second_[j]) {
         // Most walls are across the other, which needs no more.
         const double turn = std::abs(Turn(first_[i], moved));
@@ -389,7 +396,7 @@ class Matcher {
           std::lround(displacement[1] / kCell),
           std::lround(displacement[2] / DegToRad(0.3))};
       if (!tried_.insert(cell).second) return;
-      const Explanation explanation = Explain(displacement);
+      const Explanation& explanation = Explain(displacement);
       if (explanation.matches.empty()) return;
       hypotheses_.push_back({displacement, explanation.worth});
       if (round == kRefinements) return;
@@ -397,10 +404,10 @@ class Matcher {
     }
   }
 
-  PlaceMatch Conclude(std::size_t best) const {
+  PlaceMatch Conclude(std::size_t best) {
     PlaceMatch result;
     result.displacement = hypotheses_[best].displacement;
-    const Explanation explanation = Explain(result.displacement);
+    const Explanation& explanation = Explain(result.displacement);
     std::vector<Line> lines;
     for (const WallMatch& match : explanation.matches) {
       if (IsAmbiguous(match, best)) continue;
@@ -490,6 +497,10 @@ class Matcher {
   std::vector<std::vector<int>> by_second_;
   std::set<std::array<long, 3>> tried_;
   std::vector<Hypothesis> hypotheses_;
+  // Of Explain.
+  Explanation explanation_;
+  std::vector<Line> lines_;
+  std::vector<WallMatch> found_;
 };
 
 }  // namespace

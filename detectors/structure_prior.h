@@ -57,9 +57,9 @@ struct StructurePrior {
 };
 
 /// Reads a prior; `name` stands for it in errors. Throws Error with the line
-/// for an unknown word or relation, a number that is none or out of range, a
-/// unit that does not fit the row, too few or too many tolerances, what is said
-/// twice, and (without a line) a text that says nothing.
+/// for an unknown word or relation, a number that cannot be read or is out of
+/// range, a unit that does not fit the row, too few or too many tolerances,
+/// what is said twice, and (without a line) a text that says nothing.
 StructurePrior ReadStructurePrior(std::istream& input, const std::string& name,
                                   const Registry& registry);
 

@@ -42,8 +42,8 @@ struct ThicknessClassOptions {
 ///
 ///   the likelihood rises by more than its three parameters cost (Schwarz 1978:
 ///   3/2 ln n),
-///   so many samples within three standard deviations are not to be expected of
-///   even ones, wherever they are looked for (`significance`),
+///   uniform samples would hardly have as many within three standard deviations
+///   anywhere (`significance`),
 ///   it is narrow enough, has support and lies apart from the others.
 ///
 /// Samples that `known` classes explain do not count, nor do those outside the

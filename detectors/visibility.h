@@ -32,7 +32,7 @@ struct VisibilityOptions {
   double depth = 1.0;
   /// Least angle between a sight line and the wall, rad.
   double min_angle = DegToRad(10.0);
-  /// The worst so many lines of a look hold a wall back, if there are as many.
+  /// This many lines of a look, the worst, hold a wall back, if it has as many.
   int lines = 3;
   /// P-value below which one of them is broken: the wall ends there, or what
   /// stood there was moved.

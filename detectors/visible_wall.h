@@ -24,8 +24,8 @@ struct VisibleWall {
   double half_length = 0.0;
 };
 
-/// The visible part of a feature; none when it is no wall, or none with a
-/// finite visible part.
+/// The visible part of a feature; nothing when it is not a wall or its visible
+/// part is not finite.
 std::optional<VisibleWall> VisiblePartOf(const Feature& feature);
 
 /// Where a wall lies along a line through `origin` in the direction `along`, a

@@ -31,7 +31,7 @@ struct WallThicknessOptions {
   /// back over at least this length, m.
   double min_face = 0.5;
   double min_overlap = 0.5;
-  /// Two faces that are turned against each other by more are none of a wall,
+  /// Largest angle between the two faces of a wall,
   /// rad.
   double max_turn = DegToRad(5.0);
   /// Walls whose thickness is known less well say nothing of classes, m.

@@ -34,10 +34,10 @@ namespace plumbline {
 ///   unit:       rows 0, 1: m, rad (before whitening)
 ///   chi-square: 2 degrees of freedom (the rank of L)
 ///   degenerate: the value jumps where the direction is off by pi: a wall seen
-///               from outside is none of the corridor's. (-d, alpha + pi, w) is
-///               the same corridor with phi more by pi. The residual does not
-///               keep w positive. Far from the anchor along the axis the two
-///               rows depend on each other: L has to carry the lever
+///               from outside is not one of the corridor's. (-d, alpha + pi, w)
+///               is the same corridor with phi more by pi. The residual does
+///               not keep w positive. Far from the anchor along the axis the
+///               two rows depend on each other: L has to carry the lever
 ///               (CorridorInformation)
 ///   source:     ours; Sect. 7 of de la Puente and Rodriguez-Losada 2014 names
 ///               corridors as future work. Distance of Eq. 20

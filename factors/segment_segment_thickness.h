@@ -30,9 +30,9 @@ namespace plumbline {
 ///   unit:       rows 0, 1: m, rad (before whitening)
 ///   chi-square: 2 degrees of freedom (the rank of L)
 ///   degenerate: the value jumps where the direction is off by pi: two faces
-///               that are seen from the same side are none of a wall. Far apart
-///               along the wall the two rows depend on each other: L has to
-///               carry the lever (CollinearityInformation with the distance
+///               that are seen from the same side are not those of a wall. Far
+///               apart along the wall the two rows depend on each other: L has
+///               to carry the lever (CollinearityInformation with the distance
 ///               from the second face's position along its direction). Where
 ///               nothing holds the second face's position along its line, it
 ///               slides until f0 fits, however little the two are turned

@@ -30,7 +30,7 @@ class CarmenTokens {
   /// How many tokens are left.
   int Count() const;
 
-  /// The next token as a number; false when it is none.
+  /// The next token as a number; false when it is not one.
   bool NextDouble(double* value) { return Parse(Next(), value); }
   bool NextInt(int* value);
 

@@ -52,8 +52,8 @@ struct FeatureMatch {
   SegmentObservation observation;
 };
 
-/// Record of a key scan: enough to find its pose again when the
-/// map has moved.
+/// Record of a key scan: enough to find its pose again when the map
+/// has moved.
 struct KeyScanRecord {
   /// Index of the scan in the log.
   int scan = 0;

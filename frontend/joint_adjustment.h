@@ -47,8 +47,8 @@ struct JointAdjustmentOptions {
   /// repeated at most this often while a pose moves by more than this, m.
   int max_passes = 5;
   double settled_distance = 0.05;
-  /// Places of the first so many records stay where they are: the map that the
-  /// others are found in. Only without walls.
+  /// Places of this many records, the first, stay where they are: the map that
+  /// the others are found in. Only without walls.
   std::size_t num_held_records = 0;
   /// The result does not depend on it.
   int num_threads = 1;

@@ -220,6 +220,159 @@ JudgedScans JudgeScans(const std::vector<Scan>& scans,
   return {std::move(looked_at), std::move(verdicts)};
 }
 
+// What the parts of a track between its cuts have seen of each other.
+class PartComparison {
+ public:
+  // All must outlive it.
+  PartComparison(const std::vector<Scan>& scans, const std::vector<int>& keys,
+                 const std::vector<Pose2>& trajectory,
+                 const std::vector<TrackCut>& cuts,
+                 const MapCheckOptions& options)
+      : keys_(keys),
+        trajectory_(trajectory),
+        cuts_(cuts),
+        options_(options),
+        poses_(PosesAt(keys, trajectory)),
+        grid_(poses_, options.radius),
+        comparison_(scans, keys_, poses_, options),
+        returns_(scans, options.points) {
+    for (const int key : keys) parts_.push_back(PartOf(key));
+  }
+
+  // Compares scans along the way with the parts around them; false when it was
+  // stopped. Each round is spread over the way as evenly as all together: a
+  // pair of which enough is known after one is not looked at in the next.
+  bool Collect(const std::function<bool()>& stop) {
+    const std::vector<std::size_t> looked_at =
+        SpreadOver(WayLengths(poses_, kLongestStep), options_.spacing);
+    for (std::size_t round = 0; round < kRounds; ++round) {
+      for (std::size_t i = round; i < looked_at.size(); i += kRounds) {
+        if (!Compare(looked_at[i], stop)) return false;
+      }
+      for (const auto& [pair, said] : evidence_) {
+        if (said.compared >= options_.enough_compared) known_.insert(pair);
+      }
+    }
+    return true;
+  }
+
+  // The parts that are seen to lie right to each other.
+  DisjointSets Join() const {
+    DisjointSets joined(cuts_.size() + 1);
+    for (const auto& [pair, said] : evidence_) {
+      if (said.Confirms(options_)) joined.Join(pair.first, pair.second);
+    }
+    return joined;
+  }
+
+  // Whether a scan of the log agrees with what all parts saw around it.
+  bool Fits(int scan) {
+    const Pose2& pose = trajectory_[static_cast<std::size_t>(scan)];
+    std::vector<Neighbor> others;
+    for (const auto& [part, of_part] : Near(pose)) {
+      others.insert(others.end(), of_part.begin(), of_part.end());
+    }
+    return static_cast<int>(others.size()) >= options_.min_others &&
+           IsConfirming(
+               comparison_.Compare(scan, pose, std::move(others), &returns_),
+               options_);
+  }
+
+ private:
+  using Pair = std::pair<std::size_t, std::size_t>;
+  // Distance, m, and index of a key scan.
+  using Neighbor = std::pair<double, std::size_t>;
+
+  // Of what lies between two parts.
+  static constexpr std::size_t kNoPart =
+      std::numeric_limits<std::size_t>::max();
+
+  static std::vector<Pose2> PosesAt(const std::vector<int>& keys,
+                                    const std::vector<Pose2>& trajectory) {
+    std::vector<Pose2> poses;
+    for (const int key : keys) {
+      poses.push_back(trajectory[static_cast<std::size_t>(key)]);
+    }
+    return poses;
+  }
+
+  std::size_t PartOf(int scan) const {
+    std::size_t part = 0;
+    for (const TrackCut& cut : cuts_) {
+      if (scan > cut.begin && scan < cut.end) return kNoPart;
+      if (scan >= cut.end) ++part;
+    }
+    return part;
+  }
+
+  // Key scans near a pose, by the part that they are of.
+  std::map<std::size_t, std::vector<Neighbor>> Near(const Pose2& pose) const {
+    std::map<std::size_t, std::vector<Neighbor>> result;
+    grid_.Around(pose.head<2>(), [&](std::size_t j) {
+      const double distance = (poses_[j] - pose).head<2>().norm();
+      if (distance <= options_.radius && parts_[j] != kNoPart) {
+        result[parts_[j]].emplace_back(distance, j);
+      }
+    });
+    return result;
+  }
+
+  // Compares a key scan with the parts around it; false when it was stopped.
+  bool Compare(std::size_t k, const std::function<bool()>& stop) {
+    if (parts_[k] == kNoPart) return true;
+    // The parts just before and after its own are enough to join all, and what
+    // is compared does not grow with the square of the visits.
+    auto by_part = Near(poses_[k]);
+    for (auto other = by_part.begin(); other != by_part.end();) {
+      const bool is_enough =
+          other->first != parts_[k] &&
+          static_cast<int>(other->second.size()) >= options_.min_others;
+      other = is_enough ? std::next(other) : by_part.erase(other);
+    }
+    const auto after = by_part.upper_bound(parts_[k]);
+    const auto end = after == by_part.end() ? after : std::next(after);
+    auto other = after == by_part.begin() ? after : std::prev(after);
+    for (; other != end; ++other) {
+      if (stop && stop()) return false;
+      auto& [part, others] = *other;
+      const Pair pair = std::minmax(part, parts_[k]);
+      if (known_.count(pair) > 0) continue;
+      TakeEvidence(poses_[k],
+                   comparison_.Compare(keys_[k], poses_[k], std::move(others),
+                                       &returns_),
+                   pair);
+    }
+    return true;
+  }
+
+  void TakeEvidence(const Pose2& pose, const ScanAgreement& agreement,
+                    const Pair& pair) {
+    const bool contradicts =
+        Judge(agreement, options_) == Verdict::kContradicts;
+    if (!contradicts && !IsKnown(agreement, options_)) return;
+    Evidence& of_pair = evidence_[pair];
+    ++of_pair.compared;
+    if (contradicts) ++of_pair.contradicting;
+    if (IsConfirming(agreement, options_)) {
+      of_pair.confirming.emplace_back(pose.head<2>());
+    }
+  }
+
+  const std::vector<int>& keys_;
+  const std::vector<Pose2>& trajectory_;
+  const std::vector<TrackCut>& cuts_;
+  const MapCheckOptions& options_;
+  // By key scan.
+  std::vector<Pose2> poses_;
+  std::vector<std::size_t> parts_;
+  PlaceGrid grid_;
+  MapComparison comparison_;
+  ScanReturns returns_;
+  std::map<Pair, Evidence> evidence_;
+  // Pairs of which enough is known.
+  std::set<Pair> known_;
+};
+
 }  // namespace
 
 std::vector<MapContradiction> FindContradictions(
@@ -281,101 +434,13 @@ std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
   }
   std::vector<bool> is_confirmed(cuts.size(), false);
   if (cuts.empty()) return is_confirmed;
-  // Of what lies between two parts.
-  constexpr std::size_t kNoPart = std::numeric_limits<std::size_t>::max();
-  const auto part_of = [&cuts](int scan) {
-    std::size_t part = 0;
-    for (const TrackCut& cut : cuts) {
-      if (scan > cut.begin && scan < cut.end) return kNoPart;
-      if (scan >= cut.end) ++part;
-    }
-    return part;
-  };
-  std::vector<Pose2> poses;
-  std::vector<std::size_t> parts;
-  for (const int key : keys) {
-    poses.push_back(trajectory[static_cast<std::size_t>(key)]);
-    parts.push_back(part_of(key));
-  }
-  const PlaceGrid grid(poses, options.radius);
-  const MapComparison comparison(scans, keys, poses, options);
-  ScanReturns returns(scans, options.points);
-  // Key scans near a pose, by the part that they are of.
-  const auto near = [&](const Pose2& pose) {
-    std::map<std::size_t, std::vector<std::pair<double, std::size_t>>> result;
-    grid.Around(pose.head<2>(), [&](std::size_t j) {
-      const double distance = (poses[j] - pose).head<2>().norm();
-      if (distance <= options.radius && parts[j] != kNoPart) {
-        result[parts[j]].emplace_back(distance, j);
-      }
-    });
-    return result;
-  };
-  std::map<std::pair<std::size_t, std::size_t>, Evidence> evidence;
-  const std::vector<std::size_t> looked_at =
-      SpreadOver(WayLengths(poses, kLongestStep), options.spacing);
-  std::set<std::pair<std::size_t, std::size_t>> known;
-  // Compares a key scan with the parts around it; false when it was stopped.
-  const auto compare = [&](std::size_t k) {
-    if (parts[k] == kNoPart) return true;
-    // The parts just before and after its own are enough to join all, and what
-    // is compared does not grow with the square of the visits.
-    auto by_part = near(poses[k]);
-    for (auto other = by_part.begin(); other != by_part.end();) {
-      const bool is_enough =
-          other->first != parts[k] &&
-          static_cast<int>(other->second.size()) >= options.min_others;
-      other = is_enough ? std::next(other) : by_part.erase(other);
-    }
-    const auto after = by_part.upper_bound(parts[k]);
-    const auto end = after == by_part.end() ? after : std::next(after);
-    auto other = after == by_part.begin() ? after : std::prev(after);
-    for (; other != end; ++other) {
-      if (stop && stop()) return false;
-      auto& [part, others] = *other;
-      const std::pair<std::size_t, std::size_t> pair =
-          std::minmax(part, parts[k]);
-      if (known.count(pair) > 0) continue;
-      const ScanAgreement agreement =
-          comparison.Compare(keys[k], poses[k], std::move(others), &returns);
-      const bool contradicts =
-          Judge(agreement, options) == Verdict::kContradicts;
-      if (!contradicts && !IsKnown(agreement, options)) continue;
-      Evidence& of_pair = evidence[pair];
-      ++of_pair.compared;
-      if (contradicts) ++of_pair.contradicting;
-      if (IsConfirming(agreement, options)) {
-        of_pair.confirming.emplace_back(poses[k].head<2>());
-      }
-    }
-    return true;
-  };
-  // Each round is spread over the way as evenly as all together: a pair of
-  // which enough is known after one is not looked at in the next.
-  for (std::size_t round = 0; round < kRounds; ++round) {
-    for (std::size_t i = round; i < looked_at.size(); i += kRounds) {
-      if (!compare(looked_at[i])) return is_confirmed;
-    }
-    for (const auto& [pair, said] : evidence) {
-      if (said.compared >= options.enough_compared) known.insert(pair);
-    }
-  }
-  DisjointSets joined(cuts.size() + 1);
-  for (const auto& [pair, said] : evidence) {
-    if (said.Confirms(options)) joined.Join(pair.first, pair.second);
-  }
+  PartComparison parts(scans, keys, trajectory, cuts, options);
+  if (!parts.Collect(stop)) return is_confirmed;
+  DisjointSets joined = parts.Join();
   for (std::size_t c = 0; c < cuts.size(); ++c) {
     bool fits = joined.Find(c) == joined.Find(c + 1);
     for (int i = cuts[c].begin + 1; fits && i < cuts[c].end; ++i) {
-      const Pose2& pose = trajectory[static_cast<std::size_t>(i)];
-      std::vector<std::pair<double, std::size_t>> others;
-      for (const auto& [part, of_part] : near(pose)) {
-        others.insert(others.end(), of_part.begin(), of_part.end());
-      }
-      fits =
-          static_cast<int>(others.size()) >= options.min_others &&
-          IsConfirming(comparison.Compare(i, pose, std::move(others), &returns),
-                       options);
+      fits = parts.Fits(i);
     }
     is_confirmed[c] = fits;
   }

@@ -35,15 +35,16 @@ struct MapCheckOptions {
   /// reported.
   int min_scans = 3;
   /// What it takes to believe that two parts of a track lie right to each other
-  /// (FindConfirmedTies): so many scans of either that agree with the other,
-  /// one for each `spacing`, that many of all that can be compared, and so few
-  /// that contradict it. Their places have at least this standard deviation in
-  /// every direction, m: along a corridor all agrees.
+  /// (FindConfirmedTies): at least this many scans of either, one for each
+  /// `spacing`, that agree with the other, this share of all that can be
+  /// compared, and no larger share that contradicts it. Their places have at
+  /// least this standard deviation in every direction, m: along a corridor all
+  /// agrees.
   int min_confirming = 20;
   double min_confirming_share = 0.8;
   double max_contradicting_share = 0.05;
   double min_confirming_spread = 1.0;
-  /// Of two parts that see much of each other so many comparisons are enough.
+  /// Comparisons that are enough for two parts that see much of each other.
   int enough_compared = 100;
   /// Shares as above, up to which a scan agrees, and share of its returns that
   /// do not lie in the unknown.

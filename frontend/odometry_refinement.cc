@@ -352,8 +352,9 @@ UncertainPose2 OdometryRefiner::StepOf(const Pose2& by_wheels) {
     if (is_dead_) return steady_.Step();
     return {by_wheels, OdometryCovariance(by_wheels, options_.noise)};
   }
-  const Pose2 motion =
-      options_.match_scans ? odometry_scale_.Scaled(by_wheels) : by_wheels;
+  const Pose2 motion = options_.match_scans
+                           ? odometry_calibration_.Corrected(by_wheels)
+                           : by_wheels;
   UncertainPose2 step = {motion, OdometryCovariance(motion, options_.noise)};
   // Odometry that has only been late catches up with all of the way at once.
   if (is_dead_ && IsLate(motion)) {
@@ -447,7 +448,7 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
     result.pose = prior.pose;
     motion = Between(track_.last_pose, result.pose);
   }
-  if (moves_on || is_dead_) odometry_scale_.Break();
+  if (moves_on || is_dead_) odometry_calibration_.Break();
   // What may move is not what stands: where it speaks for another pose than the
   // rest, the rest counts.
   if (track_.moving > 0) --track_.moving;
@@ -611,7 +612,7 @@ void OdometryRefiner::BeginTrack(const Scan& scan, SettledScan* first) {
   track_.last_pose = refined.pose;
   track_.last_points = points_;
   key_odometry_ = scan.odometry;
-  odometry_scale_.Break();
+  odometry_calibration_.Break();
   track_.keys.push_back(
       {first->index, refined.pose, points_, scan.laser_offset.head<2>()});
   RebuildReference(&track_);
@@ -805,10 +806,10 @@ void OdometryRefiner::CompareOdometry(const Scan& scan,
   const Pose2 by_wheels = Between(key_odometry_, scan.odometry);
   key_odometry_ = scan.odometry;
   if (refined.odometry_only || track_.keys.empty()) return;
-  const Pose2 motion = odometry_scale_.Scaled(by_wheels);
-  odometry_scale_.Compare(by_wheels,
-                          OdometryCovariance(by_wheels, options_.noise),
-                          refined.since_key.mean, information);
+  const Pose2 motion = odometry_calibration_.Corrected(by_wheels);
+  odometry_calibration_.Compare(by_wheels,
+                                OdometryCovariance(by_wheels, options_.noise),
+                                refined.since_key.mean, information);
   Pose2 left = refined.since_key.mean - motion;
   left[2] = NormalizeAngle(left[2]);
   const double innovation =
@@ -949,8 +950,8 @@ void OdometryRefiner::ExchangeState(StateArchive& archive) {
               last_time_, usual_step_, search_.seen(), part_, num_parts_,
               loose_of_, wide_searches_, refusals_, losses_, loose_, guessed_,
               noise_, noise_scale_, key_odometry_, squared_innovations_,
-              compared_motions_, odometry_scale_, steady_, still_, last_motion_,
-              still_pose_, is_dead_, ahead_);
+              compared_motions_, odometry_calibration_, steady_, still_,
+              last_motion_, still_pose_, is_dead_, ahead_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

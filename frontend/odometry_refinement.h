@@ -4,7 +4,7 @@
 #include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/match_drift.h>
-#include <plumbline/frontend/odometry_scale.h>
+#include <plumbline/frontend/odometry_calibration.h>
 #include <plumbline/frontend/part_joining.h>
 #include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/scan.h>
@@ -193,7 +193,10 @@ class OdometryRefiner {
   /// or what the scans so far show, 0 while they are too few.
   double range_sigma() const;
   /// What a metre of odometry is presently taken for, m.
-  double odometry_scale() const { return odometry_scale_.scale(); }
+  double odometry_scale() const { return odometry_calibration_.scale(); }
+  /// By how much the robot is presently taken to drive to the left of where its
+  /// laser looks by the log, rad.
+  double odometry_course() const { return odometry_calibration_.course(); }
   /// Factor by which the laser is noisier than usual, as presently allowed for.
   double noise_scale() const { return noise_scale_; }
 
@@ -368,7 +371,7 @@ class OdometryRefiner {
   Pose2 key_odometry_ = Pose2::Zero();
   double squared_innovations_ = 0.0;
   int compared_motions_ = 0;
-  OdometryScale odometry_scale_;
+  OdometryCalibration odometry_calibration_;
   // How the robot moved of late, by its scans.
   SteadyMotion steady_;
   // For so many scans odometry did not move; its last motion before, and where

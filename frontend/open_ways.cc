@@ -106,6 +106,7 @@ class Comparison {
     ScanMatcherOptions matcher = options.matcher;
     matcher.initial_radius = matcher.final_radius;
     matcher.max_iterations = 5;
+    matcher.coarse_points = std::numeric_limits<int>::max();
     return matcher;
   }
 

@@ -20,8 +20,8 @@ struct OpenWayOptions {
   MatchDrift drift;
   /// Way between the places that are looked at, m.
   double spacing = 1.0;
-  /// What was seen on the last so many metres before a place, and on other
-  /// visits that passed within so many metres of it, is compared with its scan.
+  /// A place's scan is compared with what was seen on this much way before it,
+  /// and on other visits that passed within this radius of it, m.
   double visit = 4.0;
   double radius = 2.0;
   /// A visit is another one after this much way, m.

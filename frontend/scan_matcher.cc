@@ -52,6 +52,16 @@ constexpr double kListMargin = 0.004;
 constexpr double kListTurn = 0.05;
 constexpr double kRounding = 1e-9;
 
+// The gate shrinks over so many iterations, or until a step is smaller than
+// this, m and rad.
+constexpr double kShrinkingIterations = 6.0;
+constexpr double kCalmShift = 0.005;
+constexpr double kCalmTurn = 0.0015;
+
+// What a return without a partner costs, in squared sigmas: the most that any
+// does.
+constexpr double kUnmatchedCost = 4.0;
+
 // Reference points that are compared at a time, and what single precision may
 // be off by within kReferenceReach, m.
 constexpr int kBlock = 4;
@@ -270,9 +280,53 @@ int ScanMatcher::AnyReference(const Eigen::Vector2d& point,
   return found;
 }
 
+int ScanMatcher::NearestAndAround(const Eigen::Vector2d& point,
+                                  const Eigen::Vector2d& normal, double radius,
+                                  double margin, int hint,
+                                  Lookup* lookup) const {
+  Nearest nearest{-1, radius * radius};
+  double reach = radius + margin;
+  double squared_reach = reach * reach;
+  const auto begin = static_cast<std::ptrdiff_t>(around_.size());
+  const auto consider = [&](int i) {
+    const Surface& candidate = reference_[i];
+    const double distance = (candidate.position - point).squaredNorm();
+    if (distance > squared_reach) return;
+    const double cosine = candidate.normal.dot(normal);
+    if (cosine < kSameSide - kListTurn - kRounding) return;
+    around_.push_back({candidate, i});
+    if (cosine < kSameSide || !nearest.IsBetter(i, distance)) return;
+    nearest = {i, distance};
+    reach = std::sqrt(distance) + margin;
+    squared_reach = reach * reach;
+  };
+  if (hint >= 0) {
+    consider(hint);
+    // It comes once more.
+    around_.erase(around_.begin() + begin, around_.end());
+  }
+  VisitBuckets(point, &squared_reach, [&](int first, int last) {
+    VisitNear(first, last, point, &squared_reach, consider);
+  });
+  // Some were taken in before the nearest was known.
+  around_.erase(
+      std::remove_if(around_.begin() + begin, around_.end(),
+                     [&](const Neighbour& one) {
+                       return (one.surface.position - point).squaredNorm() >
+                              squared_reach;
+                     }),
+      around_.end());
+  lookup->center = point;
+  lookup->normal = normal;
+  lookup->begin = static_cast<int>(begin);
+  lookup->end = static_cast<int>(around_.size());
+  lookup->reach = reach;
+  return nearest.index;
+}
+
 int ScanMatcher::NearestAgain(const Eigen::Vector2d& point,
                               const Eigen::Vector2d& normal, double radius,
-                              int hint, Lookup* lookup) const {
+                              double step, int hint, Lookup* lookup) const {
   if (reference_.empty()) return -1;
   if (lookup->reach >= 0.0 &&
       (normal - lookup->normal).squaredNorm() < kListTurn * kListTurn) {
@@ -294,30 +348,72 @@ int ScanMatcher::NearestAgain(const Eigen::Vector2d& point,
       return nearest.index;
     }
   }
-  const int partner = NearestReference(point, normal, radius, hint);
   // A list pays once the point hardly moves.
-  lookup->reach = -1.0;
-  const double step = (point - lookup->last).norm();
   if (step < kListStep) {
-    lookup->center = point;
-    lookup->normal = normal;
-    lookup->begin = static_cast<int>(around_.size());
-    lookup->reach =
-        std::max(2.0 * step, kListMargin) +
-        (partner >= 0 ? (reference_[partner].position - point).norm() : radius);
-    const double squared_reach = lookup->reach * lookup->reach;
-    VisitBuckets(point, &squared_reach, [&](int begin, int end) {
-      VisitNear(begin, end, point, &squared_reach, [&](int i) {
-        const Surface& candidate = reference_[i];
-        if ((candidate.position - point).squaredNorm() <= squared_reach &&
-            candidate.normal.dot(normal) >= kSameSide - kListTurn - kRounding) {
-          around_.push_back({candidate, i});
-        }
-      });
-    });
-    lookup->end = static_cast<int>(around_.size());
+    return NearestAndAround(point, normal, radius,
+                            std::max(2.0 * step, kListMargin), hint, lookup);
   }
-  return partner;
+  lookup->reach = -1.0;
+  return NearestReference(point, normal, radius, hint);
+}
+
+ScanMatcher::Sums ScanMatcher::SumUp(const Pose2& pose, double radius,
+                                     std::size_t stride,
+                                     const Eigen::Vector3d& step) const {
+  Sums sums;
+  const double inverse_variance =
+      1.0 / (options_.point_sigma * options_.point_sigma);
+  const double c = std::cos(pose[2]);
+  const double s = std::sin(pose[2]);
+  const double shift = step.head<2>().norm();
+  const double turn = std::abs(step[2]);
+  double xx = 0.0, xy = 0.0, xt = 0.0, yy = 0.0, yt = 0.0, tt = 0.0;
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  int neighbour = -1;
+  for (std::size_t i = stride / 2; i < points_.size(); i += stride) {
+    const Surface& point = points_[i];
+    ++sums.tried;
+    const Eigen::Vector2d rotated(
+        c * point.position.x() - s * point.position.y(),
+        s * point.position.x() + c * point.position.y());
+    const Eigen::Vector2d position = rotated + pose.head<2>();
+    const Eigen::Vector2d normal(c * point.normal.x() - s * point.normal.y(),
+                                 s * point.normal.x() + c * point.normal.y());
+    // The partner that it had is near, as is that of the beam before.
+    Lookup& lookup = lookups_[i];
+    const int index = NearestAgain(
+        position, normal, radius, shift + turn * rotated.lpNorm<1>(),
+        lookup.partner >= 0 ? lookup.partner : neighbour, &lookup);
+    lookup.partner = index;
+    neighbour = index;
+    if (index < 0) {
+      sums.cost += kUnmatchedCost;
+      continue;
+    }
+    const Surface& partner = reference_[index];
+    const Eigen::Vector2d& n = partner.normal;
+    const double error = n.dot(position - partner.position);
+    const double squared = error * error * inverse_variance;
+    // Cauchy weight.
+    const double weight = inverse_variance / (1.0 + squared / 4.0);
+    sums.cost += std::min(kUnmatchedCost, squared);
+    ++sums.inliers;
+    // The error's derivatives are the normal and this one.
+    const double by_turn = n.y() * rotated.x() - n.x() * rotated.y();
+    const double wx = weight * n.x();
+    const double wy = weight * n.y();
+    const double wt = weight * by_turn;
+    xx += wx * n.x();
+    xy += wx * n.y();
+    xt += wx * by_turn;
+    yy += wy * n.y();
+    yt += wy * by_turn;
+    tt += wt * by_turn;
+    gradient += error * Eigen::Vector3d(wx, wy, wt);
+  }
+  sums.information << xx, xy, xt, xy, yy, yt, xt, yt, tt;
+  sums.gradient = gradient;
+  return sums;
 }
 
 MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
@@ -325,69 +421,36 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
                                 const MatchPrior& prior) const {
   MatchResult result;
   result.pose = guess;
-  lookups_.assign(scan.size(), Lookup());
+  points_.clear();
+  for (const ScanPoint& point : scan) {
+    if (point.normal.squaredNorm() == 0.0) continue;
+    points_.push_back({point.position, point.normal});
+  }
+  lookups_.assign(points_.size(), Lookup());
   around_.clear();
-  const double inverse_variance =
-      1.0 / (options_.point_sigma * options_.point_sigma);
-  Eigen::Matrix3d information;
   // Far apart they share less; points between them add nothing of their own.
   const double independence = std::min(options_.independence, OwnShare(scan));
+  // The gate shrinks over the first iterations: wide to be pulled in, narrow to
+  // be exact, and at once where the pose hardly moves. Until it is narrow some
+  // of the points are enough.
+  const std::size_t stride = std::max<std::size_t>(
+      1, points_.size() /
+             static_cast<std::size_t>(std::max(1, options_.coarse_points)));
+  double progress = 0.0;
+  Eigen::Vector3d step = Eigen::Vector3d::Constant(kReferenceReach);
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
-    // The gate shrinks over the first iterations: wide to be pulled in, narrow
-    // to be exact.
-    const double progress = std::min(1.0, iteration / 6.0);
+    const bool is_coarse = progress < 1.0;
     const double radius =
         options_.initial_radius +
         progress * (options_.final_radius - options_.initial_radius);
-    const double c = std::cos(result.pose[2]);
-    const double s = std::sin(result.pose[2]);
-    information.setZero();
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    double cost = 0.0;
-    int inliers = 0;
-    int tried = 0;
-    int neighbour = -1;
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      const ScanPoint& point = scan[i];
-      if (point.normal.squaredNorm() == 0.0) continue;
-      ++tried;
-      const Eigen::Vector2d rotated(
-          c * point.position.x() - s * point.position.y(),
-          s * point.position.x() + c * point.position.y());
-      const Eigen::Vector2d position = rotated + result.pose.head<2>();
-      const Eigen::Vector2d normal(c * point.normal.x() - s * point.normal.y(),
-                                   s * point.normal.x() + c * point.normal.y());
-      // The partner that it had is near, as is that of the beam before.
-      Lookup& lookup = lookups_[i];
-      const int index = NearestAgain(
-          position, normal, radius,
-          lookup.partner >= 0 ? lookup.partner : neighbour, &lookup);
-      lookup.partner = index;
-      lookup.last = position;
-      neighbour = index;
-      if (index < 0) {
-        cost += 4.0;
-        continue;
-      }
-      const Surface& partner = reference_[index];
-      const Eigen::Vector2d n = partner.normal;
-      const double error = n.dot(position - partner.position);
-      const double squared = error * error * inverse_variance;
-      // Cauchy weight.
-      const double weight = 1.0 / (1.0 + squared / 4.0);
-      cost += std::min(4.0, squared);
-      ++inliers;
-      const Eigen::Vector3d jacobian(n.x(), n.y(),
-                                     n.y() * rotated.x() - n.x() * rotated.y());
-      information.noalias() +=
-          (weight * inverse_variance) * jacobian * jacobian.transpose();
-      gradient.noalias() += (weight * inverse_variance * error) * jacobian;
-    }
-    information *= independence;
-    gradient *= independence;
-    result.inliers = inliers;
-    result.inlier_ratio = tried > 0 ? static_cast<double>(inliers) / tried : 0;
-    result.cost = tried > 0 ? cost / tried : 4.0;
+    const Sums sums = SumUp(result.pose, radius, is_coarse ? stride : 1, step);
+    const double share = is_coarse ? independence * stride : independence;
+    const Eigen::Matrix3d information = share * sums.information;
+    Eigen::Vector3d gradient = share * sums.gradient;
+    result.inliers = sums.inliers;
+    result.inlier_ratio =
+        sums.tried > 0 ? static_cast<double>(sums.inliers) / sums.tried : 0.0;
+    result.cost = sums.tried > 0 ? sums.cost / sums.tried : kUnmatchedCost;
     Eigen::Vector3d difference = result.pose - prior.pose;
     difference[2] = NormalizeAngle(difference[2]);
     // The prior is heavy tailed: odometry that is plainly wrong (a slip, a
@@ -397,16 +460,21 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
     Eigen::Matrix3d hessian = information + prior_weight * prior.information;
     gradient += prior_weight * (prior.information * difference);
     hessian.diagonal().array() += 1e-9;
-    const Eigen::Vector3d step = hessian.ldlt().solve(-gradient);
+    step = hessian.ldlt().solve(-gradient);
     result.information = information;
     result.covariance = hessian.inverse();
     if (!step.allFinite()) break;
     result.pose += step;
     result.pose[2] = NormalizeAngle(result.pose[2]);
-    if (progress >= 1.0 && step.head<2>().norm() < options_.convergence &&
-        std::abs(step[2]) < options_.convergence) {
+    const double shift = step.head<2>().norm();
+    const double turn = std::abs(step[2]);
+    if (!is_coarse && shift < options_.convergence &&
+        turn < options_.convergence) {
       break;
     }
+    if (shift < kCalmShift && turn < kCalmTurn) progress = 1.0;
+    progress = std::max(progress,
+                        std::min(1.0, (iteration + 1) / kShrinkingIterations));
   }
   return result;
 }

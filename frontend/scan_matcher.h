@@ -29,6 +29,9 @@ struct ScanMatcherOptions {
   int max_iterations = 20;
   /// A step smaller than this (m, and rad) ends the iteration.
   double convergence = 1e-4;
+  /// While the radius shrinks about so many points of a scan are matched, then
+  /// all.
+  int coarse_points = 80;
   /// Correlative search: cell size (m), step of the search in translation (m)
   /// and rotation (rad).
   double grid_resolution = 0.1;
@@ -227,9 +230,11 @@ class ScanMatcher {
   // away several at a time.
   std::vector<float> reference_x_;
   std::vector<float> reference_y_;
-  // A point of the scan that is refined: its partner, and copies of the
-  // reference points around the place where it was last looked up. While it
-  // stays near, its partner is one of them.
+  // Points of the scan that is refined: those with a normal.
+  mutable std::vector<Surface> points_;
+  // Of each of them: its partner, and copies of the reference points around the
+  // place where it was last looked up. While it stays near, its partner is one
+  // of them.
   struct Lookup {
     int partner = -1;
     int begin = 0;
@@ -239,7 +244,6 @@ class ScanMatcher {
     double reach = -1.0;
     Eigen::Vector2d center = Eigen::Vector2d::Zero();
     Eigen::Vector2d normal = Eigen::Vector2d::Zero();
-    Eigen::Vector2d last = Eigen::Vector2d::Zero();
   };
   struct Neighbour {
     Surface surface;
@@ -247,9 +251,27 @@ class ScanMatcher {
   };
   mutable std::vector<Lookup> lookups_;
   mutable std::vector<Neighbour> around_;
-  // NearestReference for a point that was looked up before.
+  // NearestReference for a point that may have been looked up before, and has
+  // moved by no more than `step`, m, since the iteration before.
   int NearestAgain(const Eigen::Vector2d& point, const Eigen::Vector2d& normal,
-                   double radius, int hint, Lookup* lookup) const;
+                   double radius, double step, int hint, Lookup* lookup) const;
+  // NearestReference that also keeps the reference points which are farther
+  // away than the nearest by no more than `margin`, m.
+  int NearestAndAround(const Eigen::Vector2d& point,
+                       const Eigen::Vector2d& normal, double radius,
+                       double margin, int hint, Lookup* lookup) const;
+  // What the points say of a pose: sums over those with a partner in squared
+  // sigmas, of one point in `stride`.
+  struct Sums {
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    double cost = 0.0;
+    int inliers = 0;
+    int tried = 0;
+  };
+  // `step`: by which the pose was changed since the iteration before.
+  Sums SumUp(const Pose2& pose, double radius, std::size_t stride,
+             const Eigen::Vector3d& step) const;
   // Buckets of reference points, by counting sort over cells.
   double bucket_size_ = 0.1;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();

@@ -197,7 +197,7 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
   if (places_.size() != poses.size()) {
     throw PLUMBLINE_ERROR(std::to_string(places_.size()) + " places and " +
                               std::to_string(poses.size()) + " poses",
-                          "one pose a place");
+                          "one pose per place");
   }
   const std::vector<Submap> submaps = Submaps(places_, options_.submap_size);
   const std::vector<std::vector<int>> keys =

@@ -69,7 +69,7 @@ struct WallCompletionOptions {
   /// on their number.
   int num_threads = 1;
 
-  /// For a laser that is so many times noisier (RangeNoiseScale).
+  /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale);
 };
 

@@ -34,7 +34,7 @@ struct WallVoteOptions {
   /// The result does not depend on it.
   int num_threads = 1;
 
-  /// For a laser that is so many times noisier (RangeNoiseScale).
+  /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale) {
     max_offset *= scale;
     point_sigma *= scale;

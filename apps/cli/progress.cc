@@ -13,7 +13,7 @@
 DEFINE_bool(quiet, false,
             "Print errors only: no progress bar (there is one on a terminal "
             "only), no remarks, no closing lines");
-DEFINE_bool(verbose, false, "Print what is being done, a line a step");
+DEFINE_bool(verbose, false, "Print what is being done, one line per step");
 
 namespace plumbline {
 namespace {

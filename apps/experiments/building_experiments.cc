@@ -4,6 +4,7 @@
 #include <plumbline/apps/experiments/solve_mode.h>
 #include <plumbline/apps/experiments/synthetic_run.h>
 #include <plumbline/apps/simulation/bent_world.h>
+#include <plumbline/apps/simulation/building.h>
 
 #include <algorithm>
 #include <cmath>

@@ -2,6 +2,7 @@
 #include <plumbline/apps/experiments/experiment_jobs.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
+#include <plumbline/outputs/map_picture.h>
 
 #include <cmath>
 #include <cstdio>

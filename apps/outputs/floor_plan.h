@@ -20,7 +20,7 @@ struct FloorPlanOptions {
   /// Faces whose directions differ by more are never one, rad.
   double merge_angle = DegToRad(3.0);
   /// Two faces that look the same way and lie side by side cannot both be
-  /// seen: this near to each other, m, they are one wall seen twice.
+  /// seen: no farther apart than this, m, they are one wall seen twice.
   double duplicate_offset = 0.15;
   /// Faces one behind the other are one when they are in line to this and the
   /// gap between them is no longer than that, m. Set-back doors and openings
@@ -57,7 +57,7 @@ struct FloorPlan {
   BuildingPlan building;
   /// Between two faces of one wall: corners in order, m, map frame.
   std::vector<std::array<Eigen::Vector2d, 4>> solids;
-  /// Columns and other round things.
+  /// Columns and other circles.
   std::vector<DrawnCircle> circles;
   /// Poses of the robot; what lies nearer than 5 cm to the one before is left
   /// out.

@@ -2,6 +2,7 @@
 #include <plumbline/core/number_text.h>
 #include <plumbline/core/xml_text.h>
 #include <plumbline/outputs/floor_plan_svg.h>
+#include <plumbline/outputs/map_layout.h>
 
 #include <algorithm>
 #include <cmath>

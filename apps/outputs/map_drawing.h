@@ -90,13 +90,6 @@ struct MapDrawing {
   std::string title;
 };
 
-/// Options of drawing a map.
-struct MapDrawingOptions {
-  /// Length of the picture's longer side, px, 200 to 20000. Line widths and
-  /// letters grow with it.
-  int long_side = 2400;
-};
-
 /// Draws the walls (segments and lines with an extent), circles, rectangles and
 /// points of a graph; virtual points are common centres. A wall's cluster is
 /// the orientation feature to which live structure ties it or the rectangle
@@ -106,23 +99,8 @@ struct MapDrawingOptions {
 MapDrawing DrawingFromGraph(const Graph& graph, const std::vector<Pose2>& path);
 
 /// Ends of a wall feature (segment or line) in the map frame, m: x1, y1, x2,
-/// y2. False when the feature is no wall or has no extent.
+/// y2. False when the feature is not a wall or has no extent.
 bool WallEnds(const Feature& feature, DrawnWall* wall);
-
-/// Largest length of the form 1, 2 or 5 times a power of ten that is at most
-/// `longest` (> 0), m.
-double ScaleBarLength(double longest);
-
-/// Writes the drawing as SVG whose outer user unit is the metre: x to the
-/// right as in the map, y downwards, so y of the map is minus y of the viewBox.
-/// Written whole or not at all; the same drawing gives the same bytes. Throws
-/// Error for options out of range or when the file cannot be written.
-void WriteMapSvg(const MapDrawing& drawing, const std::string& path,
-                 const MapDrawingOptions& options = {});
-
-/// The same picture as PNG on white.
-void WriteMapPng(const MapDrawing& drawing, const std::string& path,
-                 const MapDrawingOptions& options = {});
 
 }  // namespace plumbline
 

@@ -26,8 +26,8 @@ namespace plumbline {
 /// and rooms.csv. Without a plan (null) there is neither "rooms" nor "doors";
 /// both are empty when rooms were looked for and there are none. ReadGraphJson
 /// reads the file and passes over both. Last come the key scans
-/// (AppendKeyScans), from which another run goes on; without them (null) there
-/// is none of it.
+/// (AppendKeyScans), from which another run goes on; without them (null)
+/// they are left out.
 void WriteMapJson(const Graph& graph, const FeatureCovariances* covariances,
                   const BuildingPlan* plan, const KeyScanArchive* key_scans,
                   std::ostream& output);

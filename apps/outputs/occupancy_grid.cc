@@ -299,7 +299,7 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
   if (scans.size() < poses.size()) {
     throw PLUMBLINE_ERROR(std::to_string(poses.size()) + " poses for " +
                               std::to_string(scans.size()) + " scans",
-                          "a scan a pose");
+                          "one scan per pose");
   }
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;

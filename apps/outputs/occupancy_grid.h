@@ -61,7 +61,7 @@ class OccupancyGrid {
                 const OccupancyOptions& options);
 
   /// Casts the rays of a scan whose robot stood at `pose` (map frame). A cell
-  /// is hit or seen through at most once a scan, and hit rather than seen
+  /// is hit or seen through at most once per scan, and hit rather than seen
   /// through. Readings without return are passed over: a laser also sees none
   /// on glass and on black things. What lies outside of the grid is left out.
   void AddScan(const Scan& scan, const Pose2& pose);

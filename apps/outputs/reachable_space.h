@@ -26,8 +26,9 @@ struct ReachOptions {
   int pocket = 20;
   /// What was hit is kept up to this far from free space that is kept.
   int behind = 6;
-  /// So many unknown cells between two free ones in a row or a column hinder
-  /// the disc no more than free ones: rays are so far apart there. Empty: 0.
+  /// Up to this many unknown cells between two free ones in a row or a column
+  /// hinder the disc no more than free ones: rays are that far apart there.
+  /// Empty: 0.
   std::function<int(int column, int row)> gap;
 };
 

@@ -10,6 +10,7 @@
 #include <plumbline/outputs/floor_plan_svg.h>
 #include <plumbline/outputs/map_drawing.h>
 #include <plumbline/outputs/map_json.h>
+#include <plumbline/outputs/map_picture.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/report.h>
 #include <plumbline/outputs/rooms_csv.h>
@@ -312,8 +313,8 @@ void RegisterBuiltinOutputWriters(Registry* registry) {
           WriteG2o(*outcome.graph, outcome.g2o, output);
         });
       }));
-  add("em_trace.csv", "a row a phase of expectation maximization", true, false,
-      Always([](const SolveOutcome& outcome, const path& folder) {
+  add("em_trace.csv", "one row per phase of expectation maximization", true,
+      false, Always([](const SolveOutcome& outcome, const path& folder) {
         std::vector<EmTraceRow> rows;
         for (const EmPhase& phase : outcome.trace) rows.push_back({phase, {}});
         WriteEmTrace(rows, folder / "em_trace.csv");

@@ -158,6 +158,11 @@ Json FrontendToJson(const Summary& summary) {
   json["scan_seconds_growth"] =
       early && late && *early > 0.0 ? Json(*late / *early) : Json(nullptr);
   json["range_noise_m"] = summary.range_noise;
+  if (summary.odometry_scale > 0.0) {
+    json["range_offset_m"] = summary.range_offset;
+    json["odometry_scale"] = summary.odometry_scale;
+    json["odometry_course_deg"] = RadToDeg(summary.odometry_course);
+  }
   if (summary.open_way > 0.0) json["open_way_m"] = summary.open_way;
   return json;
 }

@@ -180,10 +180,18 @@ struct Summary {
   std::vector<SkipReport> skipped;
   std::vector<double> scan_seconds;
   /// Of a log without odometry: m of the way along which the scans do not tell
-  /// how far the robot went; 0: too little to speak of.
+  /// how far the robot went; 0: too little to mention.
   double open_way = 0.0;
   /// Of a log: noise of the laser's ranges (standard deviation, m).
   double range_noise = 0.0;
+  /// Of a log: by how much they were too long, m (negative: too short), which
+  /// was taken out; 0: by nothing that shows. Of several logs the notes tell.
+  double range_offset = 0.0;
+  /// Of one log: what a metre of its odometry was taken for, m, and by how much
+  /// the robot drove to the left of where its laser looks by the log, rad. A
+  /// scale of 0: of several logs; neither is written.
+  double odometry_scale = 0.0;
+  double odometry_course = 0.0;
   /// Of a log only: its format, what gave the scans and the odometry, and what
   /// was taken for granted, for people. Empty: not written.
   std::string log_format;
@@ -211,6 +219,9 @@ std::string CountsAsJson(const Summary& summary);
 /// seconds}}; for a log also frontend {skipped [{reason, count, first_lines}],
 /// scan_seconds_second_tenth, scan_seconds_last_tenth, scan_seconds_growth
 /// (their quotient), range_noise_m (of the laser, as the scans show it),
+/// range_offset_m (by which its ranges were too long, and which was taken out),
+/// odometry_scale, odometry_course_deg (what a metre of odometry was taken for,
+/// and by how much the robot drove to the left of where its laser looks),
 /// open_way_m (along which nothing tells how far the robot went; of logs
 /// without odometry), format, scans, odometry (names; of logs that tell), notes
 /// [text]}, tracking {pieces, loose [{begin, end, why}]}, where the outputs

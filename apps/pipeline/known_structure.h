@@ -32,7 +32,7 @@ struct WallStatement {
   enum class Kind {
     /// They lie on one line.
     kSame,
-    /// They are parallel, so far apart.
+    /// They are parallel, at a distance.
     kDistance,
     /// They are parallel.
     kParallel,
@@ -68,8 +68,8 @@ struct KnownStructure {
   /// p-value below which a wall is let go from its line, or a statement is
   /// broken.
   double break_below = 0.01;
-  /// A wall may lie so far from its line when it is tied to it, m and rad: a
-  /// line that is wrong by less is tied, and breaks.
+  /// Largest distance and angle between a wall and the line it is tied to, m
+  /// and rad: a line that is wrong by less is tied, and breaks.
   double max_offset = 0.6;
   double max_angle = DegToRad(4.0);
   /// What it takes to believe a place of the plan: length of walls that lie on
@@ -85,7 +85,7 @@ struct KnownStructure {
   double max_pose_offset = 3.0;
   double max_pose_turn = DegToRad(45.0);
   /// A line of the plan is called wrong when walls that were let go lie beside
-  /// such a share of it, or such a length, m; less may be furniture in front of
+  /// this share of it, or this length, m; less may be furniture in front of
   /// it.
   double min_contradicting_share = 0.5;
   double min_contradicting_length = 3.0;

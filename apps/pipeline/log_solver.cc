@@ -3,20 +3,19 @@
 #include <plumbline/core/read_ahead.h>
 #include <plumbline/core/sight_lines.h>
 #include <plumbline/core/stopwatch.h>
-#include <plumbline/core/wall_pair.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/detectors/visibility.h>
 #include <plumbline/frontend/looks.h>
-#include <plumbline/frontend/open_ways.h>
-#include <plumbline/frontend/place_chain.h>
-#include <plumbline/frontend/wall_views.h>
-#include <plumbline/pipeline/bent_map.h>
+#include <plumbline/frontend/relocalization.h>
+#include <plumbline/pipeline/glimpsed_walls.h>
+#include <plumbline/pipeline/log_run.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/log_solver_state.h>
+#include <plumbline/pipeline/map_review.h>
+#include <plumbline/pipeline/second_map.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <limits>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -33,66 +32,8 @@ constexpr std::size_t kSmallMapGrowth = 10;
 // Scans that the odometry refinement is ahead of the map at most.
 constexpr std::size_t kScansAhead = 64;
 
-// A second map with less than this share of the first one's length of walls has
-// lost what the scans show, and is no better.
-constexpr double kLeastSecondShare = 1.0 / 3.0;
-
 // Rounds of binding walls to a plan, with EM after each.
 constexpr int kPlanRounds = 6;
-
-// How well a wall of glimpses is known relative to the place that saw it, m
-// and rad.
-constexpr double kGlimpsedPosition = 0.03;
-constexpr double kGlimpsedDirection = DegToRad(0.3);
-
-// Of crossings whose times and those of what speaks against them enclose
-// others' only these: the fault lies between.
-std::vector<BlockedWay> Innermost(const std::vector<BlockedWay>& ways) {
-  std::vector<BlockedWay> left;
-  const auto span = [](const BlockedWay& way) {
-    return std::minmax(way.crossing, way.seen);
-  };
-  for (const BlockedWay& way : ways) {
-    const auto [begin, end] = span(way);
-    const bool encloses =
-        std::any_of(ways.begin(), ways.end(), [&](const BlockedWay& other) {
-          const auto [first, last] = span(other);
-          return first >= begin && last <= end &&
-                 (first > begin || last < end || &other < &way);
-        });
-    if (!encloses) left.push_back(way);
-  }
-  return left;
-}
-
-void AddLoose(int begin, int end, std::string why, LogSolverResult* result) {
-  LooseTrack loose;
-  loose.begin = begin;
-  loose.end = end;
-  loose.found = true;
-  loose.why = std::move(why);
-  result->loose.push_back(std::move(loose));
-}
-
-// The returns and the matches of the check of the map.
-OpenWayOptions OptionsOfOpenWays(const MapCheckOptions& check) {
-  OpenWayOptions options;
-  options.points = check.points;
-  options.matcher = check.matcher;
-  options.num_threads = check.num_threads;
-  return options;
-}
-
-void AddOpenWays(const std::vector<OpenWay>& ways, LogSolverResult* result) {
-  for (const OpenWay& way : ways) {
-    char why[128];
-    std::snprintf(why, sizeof why,
-                  "nothing in sight shows how far the robot went: the %.0f m "
-                  "of this way are known to %.1f m",
-                  way.length, way.sigma);
-    AddLoose(way.begin, way.end, why, result);
-  }
-}
 
 // Before the detector that refutes closures.
 void AddSameWall(HierarchySpec* hierarchy) {
@@ -114,18 +55,6 @@ void ShowScans(const std::vector<Scan>& scans, const ScanPointsOptions& points,
   GiveLooks(std::make_shared<const Looks>(
                 CollectLooks(scans, make_places(), options)),
             detectors);
-}
-
-// The scans of the records, and where they are.
-std::pair<std::vector<int>, std::vector<Pose2>> KeyScans(
-    const LogSolverResult& result) {
-  std::vector<int> keys;
-  std::vector<Pose2> poses;
-  for (const KeyScanRecord& record : result.records) {
-    keys.push_back(record.scan);
-    poses.push_back(result.trajectory[static_cast<std::size_t>(record.scan)]);
-  }
-  return {std::move(keys), std::move(poses)};
 }
 
 }  // namespace
@@ -171,38 +100,15 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
   return key;
 }
 
-// What the stages share once all scans are in.
-struct LogSolver::Context {
-  const std::vector<Scan>& scans;
-  const RunControl& control;
-  LogSolverResult result;
-  // As the scans were found again last.
-  std::vector<Pose2> keys;
-  // Features of the places of the second map, or of those that were recovered.
-  std::vector<FeatureId> places;
-  // While the second map is made: what makes it, and the first one.
-  std::unique_ptr<JointAdjustment> adjustment;
-  std::string first_map;
-  std::vector<Pose2> first_trajectory;
-  double first_length = 0.0;
-  // Of the second map (JointAdjustment::vote_variance_excess).
-  double vote_excess = 1.0;
-  // Not once the adjusted poses were looked through for them in vain.
-  bool may_have_open_ways = true;
+// What the stages share once all scans are in, and the second map, which some
+// of them make.
+struct LogSolver::Context : LogRun {
+  SecondMap second;
 
-  Context(const std::vector<Scan>& all_scans, const RunControl& run_control)
-      : scans(all_scans), control(run_control) {}
-
-  void Begin(const char* step) const {
-    if (control.step) control.step(step);
-  }
-  // Once it was time to stop, it stays so.
-  bool IsStopped() {
-    if (!result.interrupted && control.stop && control.stop()) {
-      result.interrupted = true;
-    }
-    return result.interrupted;
-  }
+  Context(const std::vector<Scan>& all_scans, const RunControl& run_control,
+          LogSolver* solver)
+      : LogRun(all_scans, run_control),
+        second(solver->registry_, solver->options_, this, &solver->map_) {}
 };
 
 // What the refiner made of a scan.
@@ -219,18 +125,13 @@ LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
     : registry_(registry),
       profile_(ProfileOf(options.features)),
       options_(WithProfile(profile_, options)),
-      graph_(std::make_unique<Graph>()),
+      map_(registry_, options_.session, options_.em),
       refiner_(options_.odometry) {
-  break_log_.Attach(graph_.get());
-  session_ = std::make_unique<SolverSession>(graph_.get(), registry_,
-                                             options_.session);
-  em_ =
-      std::make_unique<EmOrchestrator>(graph_.get(), session_.get(), registry_,
-                                       StructureDetectors(), options_.em);
+  map_.Renew(StructureDetectors());
   if (RecoversPoses(options_)) {
     options_.builder.association.max_gap = options_.max_gap_of_final_map;
   }
-  builder_ = profile_.make_builder(options_, graph_.get(), registry_);
+  builder_ = profile_.make_builder(options_, &map_.graph(), registry_);
 }
 
 LogSolver::~LogSolver() = default;
@@ -323,12 +224,10 @@ void LogSolver::TakeAnew(const std::vector<Scan>& scans, double* em_seconds) {
     refined.since = late.since;
     refined.since_key = late.since_key;
   }
-  DropEm();
   builder_.reset();
-  MakeGraph();
-  break_log_.records().clear();
-  builder_ = profile_.make_builder(options_, graph_.get(), registry_);
-  Renew(StructureDetectors());
+  map_.StartOver();
+  builder_ = profile_.make_builder(options_, &map_.graph(), registry_);
+  map_.Renew(StructureDetectors());
   scans_since_em_ = 0;
   features_at_last_global_ = 0;
   ScanPointsOptions points = options_.odometry.points;
@@ -362,7 +261,7 @@ void LogSolver::TakeScan(const std::vector<Scan>& scans,
   if (EndsStage(stage_begin_, refined_.size(), processed) &&
       num_settled_ == refined_.size()) {
     stage_begin_ = refined_.size();
-    Renew(StructureDetectors());
+    map_.Renew(StructureDetectors());
   }
   const double seconds = watch.Seconds() + processed.seconds;
   scan_seconds_.push_back(static_cast<float>(seconds));
@@ -401,7 +300,8 @@ bool LogSolver::TakeStage(const std::vector<Scan>& scans,
     TakeScan(scans, *processed);
     if (control.progress) control.progress(refined_.size(), scans.size());
     if (control.look) {
-      control.look({*graph_, trace_, [this] { return Trajectory(); }});
+      control.look(
+          {map_.graph(), map_.trace(), [this] { return Trajectory(); }});
     }
     // Also what was begun when it was stopped: the refiner has gone that far.
     ask_stop();
@@ -421,7 +321,7 @@ void LogSolver::TakeScans(const std::vector<Scan>& scans,
       control.checkpoint([&] {
         StateWriter writer;
         Stage stage = Stage::kTakeScans;
-        Context context(scans, control);
+        Context context(scans, control, this);
         ExchangeState(writer, &stage, &context);
         ExchangeScansState(writer);
         builder_->WriteState(&writer);
@@ -435,15 +335,15 @@ void LogSolver::TakeScans(const std::vector<Scan>& scans,
 
 void LogSolver::RunEmNearRobot() {
   builder_->WriteRobot();
-  const std::size_t features = graph_->num_features();
+  const std::size_t features = map_.graph().num_features();
   if (features < static_cast<std::size_t>(options_.small_map) &&
       features > features_at_last_global_ + kSmallMapGrowth) {
     features_at_last_global_ = features;
-    em_->Iterate();
+    map_.em().Iterate();
   } else {
     const std::vector<FeatureId> scope =
         builder_->Neighborhood(options_.em_depth);
-    em_->Iterate(&scope);
+    map_.em().Iterate(&scope);
   }
   builder_->ReadRobot();
 }
@@ -451,7 +351,7 @@ void LogSolver::RunEmNearRobot() {
 std::vector<Pose2> LogSolver::KeyPoses(
     const std::vector<KeyScanRecord>& records) const {
   if (options_.refine != Refinement::kNone) {
-    return RelocalizeKeyScans(*graph_, records, options_.relocalization);
+    return RelocalizeKeyScans(map_.graph(), records, options_.relocalization);
   }
   std::vector<Pose2> poses;
   for (const KeyScanRecord& record : records) poses.push_back(record.pose);
@@ -474,7 +374,8 @@ LogSolverResult LogSolver::RunFirst(const Log& log, const RunControl& control) {
   RequireFresh();
   TakeScans(log.scans, control);
   LogSolverResult result = FinishWith(log.scans, Stage::kAdjustPoses, control);
-  result.closures = ClosuresOf(result);
+  result.closures =
+      FindLoopClosures(map_.graph(), result.records, result.trajectory);
   return result;
 }
 
@@ -491,9 +392,9 @@ LogSolverResult LogSolver::GoOn(const std::vector<Scan>& scans,
   if (!is_finished_) ScaleToNoise(first.noise_scale);
   is_finished_ = true;
   builder_.reset();
-  Context context(scans, control);
+  Context context(scans, control, this);
   context.result = std::move(first);
-  context.first_length = wall_length;
+  context.second.SetFirstLength(wall_length);
   for (const KeyScanRecord& record : context.result.records) {
     context.keys.push_back(
         context.result.trajectory[static_cast<std::size_t>(record.scan)]);
@@ -512,7 +413,7 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
   if (!refined_.empty()) {
     throw PLUMBLINE_ERROR("scans were added before Resume", "a new solver");
   }
-  Context context(log.scans, control);
+  Context context(log.scans, control, this);
   Stage stage = Stage::kTakeScans;
   StateReader reader(state);
   ExchangeState(reader, &stage, &context);
@@ -525,7 +426,7 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
     }
     builder_->ReadState(&reader);
     refiner_.ReadState(&reader);
-    Renew(StructureDetectors());
+    map_.Renew(StructureDetectors());
     if (control.progress) control.progress(refined_.size(), log.scans.size());
     TakeScans(log.scans, control);
     return FinishWith(log.scans, Stage::kEnd, control);
@@ -539,12 +440,9 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
                               " scans",
                           std::to_string(log.scans.size()));
   }
-  Renew();
+  map_.Renew();
   if (stage == Stage::kMakeWalls || stage == Stage::kAdjustWalls) {
-    context.adjustment = std::make_unique<JointAdjustment>(
-        graph_.get(), session_.get(), registry_, log.scans,
-        context.result.refined, context.result.records, &reader,
-        options_.adjustment, control.stop);
+    context.second.ReadAdjustment(&reader);
   }
   if (control.progress) control.progress(log.scans.size(), log.scans.size());
   return FinishFrom(stage, Stage::kEnd, &context);
@@ -560,7 +458,7 @@ void LogSolver::ScaleToNoise(double scale) {
 LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
                                       const RunControl& control) {
   is_finished_ = true;
-  Context context(scans, control);
+  Context context(scans, control, this);
   LogSolverResult& result = context.result;
   result.interrupted = refined_.size() < scans.size();
   {
@@ -581,6 +479,8 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
   result.refused_matches = refiner_.refusals();
   result.lost_tracks = refiner_.losses();
   result.range_sigma = refiner_.range_sigma();
+  result.odometry_scale = refiner_.odometry_scale();
+  result.odometry_course = refiner_.odometry_course();
   result.noise_scale = refiner_.noise_scale();
   ScaleToNoise(result.noise_scale);
   result.loose = refiner_.loose();
@@ -607,9 +507,8 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Stage end,
   }
   if (stage == Stage::kAdjustPoses && stage != end) {
     AdjustPoses(context);
-    BeginStage(stage = context->adjustment == nullptr
-                           ? Stage::kFindStructureAgain
-                           : Stage::kMakeWalls,
+    BeginStage(stage = context->second.is_begun() ? Stage::kMakeWalls
+                                                  : Stage::kFindStructureAgain,
                context);
   }
   if (stage == Stage::kMakeWalls) {
@@ -625,18 +524,17 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Stage end,
     CheckMap(context);
     BeginStage(stage = Stage::kEnd, context);
   }
-  context->result.detect_seconds =
-      em_before_.detect_seconds + em_->totals().detect_seconds;
-  context->result.solve_seconds =
-      em_before_.solve_seconds + em_->totals().solve_seconds;
-  context->result.breaks = break_log_.records();
+  const EmReport totals = map_.totals();
+  context->result.detect_seconds = totals.detect_seconds;
+  context->result.solve_seconds = totals.solve_seconds;
+  context->result.breaks = map_.breaks();
   scans_ = {};
   return std::move(context->result);
 }
 
 void LogSolver::BeginStage(Stage stage, Context* context) {
   if (context->control.look) {
-    context->control.look({*graph_, trace_, [&] {
+    context->control.look({map_.graph(), map_.trace(), [&] {
                              const LogSolverResult& result = context->result;
                              return result.trajectory.empty()
                                         ? InterpolateScans(
@@ -647,46 +545,24 @@ void LogSolver::BeginStage(Stage stage, Context* context) {
   }
   // What was cut short is for no other run to go on with.
   if (context->IsStopped()) return;
-  Renew();
-  if (context->adjustment != nullptr) {
-    context->adjustment->SetSession(session_.get());
-  }
+  map_.Renew();
+  context->second.TakeSession();
   if (!context->control.checkpoint) return;
   context->control.checkpoint([&] {
     StateWriter writer;
     ExchangeState(writer, &stage, context);
-    if (context->adjustment != nullptr) {
-      context->adjustment->WriteState(&writer);
-    }
+    context->second.WriteAdjustment(&writer);
     return writer.bytes();
   });
-}
-
-void LogSolver::DropEm() {
-  if (em_ != nullptr) CountEm();
-  em_.reset();
-  session_.reset();
-}
-
-// The session and EM know nothing but what is in the graph.
-void LogSolver::Renew(Hierarchy detectors) {
-  DropEm();
-  session_ = std::make_unique<SolverSession>(graph_.get(), registry_,
-                                             options_.session);
-  em_ =
-      std::make_unique<EmOrchestrator>(graph_.get(), session_.get(), registry_,
-                                       std::move(detectors), options_.em);
 }
 
 template <typename Archive>
 void LogSolver::ExchangeState(Archive& archive, Stage* stage,
                               Context* context) {
-  ExchangeAll(archive, *stage, context->result, context->keys, context->places,
-              context->first_map, context->first_trajectory,
-              context->first_length, context->vote_excess,
-              context->may_have_open_ways, em_before_, trace_,
-              break_log_.records());
-  Exchange(archive, registry_, *graph_);
+  ExchangeAll(archive, *stage, context->result, context->keys, context->places);
+  context->second.ExchangeFirst(archive);
+  Exchange(archive, context->may_have_open_ways);
+  map_.ExchangeState(archive);
 }
 
 template <typename Archive>
@@ -696,15 +572,15 @@ void LogSolver::ExchangeScansState(Archive& archive) {
 }
 
 void LogSolver::RunEm(Context* context) {
-  const EmReport report = em_->Run(context->control.stop);
+  const EmReport report = map_.em().Run(context->control.stop);
   context->result.em.iterations += report.iterations;
   context->result.em.termination = report.termination;
 }
 
 void LogSolver::FindStructure(Context* context) {
   context->Begin("structure of the whole map");
-  context->result.initial_cost = session_->Cost();
-  TraceEm();
+  context->result.initial_cost = map_.session().Cost();
+  map_.Trace();
   RunEm(context);
 }
 
@@ -727,27 +603,27 @@ void LogSolver::BringPosesBack(Context* context) {
   {
     const ScopedTimer timer(&context->result.relocalization_seconds);
     FeatureId robot = kNoId;
-    for (const Feature* feature : std::as_const(*graph_).Features()) {
+    for (const Feature* feature : std::as_const(map_.graph()).Features()) {
       if (feature->type->Is(FeatureRole::kPose)) robot = feature->id;
     }
     context->places =
         RecoverPoses(context->result.records, KeyPoses(context->result.records),
-                     robot, RecoveryOptions(options_), registry_, graph_.get())
+                     robot, RecoveryOptions(options_), registry_, &map_.graph())
             .places;
   }
-  Renew();
-  context->result.initial_cost = session_->Cost();
-  TraceEm();
+  map_.Renew();
+  context->result.initial_cost = map_.session().Cost();
+  map_.Trace();
   RunEm(context);
 }
 
 void LogSolver::FindScansAgain(Context* context) {
   LogSolverResult& result = context->result;
-  result.final_cost = session_->Cost();
+  result.final_cost = map_.session().Cost();
   context->IsStopped();
   const ScopedTimer timer(&result.relocalization_seconds);
   if (!context->places.empty()) {
-    TakeTrajectory(context);
+    context->TakeTrajectory(map_.graph(), options_.adjustment.place_stride);
     return;
   }
   context->keys = KeyPoses(result.records);
@@ -765,232 +641,45 @@ void LogSolver::CompleteWalls(Context* context) {
   Transaction walls;
   {
     const ScopedTimer timer(&result.completion_seconds);
-    walls =
-        FindGlimpsedWalls(*graph_, registry_, context->scans, result.trajectory,
-                          options_.completion, context->control.stop);
+    walls = FindGlimpsedWalls(map_.graph(), registry_, context->scans,
+                              result.trajectory, options_.completion,
+                              context->control.stop);
   }
-  if (!context->places.empty()) walls = BindToPlaces(walls, *context);
+  if (!context->places.empty()) {
+    walls = BindGlimpsedWalls(walls, map_.graph(), registry_, context->places,
+                              context->scans, result.records, result.trajectory,
+                              options_.adjustment.place_stride,
+                              options_.completion);
+  }
   result.glimpsed_walls =
       static_cast<std::int64_t>(walls.added_features().size());
   if (walls.empty()) return;
-  graph_->Apply(std::move(walls));
+  map_.graph().Apply(std::move(walls));
   RunEm(context);
   FindScansAgain(context);
 }
 
-Transaction LogSolver::BindToPlaces(const Transaction& walls,
-                                    const Context& context) const {
-  Transaction bound;
-  const Eigen::Vector3d sigma(kGlimpsedPosition, kGlimpsedPosition,
-                              kGlimpsedDirection);
-  const Eigen::Matrix3d information =
-      sigma.array().square().inverse().matrix().asDiagonal();
-  const std::vector<std::size_t> begins =
-      PlaceBegins(context.result.records, options_.adjustment.place_stride);
-  std::vector<int> place_of_scan;
-  for (std::size_t p = 0; p < begins.size(); ++p) {
-    const auto first =
-        static_cast<std::size_t>(context.result.records[begins[p]].scan);
-    place_of_scan.resize(std::max(first, place_of_scan.size()),
-                         std::max(0, static_cast<int>(p) - 1));
-  }
-  place_of_scan.resize(context.scans.size(),
-                       static_cast<int>(begins.size()) - 1);
-  const std::vector<int> seen_from = GroupsThatSaw(
-      walls.added_features(), context.scans, context.result.trajectory,
-      place_of_scan, options_.completion.points,
-      options_.completion.explained_offset);
-  for (std::size_t w = 0; w < seen_from.size(); ++w) {
-    if (seen_from[w] < 0) continue;
-    const Feature& wall = walls.added_features()[w];
-    const Feature& place = graph_->GetFeature(context.places[seen_from[w]]);
-    bound.AddConstraint(MakeMeasurement(
-        registry_.GetRelation("pose_pose"), {place.id, bound.AddFeature(wall)},
-        Between(place.type->frame(place), wall.type->frame(wall)), information,
-        wall.source));
-  }
-  return bound;
-}
-
 void LogSolver::AdjustPoses(Context* context) {
   if (options_.refine != Refinement::kFull || context->IsStopped()) return;
-  LogSolverResult& result = context->result;
-  const ScopedTimer timer(&result.adjustment_seconds);
+  const ScopedTimer timer(&context->result.adjustment_seconds);
   context->Begin("adjustment of poses");
-  StateWriter first_map;
-  Exchange(first_map, registry_, *graph_);
-  context->first_map = first_map.bytes();
-  context->first_trajectory = result.trajectory;
-  if (context->first_length == 0.0) {
-    context->first_length = LengthOfWalls(*graph_);
-  }
-  // RunFirst has kept them, perhaps those of several maps.
-  if (result.closures.empty()) result.closures = ClosuresOf(result);
-  // What was taken for walls must not make odometry worse.
-  const std::vector<Pose2> by_odometry =
-      PosesByMotions(result.records, context->keys);
-  const bool is_bent = IsBent(context->keys, by_odometry);
-  AdjustPosesFrom(is_bent ? by_odometry : context->keys, context);
-  const bool has_contradictions = HasContradictions(context);
-  if (has_contradictions || HasOpenWays(context)) {
-    // A start that is far off ends in a wrong place: the better of two stands.
-    const MapAgreement agreement = AgreementOf(*context);
-    const double misfit = context->adjustment->Misfit();
-    const std::int64_t relations = context->adjustment->num_relations();
-    StateWriter kept;
-    Exchange(kept, registry_, *graph_);
-    context->adjustment->WriteState(&kept);
-    std::vector<Pose2> trajectory = result.trajectory;
-    AdjustPosesFrom(is_bent ? context->keys : by_odometry, context);
-    // Where scans agree everywhere, as in a round corridor, what was measured
-    // between them decides.
-    const MapAgreement now = AgreementOf(*context);
-    const bool is_better =
-        has_contradictions
-            ? now.IsBetterThan(agreement)
-            : now.contradicting <= agreement.contradicting &&
-                  context->adjustment->FitsBetterThan(misfit, relations);
-    if (!context->IsStopped() && !is_better) {
-      const std::string bytes = kept.bytes();
-      StateReader reader(bytes);
-      context->adjustment.reset();
-      DropEm();
-      MakeGraph();
-      Exchange(reader, registry_, *graph_);
-      Renew();
-      context->adjustment = std::make_unique<JointAdjustment>(
-          graph_.get(), session_.get(), registry_, context->scans,
-          result.refined, result.records, &reader, options_.adjustment,
-          context->control.stop);
-      context->places = context->adjustment->places();
-      result.trajectory = std::move(trajectory);
-    }
-  }
-  if (context->IsStopped()) ReturnToFirstMap(context);
-}
-
-void LogSolver::AdjustPosesFrom(const std::vector<Pose2>& start,
-                                Context* context) {
-  const LogSolverResult& result = context->result;
-  context->adjustment.reset();
-  ClearGraph();
-  context->adjustment = std::make_unique<JointAdjustment>(
-      graph_.get(), session_.get(), registry_, context->scans, result.refined,
-      result.records, start, kNoId, options_.adjustment, context->control.stop);
-  JointAdjustment& adjustment = *context->adjustment;
-  context->places = adjustment.places();
-  adjustment.Adjust();
-  if (!context->IsStopped()) {
-    adjustment.MatchAnew();
-    adjustment.Adjust();
-  }
-  if (context->IsStopped()) return;
-  adjustment.EstimateVariances();
-  TakeTrajectory(context);
-}
-
-bool LogSolver::HasContradictions(Context* context) const {
-  if (!options_.check_map || context->IsStopped()) return false;
-  const auto [keys, poses] = KeyScans(context->result);
-  return !FindContradictions(context->scans, keys, poses, options_.check,
-                             [context] { return context->IsStopped(); })
-              .empty();
-}
-
-bool LogSolver::HasOpenWays(Context* context) const {
-  if (!options_.check_map || context->IsStopped()) return false;
-  const auto [keys, poses] = KeyScans(context->result);
-  context->may_have_open_ways =
-      !FindOpenWays(context->scans, keys, poses,
-                    OptionsOfOpenWays(options_.check),
-                    [context] { return context->IsStopped(); })
-           .empty();
-  return context->may_have_open_ways;
-}
-
-MapAgreement LogSolver::AgreementOf(const Context& context) const {
-  const auto [keys, poses] = KeyScans(context.result);
-  return CountAgreement(context.scans, keys, poses, options_.check,
-                        context.control.stop);
-}
-
-std::vector<LoopClosure> LogSolver::ClosuresOf(
-    const LogSolverResult& result) const {
-  std::vector<LoopClosure> closures;
-  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
-    if (!constraint->type->Is(RelationRole::kSameWall)) continue;
-    const std::optional<Wall> first =
-        WallOf(graph_->GetFeature(constraint->features[0]));
-    const std::optional<Wall> second =
-        WallOf(graph_->GetFeature(constraint->features[1]));
-    if (!first || !second) continue;
-    const Pose2 middle = MiddleOfCommonPart(*first, *second);
-    LoopClosure closure;
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const KeyScanRecord& record : result.records) {
-      const Pose2& pose =
-          result.trajectory[static_cast<std::size_t>(record.scan)];
-      const double distance = (pose - middle).head<2>().squaredNorm();
-      if (distance >= nearest) continue;
-      nearest = distance;
-      closure.scan = record.scan;
-      closure.place = Between(pose, middle);
-    }
-    closure.holds = constraint->state == ConstraintState::kLive;
-    closure.delta = constraint->delta;
-    closures.push_back(closure);
-  }
-  return closures;
+  context->second.AdjustPoses();
 }
 
 void LogSolver::MakeWalls(Context* context) {
-  // Half of a second map is worth less than the whole of the first.
-  if (context->IsStopped()) return ReturnToFirstMap(context);
   const ScopedTimer timer(&context->result.adjustment_seconds);
-  context->Begin("walls from adjusted poses");
-  context->adjustment->AddWalls(FindGlimpsedWalls(
-      *graph_, registry_, context->scans, context->result.trajectory,
-      options_.completion, context->control.stop));
+  if (!context->IsStopped()) context->Begin("walls from adjusted poses");
+  context->second.MakeWalls();
 }
 
 void LogSolver::AdjustWalls(Context* context) {
-  if (context->adjustment == nullptr) return;
-  if (context->IsStopped()) return ReturnToFirstMap(context);
+  if (!context->second.is_begun()) return;
   LogSolverResult& result = context->result;
   const ScopedTimer timer(&result.adjustment_seconds);
-  context->Begin("joint adjustment of poses and walls");
-  JointAdjustment& adjustment = *context->adjustment;
-  adjustment.Adjust();
-  if (!context->IsStopped()) adjustment.EstimateVariances();
-  if (context->IsStopped()) return ReturnToFirstMap(context);
-  TakeTrajectory(context);
-  result.scan_relations = adjustment.num_relations();
-  result.wall_votes = adjustment.num_votes();
-  context->vote_excess = adjustment.vote_variance_excess();
-  result.second_map_refused =
-      LengthOfWalls(*graph_) < kLeastSecondShare * context->first_length &&
-      !IsBent(context->first_trajectory, result.trajectory);
-  if (result.second_map_refused) return ReturnToFirstMap(context);
-  context->adjustment.reset();
-  context->first_map.clear();
-  context->first_trajectory.clear();
-}
-
-void LogSolver::ReturnToFirstMap(Context* context) {
-  LogSolverResult& result = context->result;
-  context->adjustment.reset();
-  StateReader reader(context->first_map);
-  DropEm();
-  MakeGraph();
-  Exchange(reader, registry_, *graph_);
-  Renew();
-  context->places.clear();
-  result.trajectory = std::move(context->first_trajectory);
-  context->first_trajectory.clear();
-  context->first_map.clear();
-  // They stand in the map.
-  result.closures.clear();
-  result.scan_relations = result.wall_votes = 0;
+  if (!context->IsStopped()) {
+    context->Begin("joint adjustment of poses and walls");
+  }
+  context->second.AdjustWalls();
   if (!result.second_map_refused ||
       options_.features != RawFeatures::kSegments) {
     return;
@@ -1020,16 +709,16 @@ void LogSolver::FindStructureAgain(Context* context) {
                                options_.adjustment.place_stride);
       },
       detectors);
-  ReplaceEm(std::move(detectors), options);
+  map_.ReplaceEm(std::move(detectors), options);
   KnownStructureBinder known(options_.known, registry_, context->places.front(),
-                             graph_.get());
+                             &map_.graph());
   if (options_.structure) known.AddStatements();
   RunEm(context);
   if (options_.structure) TieToPlan(&known, context);
   context->IsStopped();
-  result.final_cost = session_->Cost();
-  TakeTrajectory(context);
-  ReportVoteVariances(context->vote_excess, registry_, graph_.get());
+  result.final_cost = map_.session().Cost();
+  context->TakeTrajectory(map_.graph(), options_.adjustment.place_stride);
+  ReportVoteVariances(context->second.vote_excess(), registry_, &map_.graph());
 }
 
 // Walls that lie near the plan pull others near.
@@ -1041,14 +730,6 @@ void LogSolver::TieToPlan(KnownStructureBinder* known, Context* context) {
   context->result.notes = known->Notes();
 }
 
-void LogSolver::TakeTrajectory(Context* context) const {
-  LogSolverResult& result = context->result;
-  result.trajectory = InterpolateScans(
-      result.refined, result.records,
-      KeyPosesOfPlaces(*graph_, context->places, result.records,
-                       options_.adjustment.place_stride));
-}
-
 void LogSolver::CheckMap(Context* context) const {
   LogSolverResult& result = context->result;
   if (!options_.check_map || options_.refine == Refinement::kNone ||
@@ -1057,100 +738,26 @@ void LogSolver::CheckMap(Context* context) const {
   }
   context->Begin("check of the map");
   const ScopedTimer timer(&result.relocalization_seconds);
-  const auto [keys, poses] = KeyScans(result);
-  const auto stop = [context] { return context->IsStopped(); };
-  const std::vector<MapContradiction> contradictions =
-      FindContradictions(context->scans, keys, poses, options_.check, stop);
-  std::vector<Wall> walls;
-  for (const Feature* feature : std::as_const(*graph_).Features()) {
-    if (feature->level != 0) continue;
-    if (const std::optional<Wall> wall = WallOf(*feature)) {
-      walls.push_back(*wall);
-    }
-  }
-  const std::vector<BlockedWay> blocked = FindBlockedWays(
-      context->scans, keys, poses, walls, options_.way_check, stop);
-  // Where something is wrong no tie is taken for sure.
-  if (contradictions.empty() && blocked.empty()) DropConfirmed(keys, context);
-  for (const MapContradiction& part : contradictions) {
-    AddLoose(part.begin, part.end,
-             "what the robot saw here contradicts what it saw on other visits",
-             &result);
-  }
-  for (const BlockedWay& way : Innermost(blocked)) {
-    const auto [begin, end] = std::minmax(way.crossing, way.seen);
-    // A tie between them that is reported already may be why.
-    const bool is_explained =
-        std::any_of(result.loose.begin(), result.loose.end(),
-                    [begin = begin, end = end](const LooseTrack& loose) {
-                      return (loose.begin >= begin && loose.begin < end) ||
-                             (loose.end > begin && loose.end <= end);
-                    });
-    if (is_explained) continue;
-    AddLoose(begin, end,
-             "between these two the robot went through what it has seen as a "
-             "wall: that was moved, or the map is wrong",
-             &result);
-  }
   // The second map moves poses by centimetres: what is in sight stays the same.
-  if (context->may_have_open_ways || result.second_map_refused) {
-    AddOpenWays(FindOpenWays(context->scans, keys, poses,
-                             OptionsOfOpenWays(options_.check), stop),
-                &result);
-  }
-  std::stable_sort(result.loose.begin(), result.loose.end(),
-                   [](const LooseTrack& a, const LooseTrack& b) {
-                     return a.begin < b.begin;
-                   });
-}
-
-void LogSolver::DropConfirmed(const std::vector<int>& keys,
-                              Context* context) const {
-  LogSolverResult& result = context->result;
-  std::vector<TrackCut> cuts;
-  for (const LooseTrack& loose : result.loose) {
-    // A guess is one from its first scan on.
-    cuts.push_back({loose.begin, loose.found ? loose.end : loose.begin + 1});
-  }
-  const std::vector<bool> is_confirmed = FindConfirmedTies(
-      context->scans, keys, result.trajectory, cuts, options_.check,
-      [context] { return context->IsStopped(); });
-  std::vector<LooseTrack> left;
-  for (std::size_t i = 0; i < cuts.size(); ++i) {
-    if (result.loose[i].found && is_confirmed[i]) continue;
-    left.push_back(std::move(result.loose[i]));
-  }
-  result.loose = std::move(left);
-}
-
-void LogSolver::MakeGraph() {
-  break_log_.Detach();
-  graph_ = std::make_unique<Graph>();
-  break_log_.Attach(graph_.get());
-}
-
-void LogSolver::ClearGraph() {
-  Transaction clear;
-  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
-    clear.RemoveConstraint(constraint->id);
-  }
-  for (const Feature* feature : std::as_const(*graph_).Features()) {
-    clear.RemoveFeature(feature->id);
-  }
-  graph_->Apply(std::move(clear));
+  const bool tell_open_ways =
+      context->may_have_open_ways || result.second_map_refused;
+  MapReview(context->scans, result.records, result.trajectory, options_.check,
+            options_.way_check, [context] { return context->IsStopped(); })
+      .Revise(map_.graph(), tell_open_ways, &result.loose);
 }
 
 void LogSolver::BeginClosing(Context* context) {
   const Eigen::Vector3d scale(1.0 / options_.closing_position_scale,
                               1.0 / options_.closing_position_scale, 1.0);
-  for (const Constraint* constraint : std::as_const(*graph_).Constraints()) {
+  for (const Constraint* constraint :
+       std::as_const(map_.graph()).Constraints()) {
     if (constraint->kind != ConstraintClass::kMeasurement ||
         constraint->state != ConstraintState::kLive ||
         !constraint->type->Is(RelationRole::kPose) ||
         constraint->features.size() != 2) {
       continue;
     }
-    graph_->UpdateConstraint(
+    map_.graph().UpdateConstraint(
         constraint->id, constraint->expected,
         scale.asDiagonal() * constraint->information * scale.asDiagonal());
   }
@@ -1163,33 +770,11 @@ void LogSolver::BeginClosing(Context* context) {
       context->scans, options_.adjustment.points,
       [&] {
         const std::vector<KeyScanRecord>& records = context->result.records;
-        return LooksFromWalls(records, KeyPoses(records), *graph_,
+        return LooksFromWalls(records, KeyPoses(records), map_.graph(),
                               options_.adjustment.place_stride);
       },
       detectors);
-  ReplaceEm(std::move(detectors), options);
-}
-
-void LogSolver::CountEm() {
-  const EmReport& totals = em_->totals();
-  em_before_.iterations += totals.iterations;
-  em_before_.detect_seconds += totals.detect_seconds;
-  em_before_.solve_seconds += totals.solve_seconds;
-}
-
-void LogSolver::ReplaceEm(Hierarchy detectors, const EmOptions& options) {
-  CountEm();
-  em_ = std::make_unique<EmOrchestrator>(
-      graph_.get(), session_.get(), registry_, std::move(detectors), options);
-  TraceEm();
-}
-
-void LogSolver::TraceEm() {
-  em_->SetTrace([this](EmPhase phase) {
-    phase.iteration += em_before_.iterations;
-    break_log_.SetIteration(phase.iteration);
-    trace_.push_back(std::move(phase));
-  });
+  map_.ReplaceEm(std::move(detectors), options);
 }
 
 }  // namespace plumbline

@@ -19,8 +19,10 @@
 #include <plumbline/frontend/wall_completion.h>
 #include <plumbline/frontend/way_check.h>
 #include <plumbline/pipeline/known_structure.h>
+#include <plumbline/pipeline/loop_closures.h>
 #include <plumbline/pipeline/raw_features.h>
 #include <plumbline/pipeline/run_control.h>
+#include <plumbline/pipeline/solved_map.h>
 
 #include <functional>
 #include <map>
@@ -79,6 +81,9 @@ struct LogSolverOptions {
   WallCompletionOptions completion;
   Refinement refine = Refinement::kFull;
   JointAdjustmentOptions adjustment;
+  /// Whether programs that read a log take the offset of its laser's ranges
+  /// out (FindRangeOffset). The solver itself takes ranges as they are.
+  bool range_offset = true;
   /// Compare each part of the final trajectory with what was seen on other
   /// visits, and report those that contradict it, and walls that the robot has
   /// gone through.
@@ -99,19 +104,6 @@ struct LogSolverOptions {
   /// While the map has fewer features than this, EM steps take in all of it:
   /// the first orientations come from few walls and are still to move.
   int small_map = 150;
-};
-
-/// Two walls of the first map that were supposed to be one, seen on different
-/// visits, while loops were closed. A second map, whose walls are made anew
-/// from all visits, has none of them any more.
-struct LoopClosure {
-  /// A scan made near the middle of what both walls have in common, and this
-  /// middle, with the wall's direction, in the robot's frame there.
-  int scan = 0;
-  Pose2 place = Pose2::Zero();
-  bool holds = false;
-  /// p-value of the hypothesis as it was judged last.
-  double delta = 0.0;
 };
 
 /// Result of solving a log; the map itself is the solver's graph.
@@ -161,6 +153,11 @@ struct LogSolverResult {
   /// which the options' distances were larger for it.
   double range_sigma = 0.0;
   double noise_scale = 1.0;
+  /// Of one log, in the end: what a metre of its odometry was taken for, m, and
+  /// by how much the robot drove to the left of where its laser looks by the
+  /// log, rad (odometry_calibration.h). A scale of 0: of several logs.
+  double odometry_scale = 0.0;
+  double odometry_course = 0.0;
   /// What became of LogSolverOptions::known, for people.
   std::vector<std::string> notes;
   /// Of the first map, where a second one stands for it.
@@ -245,15 +242,12 @@ class LogSolver {
                        const RunControl& control = {});
 
   /// The map as it stands: after any scan, and after Finish.
-  const Graph& graph() const { return *graph_; }
-  const SolverSession& session() const { return *session_; }
+  const Graph& graph() const { return map_.graph(); }
+  const SolverSession& session() const { return map_.session(); }
   /// Rows of em_trace.csv: the EM on the whole map at the end.
-  const std::vector<EmPhase>& trace() const { return trace_; }
+  const std::vector<EmPhase>& trace() const { return map_.trace(); }
 
  private:
-  // The closures of the map as it stands, by scans near them.
-  std::vector<LoopClosure> ClosuresOf(const LogSolverResult& result) const;
-
   // A stage, by what it does.
   enum class Stage : int {
     kTakeScans,
@@ -309,53 +303,24 @@ class LogSolver {
   void BringPosesBack(Context* context);
   void FindScansAgain(Context* context);
   void CompleteWalls(Context* context);
-  // The walls, each bound to the place next to it, which saw it: what they are
-  // relative to other walls goes by way of the places.
-  Transaction BindToPlaces(const Transaction& walls,
-                           const Context& context) const;
   // The second map, in three stages.
   void AdjustPoses(Context* context);
-  // The poses alone by all scans, from these of the key scans.
-  void AdjustPosesFrom(const std::vector<Pose2>& start, Context* context);
-  // Whether what the robot saw contradicts itself; false when the map is not to
-  // be checked. Whether lengths hang on odometry; likewise. How far it agrees
-  // with itself.
-  bool HasContradictions(Context* context) const;
-  bool HasOpenWays(Context* context) const;
-  MapAgreement AgreementOf(const Context& context) const;
   void MakeWalls(Context* context);
   void AdjustWalls(Context* context);
-  // The first map stands.
-  void ReturnToFirstMap(Context* context);
   void FindStructureAgain(Context* context);
   void TieToPlan(KnownStructureBinder* known, Context* context);
   // Tells what hangs loosely, or contradicts the rest of the map.
   void CheckMap(Context* context) const;
-  // Drops what was reported as loose and has turned out to be right.
-  void DropConfirmed(const std::vector<int>& keys, Context* context) const;
-
   // Between stages: all that is left is in the state.
   void BeginStage(Stage stage, Context* context);
-  void DropEm();
-  void Renew(Hierarchy detectors = Hierarchy());
   template <typename Archive>
   void ExchangeState(Archive& archive, Stage* stage, Context* context);
   template <typename Archive>
   void ExchangeScansState(Archive& archive);
-  void TakeTrajectory(Context* context) const;
 
   void RunEm(Context* context);
   // Loosens the relations between features and lets closures be proposed.
   void BeginClosing(Context* context);
-  void CountEm();
-  void ReplaceEm(Hierarchy detectors, const EmOptions& options);
-  // An empty graph in place of the one there was.
-  void MakeGraph();
-  // Takes everything out of the graph: what the front-end made of the scans has
-  // served to place the poses.
-  void ClearGraph();
-  // Rows of the trace, counted on over all orchestrators.
-  void TraceEm();
   HierarchySpec HierarchyOfOptions() const;
   Hierarchy StructureDetectors() const;
   Hierarchy MakeDetectors(const HierarchySpec& spec) const;
@@ -364,11 +329,7 @@ class LogSolver {
   const Registry& registry_;
   const RawFeatureProfile& profile_;
   LogSolverOptions options_;
-  std::unique_ptr<Graph> graph_;
-  // Of what is broken in the graph.
-  BreakLog break_log_;
-  std::unique_ptr<SolverSession> session_;
-  std::unique_ptr<EmOrchestrator> em_;
+  SolvedMap map_;
   OdometryRefiner refiner_;
   // While scans come in.
   std::unique_ptr<GraphBuilder> builder_;
@@ -385,9 +346,6 @@ class LogSolver {
   int scans_since_em_ = 0;
   std::size_t features_at_last_global_ = 0;
   bool is_finished_ = false;
-  // Sums over the orchestrators that were there before.
-  EmReport em_before_;
-  std::vector<EmPhase> trace_;
 };
 
 /// Length of the walls of a map (level 0), m.

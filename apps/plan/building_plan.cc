@@ -2,7 +2,10 @@
 #include <plumbline/plan/arrangement.h>
 #include <plumbline/plan/building_plan.h>
 #include <plumbline/plan/drawn_lines.h>
+#include <plumbline/plan/furniture_rows.h>
+#include <plumbline/plan/room_shape.h>
 #include <plumbline/plan/rooms_with_doors.h>
+#include <plumbline/plan/sides.h>
 #include <plumbline/plan/unseen_walls.h>
 
 #include <algorithm>
@@ -15,9 +18,6 @@ namespace {
 
 using Eigen::Vector2d;
 
-// A corridor is longer than so many times its width, and no wider than this, m.
-constexpr double kCorridorRatio = 3.5;
-constexpr double kCorridorWidth = 4.0;
 // A wall of which only one face was seen is drawn this thick, m.
 constexpr double kThinnestWall = 0.1;
 // From this share of openings on a side of a room is no wall.
@@ -217,13 +217,6 @@ std::vector<PlanRoom> RoomsOf(const Arrangement& arrangement,
   return sorted;
 }
 
-// Of a rectangle with the same area and perimeter, the shorter one first, m.
-std::pair<double, double> SidesOfRectangle(const Polygon& outline) {
-  const double half = 0.25 * outline.Perimeter();
-  const double root = std::sqrt(std::max(0.0, half * half - outline.Area()));
-  return {half - root, half + root};
-}
-
 // Drops rooms that open in their whole width to what is no room, while no way
 // through doors and openings leads to them from a room that the robot was in.
 // For a robot that drove outside these are alleys between houses and gaps
@@ -270,55 +263,9 @@ void DropUnreached(const Arrangement& arrangement, std::vector<PlanRoom>* rooms,
   *rooms = std::move(kept);
 }
 
-// Long and narrow.
 PlanRoom::Kind KindOf(const Polygon& outline) {
-  const auto [width, length] = SidesOfRectangle(outline);
-  return length >= kCorridorRatio * width && width <= kCorridorWidth
-             ? PlanRoom::Kind::kCorridor
-             : PlanRoom::Kind::kRoom;
-}
-
-// What lies along a drawn line: rooms to the left and to the right of each of
-// its samples.
-struct Sides {
-  static constexpr int kNone = -2;  // no border of a room
-  std::vector<int> left, right;
-};
-
-std::vector<Sides> SidesOf(const Arrangement& arrangement,
-                           const std::vector<int>& room_of_face,
-                           const std::vector<DrawnLine>& drawn) {
-  std::vector<Sides> sides(drawn.size());
-  for (std::size_t i = 0; i < drawn.size(); ++i) {
-    const auto size = static_cast<std::size_t>(drawn[i].profile.size());
-    sides[i].left.assign(size, Sides::kNone);
-    sides[i].right.assign(size, Sides::kNone);
-  }
-  for (const ArrangementEdge& edge : arrangement.edges) {
-    if (edge.line < 0) continue;
-    const auto room = [&](int face) {
-      return face < 0 ? -1 : room_of_face[static_cast<std::size_t>(face)];
-    };
-    int left = room(edge.left);
-    int right = room(edge.right);
-    if (left == right) continue;
-    const auto line = static_cast<std::size_t>(edge.line);
-    const WallProfile& profile = drawn[line].profile;
-    double from = drawn[line].line.Along(edge.begin);
-    double to = drawn[line].line.Along(edge.end);
-    if (from > to) {
-      std::swap(from, to);
-      std::swap(left, right);
-    }
-    for (int i = std::max(0, profile.IndexOf(from)); i < profile.size(); ++i) {
-      const double middle = profile.MiddleOf(i);
-      if (middle > to) break;
-      if (middle < from) continue;
-      sides[line].left[static_cast<std::size_t>(i)] = left;
-      sides[line].right[static_cast<std::size_t>(i)] = right;
-    }
-  }
-  return sides;
+  return IsLongAndNarrow(outline) ? PlanRoom::Kind::kCorridor
+                                  : PlanRoom::Kind::kRoom;
 }
 
 // A straight wall from sample `first` to `last` (not included) of a line.
@@ -365,6 +312,7 @@ Division Divide(const std::vector<WallLine>& lines, const SpaceGrid& space,
   MeasureLines(space, options.doors, &division.drawn);
   division.arrangement = Arrange(division.drawn, space);
   division.region = FindRegions(division.arrangement, options.regions);
+  JoinAcrossFurniture(division.arrangement, division.drawn, &division.region);
   return division;
 }
 
@@ -453,6 +401,31 @@ void AddNiche(const DrawnLine& on, int first, int last, int side,
   walls->push_back(wall);
 }
 
+// Whether two samples lie between the same rooms.
+bool AreSame(const Sides& sides, int a, int b) {
+  const auto i = static_cast<std::size_t>(a);
+  const auto j = static_cast<std::size_t>(b);
+  return sides.left[i] == sides.left[j] && sides.right[i] == sides.right[j];
+}
+
+// Whether the wall beside an opening, from sample `first` to `last` (not
+// included), stands between the same two rooms.
+bool HasJamb(const Sides& sides, const std::vector<bool>& is_open, int first,
+             int last) {
+  const int count = static_cast<int>(is_open.size());
+  const int middle = (first + last) / 2;
+  const auto has_wall = [&](int begin, int end) {
+    int wall = 0;
+    for (int k = std::max(0, begin); k < std::min(end, count); ++k) {
+      wall +=
+          AreSame(sides, k, middle) && !is_open[static_cast<std::size_t>(k)];
+    }
+    return wall >= kLeastJamb;
+  };
+  return has_wall(first - 2 * kLeastJamb, first) ||
+         has_wall(last, last + 2 * kLeastJamb);
+}
+
 // Walls and doors along a line.
 void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
               const BuildingPlanOptions& options, BuildingPlan* plan) {
@@ -495,6 +468,18 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
       i = j;
       continue;
     }
+    // Where a corridor ends as wide as it is there is no door. An opening onto
+    // two rooms beside each other may be one to one of them.
+    if ((j - i) * WallProfile::kStep + space.resolution >
+            options.doors.narrow &&
+        !HasJamb(sides, is_open, i, j)) {
+      const int last = j;
+      for (j = i; j < last && AreSame(sides, i, j);) ++j;
+      if (!HasJamb(sides, is_open, i, j)) {
+        i = j;
+        continue;
+      }
+    }
     const auto middle = static_cast<std::size_t>((i + j) / 2);
     PlanDoor door;
     // Jambs lie in the middle of their cells.
@@ -506,27 +491,14 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
                   std::max(-1, sides.right[middle])};
     const bool is_between = i > 0 && j < count && on.line.is_wall;
     const bool has_both = door.rooms[0] >= 0 && door.rooms[1] >= 0;
-    // Where a corridor ends as wide as it is there is no door.
-    const auto has_jamb = [&](int begin, int end) {
-      int wall = 0;
-      for (int k = std::max(0, begin); k < std::min(end, count); ++k) {
-        const auto at = static_cast<std::size_t>(k);
-        wall += sides.left[at] == sides.left[middle] &&
-                sides.right[at] == sides.right[middle] && !is_open[at];
-      }
-      return wall >= kLeastJamb;
-    };
-    if (door.width() > options.doors.narrow &&
-        !has_jamb(i - 2 * kLeastJamb, i) && !has_jamb(j, j + 2 * kLeastJamb)) {
-      i = j;
-      continue;
-    }
     const bool is_door =
         has_both ||
         LeadsSomewhere(on, i, j, door.rooms[0] >= 0 ? -1 : 1, space);
     if (is_between && is_door && door.width() >= options.min_door &&
-        door.width() <=
-            (has_both ? options.doors.wide : options.doors.narrow)) {
+        door.width() <= (!has_both ? options.doors.narrow
+                         : on.profile.marks[middle] == Mark::kDoor
+                             ? options.doors.widest_front
+                             : options.doors.wide)) {
       plan->doors.push_back(door);
     } else if (is_between && !is_door && door.width() <= options.doors.wide) {
       AddNiche(on, i, j, door.rooms[0] >= 0 ? -1 : 1, space, &plan->walls);

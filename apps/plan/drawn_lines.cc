@@ -31,6 +31,8 @@ constexpr double kImportantDoor = 0.6;
 // which on fully.
 constexpr double kBareFlanks = 0.3;
 constexpr double kFullFlanks = 0.6;
+// An opening in a long wall, up to the widest door, counts as much as a door.
+constexpr double kFrontAsDoor = 0.6;
 
 // What nobody saw beside an opening, behind furniture or where no room is, says
 // less against a wall there than what was seen to be open.
@@ -461,12 +463,23 @@ void Weigh(const DoorOptions& options, bool is_wall, const Crossings& crossings,
         is_wall && whole.first > 0 && whole.last < count &&
         !(width > options.narrow && goes_straight_on(whole.first) &&
           goes_straight_on(whole.last));
-    const double wider = std::clamp(
-        (width - options.narrow) / (options.wide - options.narrow), 0.0, 1.0);
-    const double narrow = 1.0 - wider * wider;
     const double flanked = std::clamp(
         (covered - kBareFlanks) / (kFullFlanks - kBareFlanks), 0.0, 1.0);
     const double important = std::min(1.0, beside * kStep / kFullWall);
+    // An office that is open to the hall beside it: nothing stands in its front
+    // but the wall that goes on.
+    const bool is_front = walls(whole.first, whole.last) == 0 &&
+                          flanked >= 1.0 && important >= 1.0;
+    const double wide = is_front ? options.widest_front : options.wide;
+    const double wider = std::clamp(
+        (width - options.narrow) / (options.wide - options.narrow), 0.0, 1.0);
+    double narrow = 1.0 - wider * wider;
+    if (is_front) {
+      narrow = std::max(
+          narrow,
+          kFrontAsDoor *
+              std::clamp((wide - width) / (wide - options.wide), 0.0, 1.0));
+    }
     const double as_door = is_between ? narrow * flanked : 0.0;
     const double holds =
         -1.0 + as_door * (1.0 - kDoorHolds + kImportantDoor * important);
@@ -485,8 +498,7 @@ void Weigh(const DoorOptions& options, bool is_wall, const Crossings& crossings,
         open += marks[static_cast<std::size_t>(j)] == Mark::kOpen;
         ++j;
       }
-      if (is_between && width <= options.wide && open * 2 >= j - i &&
-          covered >= 0.4) {
+      if (is_between && width <= wide && open * 2 >= j - i && covered >= 0.4) {
         std::fill(marks.begin() + i, marks.begin() + j, Mark::kDoor);
       }
       i = std::max(j, i + 1);

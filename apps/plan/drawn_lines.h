@@ -53,6 +53,10 @@ struct DoorOptions {
   double narrow = 1.2;
   /// ... wider than this they are not, and in between to a degree.
   double wide = 3.0;
+  /// An opening in which nothing stands, in a wall that goes on beside it (4 m
+  /// of it, and 60 % of what was seen, within 5 m), counts 0.6 at least up to
+  /// `wide`, and less from there on up to this.
+  double widest_front = 4.0;
 };
 
 /// Occupied cells this far beside the faces of a wall still belong to it, m.

@@ -111,12 +111,55 @@ bool IsNarrow(const Polygon& polygon, double width) {
   return Offset(polygon, -0.5 * width).empty();
 }
 
+// Faces of no region in unseen spaces behind furniture or within it: small and
+// narrow as a whole, up to the walls around them. For each face a number that
+// its space has alone, -1 for the others.
+std::vector<int> HiddenSpaces(const Arrangement& arrangement,
+                              const RegionOptions& options,
+                              const std::vector<int>& region) {
+  const std::size_t size = arrangement.faces.size();
+  DisjointSets spaces(size);
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    if (edge.left < 0 || edge.right < 0 ||
+        region[static_cast<std::size_t>(edge.left)] >= 0 ||
+        region[static_cast<std::size_t>(edge.right)] >= 0 ||
+        -Openness(edge.lengths) >= options.holds_apart) {
+      continue;
+    }
+    spaces.Join(static_cast<std::size_t>(edge.left),
+                static_cast<std::size_t>(edge.right));
+  }
+  std::map<std::size_t, std::vector<Polygon>> faces;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (region[i] >= 0) continue;
+    faces[spaces.Find(i)].push_back(arrangement.faces[i]);
+  }
+  std::vector<int> hidden(size, -1);
+  for (std::size_t i = 0; i < size; ++i) {
+    if (region[i] >= 0) continue;
+    const std::vector<Polygon>& parts = faces[spaces.Find(i)];
+    double area = 0.0;
+    for (const Polygon& part : parts) area += part.Area();
+    if (area > kMaxPocket) continue;
+    const std::vector<Polygon> outlines = UnionOf(parts);
+    if (std::all_of(outlines.begin(), outlines.end(),
+                    [&](const Polygon& whole) {
+                      return IsNarrow(whole, options.pocket_width);
+                    })) {
+      hidden[i] = static_cast<int>(spaces.Find(i));
+    }
+  }
+  return hidden;
+}
+
 // Regions and what lies between them while they grow.
 class Regions {
  public:
-  Regions(const Arrangement& arrangement, const std::vector<bool>& is_inside)
+  Regions(const Arrangement& arrangement, const std::vector<bool>& is_inside,
+          const RegionOptions& options)
       : region_(arrangement.faces.size(), -1),
         borders_(region_.size()),
+        of_solids_(region_.size()),
         extents_(region_.size()) {
     for (std::size_t i = 0; i < region_.size(); ++i) {
       if (is_inside[i]) region_[i] = static_cast<int>(i);
@@ -125,8 +168,16 @@ class Regions {
       extents_[i].free = arrangement.free[i];
       is_sliver_.push_back(IsNarrow(arrangement.faces[i], kSliver));
     }
+    const std::vector<int> hidden = HiddenSpaces(arrangement, options, region_);
     for (const ArrangementEdge& edge : arrangement.edges) {
       if (edge.right < 0 || edge.left == edge.right) continue;
+      for (const auto& [face, beside] :
+           {std::make_pair(edge.left, edge.right),
+            std::make_pair(edge.right, edge.left)}) {
+        const int solid = hidden[static_cast<std::size_t>(beside)];
+        if (region_[static_cast<std::size_t>(face)] < 0 || solid < 0) continue;
+        of_solids_[static_cast<std::size_t>(face)][solid].Add(edge.lengths);
+      }
       if (region_[static_cast<std::size_t>(edge.left)] < 0 ||
           region_[static_cast<std::size_t>(edge.right)] < 0) {
         continue;
@@ -183,8 +234,8 @@ class Regions {
     const auto key = [&](const BorderLengths& border, int a, int b) {
       const bool is_left = AreApart(border, a, b, options) ||
                            (only_slivers && !IsSliver(a) && !IsSliver(b));
-      return Pair(is_left ? 1.0 : -Openness(border), std::min(a, b),
-                  std::max(a, b));
+      return Pair(is_left ? 1.0 : HoldsApart(border, a, b, options),
+                  std::min(a, b), std::max(a, b));
     };
     for (std::size_t a = 0; a < borders_.size(); ++a) {
       for (const auto& [b, border] : borders_[a]) {
@@ -210,6 +261,35 @@ class Regions {
         queue.insert(key(border.all, a, c));
       }
     }
+  }
+
+  bool CouldBeRoom(int region, const RegionOptions& options) const {
+    const Extent& extent = extents_[static_cast<std::size_t>(region)];
+    return extent.area >= options.min_area &&
+           extent.Width() >= options.min_width;
+  }
+
+  // What holds two regions apart, mean along what lies between them: their
+  // border, and what stands between them and was seen from both sides, as the
+  // row of cupboards beside a passage.
+  double HoldsApart(const BorderLengths& border, int a, int b,
+                    const RegionOptions& options) const {
+    const auto& others = of_solids_[static_cast<std::size_t>(b)];
+    double length = border.length();
+    if (length < kLeastBorder) return 1.0;
+    double holds = border.holds;
+    if (!CouldBeRoom(a, options) || !CouldBeRoom(b, options)) {
+      return holds / length;
+    }
+    for (const auto& [solid, face] : of_solids_[static_cast<std::size_t>(a)]) {
+      const auto other = others.find(solid);
+      if (other == others.end()) continue;
+      const double along = std::min(face.length(), other->second.length());
+      length += along;
+      holds += along * std::max(face.holds / face.length(),
+                                other->second.holds / other->second.length());
+    }
+    return holds / length;
   }
 
   std::map<int, Border>& BordersOf(int region) {
@@ -258,11 +338,18 @@ class Regions {
       BordersOf(c)[a].Add(border);
     }
     BordersOf(b).clear();
+    for (const auto& [solid, face] : of_solids_[static_cast<std::size_t>(b)]) {
+      of_solids_[static_cast<std::size_t>(a)][solid].Add(face);
+    }
+    of_solids_[static_cast<std::size_t>(b)].clear();
     std::replace(region_.begin(), region_.end(), b, a);
   }
 
   std::vector<int> region_;
   std::vector<std::map<int, Border>> borders_;
+  // Borders with unseen spaces that belong to no region (HiddenSpaces), by
+  // their numbers.
+  std::vector<std::map<int, BorderLengths>> of_solids_;
   std::vector<Extent> extents_;
   // Narrow faces that have not joined any others.
   std::vector<bool> is_sliver_;
@@ -397,44 +484,6 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
   }
 }
 
-// Faces of no region in unseen spaces behind furniture: small and narrow as a
-// whole, up to the walls around them.
-std::vector<bool> HiddenFaces(const Arrangement& arrangement,
-                              const RegionOptions& options,
-                              const std::vector<int>& region) {
-  const std::size_t size = arrangement.faces.size();
-  DisjointSets spaces(size);
-  for (const ArrangementEdge& edge : arrangement.edges) {
-    if (edge.left < 0 || edge.right < 0 ||
-        region[static_cast<std::size_t>(edge.left)] >= 0 ||
-        region[static_cast<std::size_t>(edge.right)] >= 0 ||
-        -Openness(edge.lengths) >= options.holds_apart) {
-      continue;
-    }
-    spaces.Join(static_cast<std::size_t>(edge.left),
-                static_cast<std::size_t>(edge.right));
-  }
-  std::map<std::size_t, std::vector<Polygon>> faces;
-  for (std::size_t i = 0; i < size; ++i) {
-    if (region[i] >= 0) continue;
-    faces[spaces.Find(i)].push_back(arrangement.faces[i]);
-  }
-  std::vector<bool> is_hidden(size, false);
-  for (std::size_t i = 0; i < size; ++i) {
-    if (region[i] >= 0) continue;
-    const std::vector<Polygon>& parts = faces[spaces.Find(i)];
-    double area = 0.0;
-    for (const Polygon& part : parts) area += part.Area();
-    if (area > kMaxPocket) continue;
-    const std::vector<Polygon> outlines = UnionOf(parts);
-    is_hidden[i] = std::all_of(outlines.begin(), outlines.end(),
-                               [&](const Polygon& whole) {
-                                 return IsNarrow(whole, options.pocket_width);
-                               });
-  }
-  return is_hidden;
-}
-
 // What is too small for a room goes to the neighbor from which least keeps it
 // apart: space in front of and behind furniture, seen or not.
 void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
@@ -454,15 +503,14 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
       rooms.insert(id);
     }
   }
-  const std::vector<bool> is_hidden =
-      HiddenFaces(arrangement, options, *region);
+  const std::vector<int> hidden = HiddenSpaces(arrangement, options, *region);
   // Pockets have numbers of their own: the region's, or that of the face.
   std::vector<int> pocket(size, -1);
   std::map<int, double> seen;
   for (std::size_t i = 0; i < size; ++i) {
     if ((*region)[i] >= 0) {
       if (rooms.count((*region)[i]) == 0) pocket[i] = (*region)[i];
-    } else if (is_hidden[i]) {
+    } else if (hidden[i] >= 0) {
       pocket[i] = static_cast<int>(i);
     }
     if (pocket[i] >= 0) seen[pocket[i]] += arrangement.free[i];
@@ -525,7 +573,7 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
 
 std::vector<int> FindRegions(const Arrangement& arrangement,
                              const RegionOptions& options) {
-  Regions regions(arrangement, InsideOf(arrangement, options));
+  Regions regions(arrangement, InsideOf(arrangement, options), options);
   regions.JoinOpen(options);
   regions.JoinThrough(options);
   std::vector<int> region = regions.region();

@@ -1,4 +1,5 @@
 #include <plumbline/apps/simulation/bent_world.h>
+#include <plumbline/apps/simulation/building.h>
 #include <plumbline/core/error.h>
 #include <plumbline/factors/angle.h>
 

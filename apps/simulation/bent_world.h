@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_APPS_SIMULATION_BENT_WORLD_H_
 #define PLUMBLINE_APPS_SIMULATION_BENT_WORLD_H_
 
+#include <plumbline/apps/simulation/building.h>
 #include <plumbline/apps/simulation/world.h>
 
 #include <cstdint>

@@ -7,6 +7,7 @@
 #include <plumbline/core/utf8.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/range_offset.h>
 #include <plumbline/frontend/scan_odometry.h>
 
 #include <algorithm>
@@ -140,6 +141,25 @@ void UndoSweeps(const std::string& name, const LogSolverOptions& solver_options,
   }
 }
 
+// What the laser reads too long or too short everywhere.
+void UndoRangeOffset(const std::string& name, RunClock* clock, Log* log,
+                     Summary* summary) {
+  clock->Begin("offset of the laser's ranges");
+  const RangeOffset found = FindRangeOffset(log->scans);
+  Detail("%s: %d pairs of scans: ranges off by %.1f mm (+- %.1f) at first",
+         name.c_str(), found.pairs, 1e3 * found.first, 1e3 * found.sigma);
+  if (found.offset == 0.0) return;
+  for (Scan& scan : log->scans) TakeOutRangeOffset(found.offset, &scan);
+  summary->range_offset = found.offset;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "the laser's ranges are %.0f mm too %s: that is taken out",
+                1e3 * std::abs(found.offset),
+                found.offset > 0.0 ? "long" : "short");
+  summary->notes.push_back(text);
+  Remark("%s: %s", name.c_str(), text);
+}
+
 }  // namespace
 
 ReadingProgress::ReadingProgress(InputStream* input, RunClock* clock)
@@ -187,13 +207,14 @@ Log ReadLog(const LogInput& input, RunClock* clock, Summary* summary) {
   return log;
 }
 
-void CompleteOdometry(const std::string& name, const LogSolverOptions& options,
-                      RunClock* clock, Log* log, Summary* summary) {
+void CompleteLog(const std::string& name, const LogSolverOptions& options,
+                 RunClock* clock, Log* log, Summary* summary) {
   if (!log->has_odometry) {
     MatchScansAlone(name, options, clock, log, summary);
   } else {
     UndoSweeps(name, options, clock, log, summary);
   }
+  if (options.range_offset) UndoRangeOffset(name, clock, log, summary);
 }
 
 // The scans of a log are counted on the way; what comes after the last one is

@@ -54,9 +54,10 @@ std::unique_ptr<OpenInput> Open(const std::string& name,
 Log ReadLog(const LogInput& input, RunClock* clock, Summary* summary);
 
 /// Makes odometry of the scans of a log that has none. Undoes the motion during
-/// the scans of one that has.
-void CompleteOdometry(const std::string& name, const LogSolverOptions& options,
-                      RunClock* clock, Log* log, Summary* summary);
+/// the scans of one that has. Then takes out by how much the laser's ranges are
+/// all too long or too short, where the scans show it.
+void CompleteLog(const std::string& name, const LogSolverOptions& options,
+                 RunClock* clock, Log* log, Summary* summary);
 
 /// Stages of a run on logs, by the names of its steps. `sizes`: of each log,
 /// its scans as a share of those of a middling one of them.

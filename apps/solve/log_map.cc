@@ -24,6 +24,8 @@ void SummarizeLog(const std::vector<Scan>& scans, const LogSolverResult& result,
   summary->scan_seconds.assign(result.scan_seconds.begin(),
                                result.scan_seconds.end());
   summary->range_noise = result.range_sigma;
+  summary->odometry_scale = result.odometry_scale;
+  summary->odometry_course = result.odometry_course;
   EmReport em = result.em;
   em.detect_seconds = result.detect_seconds;
   em.solve_seconds = result.solve_seconds;

@@ -76,7 +76,7 @@ int SolveLog(const LogInput& input, const RunContext& run) {
   if (!log.has_odometry) {
     run.clock->bar().Plan(StagesWithMatching({1.0}, options));
   }
-  CompleteOdometry(input.name, options, run.clock, &log, &summary);
+  CompleteLog(input.name, options, run.clock, &log, &summary);
 
   CheckpointFile checkpoint(
       std::filesystem::path(FLAGS_output_dir) / CheckpointFile::kName,

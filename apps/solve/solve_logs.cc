@@ -128,7 +128,7 @@ std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
     Log log = ReadLog(input->log, clock, &of_log);
     summary->parse_seconds += of_log.parse_seconds;
     if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
-    CompleteOdometry(name, options, clock, &log, &of_log);
+    CompleteLog(name, options, clock, &log, &of_log);
     AddNotes(TitleOf(name), of_log, summary);
     logs.push_back(std::move(log));
   }

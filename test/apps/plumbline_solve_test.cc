@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/apps/evaluation/relations.h>
 #include <plumbline/apps/simulation/bag_writer.h>
+#include <plumbline/apps/simulation/building.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/synthetic_worlds.h>
 #include <plumbline/apps/simulation/world.h>

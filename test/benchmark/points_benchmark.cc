@@ -1,5 +1,5 @@
 // Structure of points against their number: buildings like that of experiment
-// S1, side by side. Prints a line a world and writes a figure.
+// S1, side by side. Prints one line per world and writes a figure.
 //
 //     points_benchmark [--figure=FILE.svg] [--phases] [POINTS ...]
 //

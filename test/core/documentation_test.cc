@@ -326,6 +326,16 @@ TEST_F(RelationsPageTest, TableIsThatOfTheHeaders) {
   ExpectTable(kRelationsPage, kTableBegin, kTableEnd, table);
 }
 
+TEST_F(RelationsPageTest, HeadersNameEveryFeatureType) {
+  const std::string feature = Join(ReadLines("core/feature.h"));
+  const std::string builtins = Join(ReadLines("core/builtins.h"));
+  for (const FeatureType* type : registry_.features()) {
+    EXPECT_NE(feature.find("\n///   " + type->name + " "), std::string::npos)
+        << type->name;
+    EXPECT_NE(builtins.find(type->name), std::string::npos) << type->name;
+  }
+}
+
 constexpr char kGraphFilesPage[] = "core/graph_files.md";
 
 class GraphFilesPageTest : public RelationsPageTest {};

@@ -123,7 +123,9 @@ TEST(ScanMatcherTest, EveryStepPairsWithTheNearest) {
   const Pose2 guess = truth + Pose2(0.15, -0.1, DegToRad(3.0));
   ScanMatcherOptions options = MatcherOptions();
   options.convergence = 0.0;
+  options.coarse_points = static_cast<int>(scan.size());
   Pose2 pose = guess;
+  double progress = 0.0;
   for (int steps = 1; steps <= 12; ++steps) {
     SCOPED_TRACE(steps);
     options.max_iterations = steps;
@@ -131,7 +133,7 @@ TEST(ScanMatcherTest, EveryStepPairsWithTheNearest) {
     matcher.SetReference(reference);
     const MatchResult match = matcher.Refine(scan, guess, MatchPrior());
     // What the last step saw from where the one before it had led.
-    const double progress = std::min(1.0, (steps - 1) / 6.0);
+    progress = std::max(progress, std::min(1.0, (steps - 1) / 6.0));
     const double radius =
         options.initial_radius +
         progress * (options.final_radius - options.initial_radius);
@@ -163,7 +165,39 @@ TEST(ScanMatcherTest, EveryStepPairsWithTheNearest) {
     }
     EXPECT_EQ(match.inliers, inliers);
     EXPECT_NEAR(match.cost, cost / tried, 1e-9);
+    // Where the pose hardly moves the radius is the final one at once.
+    if (PositionError(match.pose, pose) < 0.005 &&
+        HeadingError(match.pose, pose) < 0.0015) {
+      progress = 1.0;
+    }
     pose = match.pose;
+  }
+}
+
+// Few points lead to where all do, and all have a say in the end.
+TEST(ScanMatcherTest, FewPointsAreEnoughToComeNear) {
+  Laser laser = FullCircle();
+  laser.sigma = 0.01;
+  Noise noise(5);
+  const std::vector<ScanPoint> reference =
+      PointsOf(MakeScan(RoomWithPillar(), Pose2::Zero(), laser, &noise));
+  for (int trial = 0; trial < 20; ++trial) {
+    SCOPED_TRACE(trial);
+    const Pose2 truth(0.02 * trial - 0.2, 0.01 * trial, 0.01 * trial);
+    const std::vector<ScanPoint> scan =
+        PointsOf(MakeScan(RoomWithPillar(), truth, laser, &noise));
+    const Pose2 guess = truth + Pose2(0.1, -0.1, DegToRad(2.0));
+    ScanMatcherOptions options = MatcherOptions();
+    ScanMatcher few(options);
+    options.coarse_points = static_cast<int>(scan.size());
+    ScanMatcher all(options);
+    few.SetReference(reference);
+    all.SetReference(reference);
+    const MatchResult by_few = few.Refine(scan, guess, MatchPrior());
+    const MatchResult by_all = all.Refine(scan, guess, MatchPrior());
+    EXPECT_LT(PositionError(by_few.pose, by_all.pose), 0.002);
+    EXPECT_LT(HeadingError(by_few.pose, by_all.pose), DegToRad(0.05));
+    EXPECT_NEAR(by_few.inliers, by_all.inliers, 0.01 * by_all.inliers);
   }
 }
 

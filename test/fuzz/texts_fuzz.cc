@@ -4,6 +4,7 @@
 #include <plumbline/apps/evaluation/map_truth.h>
 #include <plumbline/apps/evaluation/relations.h>
 #include <plumbline/apps/simulation/world.h>
+#include <plumbline/apps/simulation/world_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/detectors/builtins.h>

@@ -300,8 +300,21 @@ TEST(BuildingPlanTest, AWideOpeningJoins) {
   EXPECT_EQ(PlanOf(drawing).rooms.size(), 2u);
 }
 
-// The space between the jambs of a thick wall belongs to one side: the other
-// must not take its door for the end of a corridor.
+// An office that is open to a hall along half of its front is a room when the
+// wall of the front goes on beside it, and a part of the hall when it does not.
+TEST(BuildingPlanTest, AnOpenFrontInALongWallKeepsAnOfficeApart) {
+  const auto plan = [](double begin) {
+    Drawing drawing(16.0, 14.0);
+    drawing.Room(1.0, begin, 9.0, 12.0).Room(9.2, 6.2, 14.0, 12.0);
+    drawing.Free(8.9, 8.9, 9.3, 11.8);
+    return PlanOf(drawing);
+  };
+  const BuildingPlan office = plan(1.0);
+  ASSERT_EQ(office.rooms.size(), 2u);
+  EXPECT_EQ(office.rooms[0].neighbors, std::vector<int>{1});
+  EXPECT_EQ(plan(6.2).rooms.size(), 1u);
+}
+
 // Screens that stand free in line between two walls leave one way around all of
 // their ends, and no doors; columns as well.
 TEST(BuildingPlanTest, ScreensAndColumnsDivideNoRoom) {
@@ -331,6 +344,8 @@ TEST(BuildingPlanTest, WallBetweenTwoDoorsKeepsRoomsApart) {
   EXPECT_EQ(PlanOf(next).doors.size(), 4u);
 }
 
+// The space between the jambs of a thick wall belongs to one side: the other
+// must not take its door for the end of a corridor.
 TEST(BuildingPlanTest, DoorsInThickWallsKeepRoomsApart) {
   for (const double thickness : {0.1, 0.3, 0.4, 0.5}) {
     Drawing drawing(14.0, 12.0);
@@ -453,8 +468,6 @@ TEST(BuildingPlanTest, AShortPartitionWithADoorKeepsRoomsApart) {
   EXPECT_EQ(rooms(5.0), 2u);
 }
 
-// A room with one wall that is an arc, whose chords are all shorter than a wall
-// must be.
 // A short wall and a cupboard beside it reach half way through a room: two
 // rooms when each half has a door to the corridor, one when there is one door.
 TEST(BuildingPlanTest, APartitionBetweenTwoDoorsKeepsRoomsApart) {
@@ -472,6 +485,26 @@ TEST(BuildingPlanTest, APartitionBetweenTwoDoorsKeepsRoomsApart) {
   EXPECT_EQ(rooms(false), 2u);
 }
 
+// Cupboards and screens across a room with three gaps: a part of the room that
+// they hide, unless it has a door to the corridor of its own. Two doors in a
+// long wall are doors.
+TEST(BuildingPlanTest, CupboardsAcrossARoomDoNotDivideIt) {
+  const auto rooms = [](const std::vector<double>& gaps, bool has_own_door) {
+    Drawing drawing(14.0, 12.0);
+    drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 13.0, 10.0);
+    drawing.Free(2.0, 2.9, 2.9, 3.3);
+    if (has_own_door) drawing.Free(11.0, 2.9, 11.9, 3.3);
+    drawing.Fill(8.0, 3.2, 8.05, 10.0, Space::kOccupied);
+    for (const double gap : gaps) drawing.Free(8.0, gap, 8.05, gap + 0.7);
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms({4.2, 6.6, 9.0}, false), 2u);
+  EXPECT_EQ(rooms({4.2, 6.6, 9.0}, true), 3u);
+  EXPECT_EQ(rooms({4.2, 9.0}, false), 3u);
+}
+
+// A room with one wall that is an arc, whose chords are all shorter than a wall
+// must be.
 TEST(BuildingPlanTest, ChordsOfAnArcCloseARoom) {
   const auto arc = [](double y) {
     return -2.0 + std::sqrt(36.0 - (y - 5.0) * (y - 5.0));

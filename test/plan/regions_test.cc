@@ -185,5 +185,45 @@ TEST(RegionsTest, WhatStandsBeforeAWallIsPartOfItsRoomFirst) {
   EXPECT_NE(region[0], region[2]);
 }
 
+// A row of cupboards that nobody saw into, 0.4 m deep, stands between two rooms
+// and leaves an opening of 1.8 m that alone holds little: the cupboards keep
+// them apart along their length. A single one beside an opening does not, nor
+// do they cut off a strip that is too narrow for a room.
+TEST(RegionsTest, CupboardsBetweenTwoRoomsKeepThemApart) {
+  const auto are_apart = [](double cupboards, double width) {
+    Arrangement arrangement;
+    const double end = 4.0 - cupboards;
+    const double right = 4.4 + width;
+    AddFace({{0.0, 0.0}, {4.0, 0.0}, {4.0, end}, {4.0, 4.0}, {0.0, 4.0}},
+            &arrangement);
+    AddFace({{4.0, 0.0},
+             {right, 0.0},
+             {right, 4.0},
+             {4.4, 4.0},
+             {4.4, end},
+             {4.0, end}},
+            &arrangement);
+    AddFace({{4.0, end}, {4.4, end}, {4.4, 4.0}, {4.0, 4.0}}, &arrangement);
+    arrangement.unknown[2] = arrangement.free[2];
+    arrangement.free[2] = 0.0;
+    AddEdge({4.0, 0.0}, {4.0, end}, 0, 1, 0.1, end, &arrangement);
+    AddEdge({4.0, end}, {4.0, 4.0}, 0, 2, 1.0, 0.0, &arrangement);
+    AddEdge({4.0, end}, {4.4, end}, 1, 2, 1.0, 0.0, &arrangement);
+    AddEdge({4.4, end}, {4.4, 4.0}, 2, 1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 0.0}, {4.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({4.0, 4.0}, {0.0, 4.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 4.0}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({4.0, 0.0}, {right, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({right, 0.0}, {right, 4.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({right, 4.0}, {4.4, 4.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({4.4, 4.0}, {4.0, 4.0}, 2, -1, 1.0, 0.0, &arrangement);
+    const std::vector<int> region = FindRegions(arrangement);
+    return region[0] != region[1];
+  };
+  EXPECT_TRUE(are_apart(2.2, 4.0));
+  EXPECT_FALSE(are_apart(0.5, 4.0));
+  EXPECT_FALSE(are_apart(2.2, 0.6));
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -14,6 +14,8 @@ Relations stay true; those whose scans are gone are left out. Kinds, with what V
   holes       a share VALUE (0.2) of the returns is missing
   near        what lies VALUE m (6) away or farther returns nothing
   long        ranges times VALUE (1.01)
+  offset      all ranges are VALUE m (0.05) too long
+  askew       odometry says that the robot drives VALUE degrees (1.5) to the right of where it does
   drift       odometry turns by VALUE degrees (1) a metre to the left
   slip        in one step of odometry of twenty the robot turned VALUE degrees (5) more than it says, or less
   wheels      normal noise on each step of odometry, a share VALUE (0.2) of it
@@ -28,7 +30,7 @@ import random
 import sys
 
 DEFAULTS = {"mirror": 0, "reverse": 0, "every": 3, "noise": 0.03, "steps": 0.05, "spikes": 0.05, "holes": 0.2, "near": 6.0,
-            "long": 1.01, "drift": 1.0, "slip": 5.0, "wheels": 0.2, "still": 0, "late": 2}
+            "long": 1.01, "offset": 0.05, "askew": 1.5, "drift": 1.0, "slip": 5.0, "wheels": 0.2, "still": 0, "late": 2}
 NO_RETURN = 81.83
 
 
@@ -120,6 +122,11 @@ def main():
         on_ranges(scans, lambda r: NO_RETURN if r >= value else r)
     elif kind == "long":
         on_ranges(scans, lambda r: value * r)
+    elif kind == "offset":
+        on_ranges(scans, lambda r: max(0.02, r + value))
+    elif kind == "askew":
+        c, s = math.cos(math.radians(value)), math.sin(math.radians(value))
+        on_steps(scans, lambda k, p: (c * p[0] + s * p[1], -s * p[0] + c * p[1], p[2]))
     elif kind == "drift":
         on_steps(scans, lambda k, p: (p[0], p[1], p[2] + math.radians(value) * math.hypot(p[0], p[1])))
     elif kind == "slip":

@@ -107,7 +107,7 @@ TEST(HelpTest, FitsEightyColumnsAndGroupsFlags) {
 
 TEST(HelpTest, ManPage) {
   const std::string page = ManPage(TestInfo(), TestFlags());
-  EXPECT_THAT(page, testing::StartsWith(".TH PLUMBLINE_TEST 1 "));
+  EXPECT_THAT(page, ::testing::StartsWith(".TH PLUMBLINE_TEST 1 "));
   EXPECT_THAT(page, HasSubstr("plumbline_test \\- shows how a summary"));
   EXPECT_THAT(page, HasSubstr("\n.B \\-\\-number=NUMBER\n"
                               "How many; it\\(aqs a \\(aqnumber\\(aq"));
@@ -128,7 +128,7 @@ TEST(HelpTest, ManPage) {
     const std::string command = line.substr(0, line.find(' '));
     EXPECT_THAT((std::vector<std::string>{".TH", ".SH", ".SS", ".TP", ".B",
                                           ".br", ".nf", ".fi", ".ad"}),
-                testing::Contains(command));
+                ::testing::Contains(command));
   }
 }
 

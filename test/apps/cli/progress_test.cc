@@ -116,10 +116,10 @@ TEST(WorkLineTest, FitsAndTellsTheTimeLeft) {
 TEST(RemarkTest, QuietAndVerbose) {
   gflags::FlagSaver saver;
   const auto print = [] {
-    testing::internal::CaptureStderr();
+    ::testing::internal::CaptureStderr();
     Remark("%d remarks", 1);
     Detail("%s", "a detail");
-    return testing::internal::GetCapturedStderr();
+    return ::testing::internal::GetCapturedStderr();
   };
   EXPECT_EQ(print(), "1 remarks\n");
   gflags::SetCommandLineOption("verbose", "true");
@@ -140,16 +140,16 @@ TEST(AppTest, VersionIsTheProjects) {
 TEST(AppTest, RunMainTurnsExceptionsIntoStatuses) {
   EXPECT_EQ(RunMain([] { return 0; }), 0);
   EXPECT_EQ(RunMain([] { return 7; }), 7);
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   EXPECT_EQ(RunMain([]() -> int {
               throw Error("a.clf", 12, "no number", "a range in m");
             }),
             2);
-  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(),
             "a.clf:12: no number: expected a range in m\n");
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   EXPECT_EQ(RunMain([]() -> int { throw std::logic_error("impossible"); }), 3);
-  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(),
             "internal error: impossible\n");
 }
 
@@ -184,7 +184,7 @@ TEST(AppTest, ChangedFlagsAreOurOwn) {
   EXPECT_EQ(changed[0].type, "bool");
 }
 
-class ParseFlagsDeathTest : public testing::Test {
+class ParseFlagsDeathTest : public ::testing::Test {
  protected:
   static void Parse(std::vector<std::string> arguments,
                     bool takes_arguments = false) {
@@ -203,24 +203,24 @@ class ParseFlagsDeathTest : public testing::Test {
 };
 
 TEST_F(ParseFlagsDeathTest, HelpAndVersionSucceed) {
-  EXPECT_EXIT(Parse({"--help"}), testing::ExitedWithCode(0), "");
-  EXPECT_EXIT(Parse({"--version"}), testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(Parse({"--help"}), ::testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(Parse({"--version"}), ::testing::ExitedWithCode(0), "");
 }
 
 TEST_F(ParseFlagsDeathTest, WrongFlagsAreRefused) {
-  EXPECT_EXIT(Parse({"--no_such_flag=1"}), testing::ExitedWithCode(1),
+  EXPECT_EXIT(Parse({"--no_such_flag=1"}), ::testing::ExitedWithCode(1),
               "no_such_flag");
-  EXPECT_EXIT(Parse({"--test_range=abc"}), testing::ExitedWithCode(1), "abc");
-  EXPECT_EXIT(Parse({"--test_range=7"}), testing::ExitedWithCode(1),
+  EXPECT_EXIT(Parse({"--test_range=abc"}), ::testing::ExitedWithCode(1), "abc");
+  EXPECT_EXIT(Parse({"--test_range=7"}), ::testing::ExitedWithCode(1),
               "--test_range=7: out of range: expected 0 to 1");
-  EXPECT_EXIT(Parse({"--quiet", "false"}), testing::ExitedWithCode(1),
+  EXPECT_EXIT(Parse({"--quiet", "false"}), ::testing::ExitedWithCode(1),
               "false: unexpected argument");
 }
 
 TEST_F(ParseFlagsDeathTest, PassesArgumentsOn) {
-  EXPECT_EXIT(Parse({"--quiet"}), testing::ExitedWithCode(40), "");
+  EXPECT_EXIT(Parse({"--quiet"}), ::testing::ExitedWithCode(40), "");
   EXPECT_EXIT(Parse({"--quiet", "--", "command", "--no_such_flag"}, true),
-              testing::ExitedWithCode(42), "");
+              ::testing::ExitedWithCode(42), "");
 }
 
 TEST_F(ParseFlagsDeathTest, FirstCtrlCIsARequestAndTheSecondAnEnd) {
@@ -235,9 +235,10 @@ TEST_F(ParseFlagsDeathTest, FirstCtrlCIsARequestAndTheSecondAnEnd) {
       return InterruptRequested() ? 0 : 50;
     }));
   };
-  EXPECT_EXIT(parse_and_raise(0), testing::ExitedWithCode(50), "");
-  EXPECT_EXIT(parse_and_raise(1), testing::ExitedWithCode(130), "interrupted");
-  EXPECT_EXIT(parse_and_raise(2), testing::KilledBySignal(SIGINT), "");
+  EXPECT_EXIT(parse_and_raise(0), ::testing::ExitedWithCode(50), "");
+  EXPECT_EXIT(parse_and_raise(1), ::testing::ExitedWithCode(130),
+              "interrupted");
+  EXPECT_EXIT(parse_and_raise(2), ::testing::KilledBySignal(SIGINT), "");
 }
 
 }  // namespace

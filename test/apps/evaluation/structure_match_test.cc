@@ -11,7 +11,7 @@
 namespace plumbline {
 namespace {
 
-class StructureMatchTest : public testing::Test {
+class StructureMatchTest : public ::testing::Test {
  protected:
   StructureMatchTest() { RegisterBuiltinRelations(&registry_); }
 

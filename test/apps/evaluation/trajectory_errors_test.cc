@@ -15,10 +15,10 @@
 namespace plumbline {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::Pair;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Pair;
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -90,9 +90,9 @@ TEST(TrajectoryErrorsTest, WhatDoesNotMatchIsRefused) {
                 AssociatePoses(Trajectory("a", {0.0, 1.0}),
                                Trajectory("b", {5.0, 6.0}));
               }),
-              testing::AllOf(HasSubstr("b: no pose (5 s to 6 s) is within "
-                                       "0.01 s of one of a (0 s to 1 s)"),
-                             HasSubstr("--time_offset")));
+              ::testing::AllOf(HasSubstr("b: no pose (5 s to 6 s) is within "
+                                         "0.01 s of one of a (0 s to 1 s)"),
+                               HasSubstr("--time_offset")));
   TrajectoryFile numbers = Trajectory("k", {0.0, 1.0});
   numbers.format = "KITTI";
   numbers.has_times = false;

@@ -17,10 +17,10 @@
 namespace plumbline {
 namespace {
 
-using testing::AllOf;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 class TrajectoryFileTest : public ::testing::Test {
  protected:
@@ -182,7 +182,7 @@ TEST_F(TrajectoryFileTest, ACutBagSaysSo) {
   for (std::size_t cut = 1; cut < bag.size(); cut += bag.size() / 50) {
     try {
       const TrajectoryFile file = Read(bag.substr(0, cut));
-      EXPECT_THAT(file.notes, testing::Not(IsEmpty())) << cut;
+      EXPECT_THAT(file.notes, ::testing::Not(IsEmpty())) << cut;
     } catch (const Error&) {
       // Nothing that is a pose was left.
     }

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 #include <plumbline/apps/experiments/building_trial.h>
 #include <plumbline/apps/simulation/bent_world.h>
+#include <plumbline/apps/simulation/building.h>
+#include <plumbline/apps/simulation/world_file.h>
 #include <plumbline/detectors/builtins.h>
 
 #include <algorithm>

@@ -16,10 +16,10 @@
 namespace plumbline {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
-class ExperimentsTest : public testing::Test {
+class ExperimentsTest : public ::testing::Test {
  protected:
   ExperimentsTest() { RegisterBuiltins(&registry_); }
 
@@ -217,7 +217,7 @@ TEST_F(ExperimentsTest, SkipsLogsThatAreNotThere) {
 }
 
 TEST_F(ExperimentsTest, WritesItsFiles) {
-  const std::string folder = testing::TempDir() + "/plumbline_experiments";
+  const std::string folder = ::testing::TempDir() + "/plumbline_experiments";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   ExperimentOptions options;

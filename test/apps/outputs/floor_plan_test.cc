@@ -479,10 +479,10 @@ TEST_F(FloorPlanTest, MapJsonOfRooms) {
 TEST_F(FloorPlanTest, TableOfRooms) {
   std::ostringstream text;
   WriteRoomsCsv(PlanWithRooms().building, text);
-  EXPECT_THAT(
-      text.str(),
-      testing::StartsWith("room,kind,area_m2,x_m,y_m,entered,doors,neighbors\n"
-                          "1,corridor,40.00,"));
+  EXPECT_THAT(text.str(),
+              ::testing::StartsWith(
+                  "room,kind,area_m2,x_m,y_m,entered,doors,neighbors\n"
+                  "1,corridor,40.00,"));
   EXPECT_THAT(text.str(), HasSubstr(",1,2,2\n2,room,20.00,"));
 }
 

@@ -95,7 +95,7 @@ TEST(MeanOfTenthTest, Tenths) {
   EXPECT_EQ(MeanOfTenth({1, 2, 3, 4, 5}, 9), 5.0);
 }
 
-class SummaryGraphTest : public testing::Test {
+class SummaryGraphTest : public ::testing::Test {
  protected:
   SummaryGraphTest() { RegisterBuiltinRelations(&registry_); }
 
@@ -177,6 +177,9 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
                    {"hierarchy", "7", "", "string"}};
   summary.scans = 20;
   summary.range_noise = 0.012;
+  summary.range_offset = -0.025;
+  summary.odometry_scale = 0.96;
+  summary.odometry_course = kPi / 60.0;
   summary.features["segment"][0] = 4;
   summary.constraints["pose_pose"].measurement = 5;
   summary.initial_cost = 9.0;
@@ -230,7 +233,8 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
             R"({"skipped":[{"reason":"too short","count":2,)"
             R"("first_lines":[7,9]}],"scan_seconds_second_tenth":2.5,)"
             R"("scan_seconds_last_tenth":18.5,"scan_seconds_growth":7.4,)"
-            R"("range_noise_m":0.012})");
+            R"("range_noise_m":0.012,"range_offset_m":-0.025,)"
+            R"("odometry_scale":0.96,"odometry_course_deg":3.0})");
 }
 
 TEST(SummaryTest, APartOfARunSaysSo) {

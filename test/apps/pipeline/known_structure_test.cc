@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <plumbline/apps/simulation/building.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/builtins.h>

@@ -3,6 +3,7 @@
 #include <plumbline/apps/evaluation/trajectory_alignment.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/world.h>
+#include <plumbline/apps/simulation/world_file.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/error.h>
 #include <plumbline/detectors/builtins.h>

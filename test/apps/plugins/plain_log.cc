@@ -1,5 +1,6 @@
-// A plug-in with a log reader: "#plain" on the first line, then a scan a line,
-// number of ranges, ranges, odometry (x y theta), time; beams over 180 degrees.
+// A plug-in with a log reader: "#plain" on the first line, then one scan per
+// line, number of ranges, ranges, odometry (x y theta), time; beams over 180
+// degrees.
 #include <plumbline/core/plugin.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/log_reader.h>
@@ -45,7 +46,7 @@ plumbline::Log ReadPlainLog(plumbline::InputStream* input,
 PLUMBLINE_PLUGIN(registry) {
   plumbline::LogReaderType type;
   type.name = "plain";
-  type.description = "Ranges, odometry and time, a scan a line";
+  type.description = "Ranges, odometry and time, one scan per line";
   type.recognizes = [](std::string_view prefix) {
     return prefix.substr(0, 6) == "#plain";
   };

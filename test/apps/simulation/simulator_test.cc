@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <plumbline/apps/simulation/building.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/world.h>
+#include <plumbline/apps/simulation/world_file.h>
 #include <plumbline/core/error.h>
 #include <zlib.h>
 

@@ -18,7 +18,7 @@
 namespace plumbline {
 namespace {
 
-class SyntheticWorldsTest : public testing::Test {
+class SyntheticWorldsTest : public ::testing::Test {
  protected:
   SyntheticWorldsTest() { RegisterBuiltinRelations(&registry_); }
 

@@ -1,4 +1,6 @@
 #include <gtest/gtest.h>
+#include <plumbline/apps/simulation/building.h>
+#include <plumbline/apps/simulation/world_file.h>
 #include <plumbline/apps/simulation/world_rooms.h>
 
 #include <sstream>

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <plumbline/apps/simulation/world.h>
+#include <plumbline/apps/simulation/world_file.h>
 #include <plumbline/core/error.h>
 
 #include <algorithm>
@@ -172,115 +173,6 @@ TEST(WorldTest, RotationTurnsEverything) {
   EXPECT_EQ(world.circles[0].begin_deg, 100.0);
   EXPECT_EQ(world.boxes[0].angle_deg, 95.0);
   EXPECT_NEAR((world.path[1] - Eigen::Vector2d(-2, 0)).norm(), 0, 1e-12);
-}
-
-TEST(WorldTest, OfficeHasAnObliqueWingColumnsAndFurniture) {
-  const World world = MakeWorld("office", 3, 1.0);
-  const WorldSurfaces surfaces = MakeSurfaces(world);
-  ASSERT_EQ(surfaces.orientations_deg.size(), 4u);
-  EXPECT_NEAR(surfaces.orientations_deg[0], -60.0, 1e-6);
-  EXPECT_NEAR(surfaces.orientations_deg[1], 0.0, 1e-6);
-  EXPECT_NEAR(surfaces.orientations_deg[2], 30.0, 1e-6);
-  EXPECT_NEAR(surfaces.orientations_deg[3], 90.0, 1e-6);
-  EXPECT_EQ(world.circles.size(), 4u);
-  EXPECT_GT(world.boxes.size(), 10u);
-  EXPECT_GT(world.path.size(), 8u);
-}
-
-TEST(WorldTest, SeedDrawsTheDimensionsAndNothingElseDoes) {
-  EXPECT_EQ(Text(MakeWorld("office", 3, 1.0)),
-            Text(MakeWorld("office", 3, 1.0)));
-  EXPECT_NE(Text(MakeWorld("office", 3, 1.0)),
-            Text(MakeWorld("office", 4, 1.0)));
-}
-
-TEST(WorldTest, EqualIntervalsMakeASymmetricGrid) {
-  BuildingOptions options;
-  options.block_length = {13.0, 13.0};
-  options.block_height = {11.0, 11.0};
-  options.visited_share = 0.0;
-  options.hall_length = 0.0;
-  options.wing_length = 0.0;
-  const World world = MakeBuilding(options, 1);
-  double right = 0.0;
-  double top = 0.0;
-  for (const Eigen::Vector2d& point : world.path) {
-    right = std::max(right, point.x());
-    top = std::max(top, point.y());
-  }
-  EXPECT_EQ(right, 26.0);
-  EXPECT_EQ(top, 11.0);
-}
-
-TEST(WorldTest, KillianLikeHasLongLoops) {
-  const World world = MakeWorld("killian_like", 1, 1.0);
-  double way = 0.0;
-  for (std::size_t i = 1; i < world.path.size(); ++i) {
-    way += (world.path[i] - world.path[i - 1]).norm();
-  }
-  EXPECT_GT(way, 900.0);
-  EXPECT_LT(way, 2500.0);
-}
-
-TEST(WorldTest, SizeMultipliesTheBlocks) {
-  EXPECT_GT(MakeWorld("office", 1, 2.0).walls.size(),
-            2 * MakeWorld("office", 1, 1.0).walls.size());
-  EXPECT_FALSE(MakeWorld("office", 1, 0.1).walls.empty());
-}
-
-TEST(WorldTest, RefusesWhatItCannotBuild) {
-  EXPECT_THROW(MakeWorld("castle", 1, 1.0), Error);
-  EXPECT_THROW(MakeWorld("office", 1, 0.0), Error);
-  EXPECT_THROW(MakeWorld("office", 1, std::nan("")), Error);
-  BuildingOptions options;
-  options.wing_angle_deg = 80.0;
-  EXPECT_THROW(MakeBuilding(options, 1), Error);
-  options = {};
-  options.wing_length = 3.0;
-  EXPECT_THROW(MakeBuilding(options, 1), Error);
-  options = {};
-  options.block_height = {5.0, 5.0};
-  EXPECT_THROW(MakeBuilding(options, 1), Error);
-  options = {};
-  options.columns = 0;
-  EXPECT_THROW(MakeBuilding(options, 1), Error);
-}
-
-TEST(WorldTest, BlocksOfASymmetricBuildingAreAlike) {
-  BuildingOptions options = SymmetricOptions();
-  options.block_length = {14.0, 14.0};
-  options.block_height = {11.0, 11.0};
-  const World world = MakeBuilding(options, 2);
-  const auto is_there = [&world](const Eigen::Vector2d& begin,
-                                 const Eigen::Vector2d& end) {
-    return std::any_of(world.walls.begin(), world.walls.end(),
-                       [&](const WorldWall& wall) {
-                         return (wall.begin - begin).norm() < 1e-9 &&
-                                (wall.end - end).norm() < 1e-9;
-                       });
-  };
-  // Walls well inside the first block are in all others, too.
-  int inside = 0;
-  for (const WorldWall& wall : world.walls) {
-    const Eigen::Vector2d low = wall.begin.cwiseMin(wall.end);
-    const Eigen::Vector2d high = wall.begin.cwiseMax(wall.end);
-    if (low.x() < 0.5 || high.x() > 13.5 || low.y() < 0.5 || high.y() > 10.5) {
-      continue;
-    }
-    ++inside;
-    for (int column = 0; column < 3; ++column) {
-      for (int row = 0; row < 2; ++row) {
-        const Eigen::Vector2d shift(14.0 * column, 11.0 * row);
-        EXPECT_TRUE(is_there(wall.begin + shift, wall.end + shift))
-            << wall.begin.transpose() << " in block " << column << " " << row;
-      }
-    }
-  }
-  EXPECT_GT(inside, 10);
-  // An office has no two blocks alike.
-  options.identical_blocks = false;
-  const World office = MakeBuilding(options, 2);
-  EXPECT_NE(office.walls.size(), world.walls.size());
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <plumbline/apps/simulation/bag_writer.h>
+#include <plumbline/apps/simulation/building.h>
 #include <plumbline/apps/simulation/simulator.h>
 #include <plumbline/apps/simulation/world.h>
 #include <plumbline/core/error.h>

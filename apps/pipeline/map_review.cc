@@ -1,0 +1,165 @@
+#include <plumbline/core/wall.h>
+#include <plumbline/pipeline/map_review.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// Of crossings whose times and those of what speaks against them enclose
+// others' only these: the fault lies between.
+std::vector<BlockedWay> Innermost(const std::vector<BlockedWay>& ways) {
+  std::vector<BlockedWay> left;
+  const auto span = [](const BlockedWay& way) {
+    return std::minmax(way.crossing, way.seen);
+  };
+  for (const BlockedWay& way : ways) {
+    const auto [begin, end] = span(way);
+    const bool encloses =
+        std::any_of(ways.begin(), ways.end(), [&](const BlockedWay& other) {
+          const auto [first, last] = span(other);
+          return first >= begin && last <= end &&
+                 (first > begin || last < end || &other < &way);
+        });
+    if (!encloses) left.push_back(way);
+  }
+  return left;
+}
+
+void AddLoose(int begin, int end, std::string why,
+              std::vector<LooseTrack>* loose) {
+  LooseTrack track;
+  track.begin = begin;
+  track.end = end;
+  track.found = true;
+  track.why = std::move(why);
+  loose->push_back(std::move(track));
+}
+
+void AddContradictions(const std::vector<MapContradiction>& parts,
+                       std::vector<LooseTrack>* loose) {
+  for (const MapContradiction& part : parts) {
+    AddLoose(part.begin, part.end,
+             "what the robot saw here contradicts what it saw on other visits",
+             loose);
+  }
+}
+
+void AddBlockedWays(const std::vector<BlockedWay>& ways,
+                    std::vector<LooseTrack>* loose) {
+  for (const BlockedWay& way : Innermost(ways)) {
+    const auto [begin, end] = std::minmax(way.crossing, way.seen);
+    // A tie between them that is reported already may be why.
+    const bool is_explained =
+        std::any_of(loose->begin(), loose->end(),
+                    [begin = begin, end = end](const LooseTrack& track) {
+                      return (track.begin >= begin && track.begin < end) ||
+                             (track.end > begin && track.end <= end);
+                    });
+    if (is_explained) continue;
+    AddLoose(begin, end,
+             "between these two the robot went through what it has seen as a "
+             "wall: that was moved, or the map is wrong",
+             loose);
+  }
+}
+
+void AddOpenWays(const std::vector<OpenWay>& ways,
+                 std::vector<LooseTrack>* loose) {
+  for (const OpenWay& way : ways) {
+    char why[128];
+    std::snprintf(why, sizeof why,
+                  "nothing in sight shows how far the robot went: the %.0f m "
+                  "of this way are known to %.1f m",
+                  way.length, way.sigma);
+    AddLoose(way.begin, way.end, why, loose);
+  }
+}
+
+// Of level 0.
+std::vector<Wall> WallsOf(const Graph& graph) {
+  std::vector<Wall> walls;
+  for (const Feature* feature : graph.Features()) {
+    if (feature->level != 0) continue;
+    if (const std::optional<Wall> wall = WallOf(*feature)) {
+      walls.push_back(*wall);
+    }
+  }
+  return walls;
+}
+
+}  // namespace
+
+MapReview::MapReview(const std::vector<Scan>& scans,
+                     const std::vector<KeyScanRecord>& records,
+                     const std::vector<Pose2>& trajectory,
+                     const MapCheckOptions& check,
+                     const WayCheckOptions& way_check,
+                     std::function<bool()> stop)
+    : scans_(scans),
+      trajectory_(trajectory),
+      check_(check),
+      way_check_(way_check),
+      stop_(std::move(stop)) {
+  for (const KeyScanRecord& record : records) {
+    keys_.push_back(record.scan);
+    poses_.push_back(trajectory[static_cast<std::size_t>(record.scan)]);
+  }
+}
+
+bool MapReview::HasContradictions() const {
+  return !FindContradictions(scans_, keys_, poses_, check_, stop_).empty();
+}
+
+MapAgreement MapReview::Agreement() const {
+  return CountAgreement(scans_, keys_, poses_, check_, stop_);
+}
+
+std::vector<OpenWay> MapReview::OpenWays() const {
+  OpenWayOptions options;
+  options.points = check_.points;
+  options.matcher = check_.matcher;
+  options.num_threads = check_.num_threads;
+  return FindOpenWays(scans_, keys_, poses_, options, stop_);
+}
+
+void MapReview::Revise(const Graph& graph, bool tell_open_ways,
+                       std::vector<LooseTrack>* loose) const {
+  const std::vector<MapContradiction> contradictions =
+      FindContradictions(scans_, keys_, poses_, check_, stop_);
+  const std::vector<BlockedWay> blocked =
+      FindBlockedWays(scans_, keys_, poses_, WallsOf(graph), way_check_, stop_);
+  // Where something is wrong no tie is taken for sure.
+  if (contradictions.empty() && blocked.empty()) DropConfirmed(loose);
+  AddContradictions(contradictions, loose);
+  AddBlockedWays(blocked, loose);
+  if (tell_open_ways) AddOpenWays(OpenWays(), loose);
+  std::stable_sort(loose->begin(), loose->end(),
+                   [](const LooseTrack& a, const LooseTrack& b) {
+                     return a.begin < b.begin;
+                   });
+}
+
+void MapReview::DropConfirmed(std::vector<LooseTrack>* loose) const {
+  std::vector<TrackCut> cuts;
+  for (const LooseTrack& track : *loose) {
+    // A guess is one from its first scan on.
+    cuts.push_back({track.begin, track.found ? track.end : track.begin + 1});
+  }
+  const std::vector<bool> is_confirmed =
+      FindConfirmedTies(scans_, keys_, trajectory_, cuts, check_, stop_);
+  std::vector<LooseTrack> left;
+  for (std::size_t i = 0; i < cuts.size(); ++i) {
+    LooseTrack& track = (*loose)[i];
+    if (track.found && is_confirmed[i]) continue;
+    left.push_back(std::move(track));
+  }
+  *loose = std::move(left);
+}
+
+}  // namespace plumbline

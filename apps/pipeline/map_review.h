@@ -1,0 +1,62 @@
+#ifndef PLUMBLINE_PIPELINE_MAP_REVIEW_H_
+#define PLUMBLINE_PIPELINE_MAP_REVIEW_H_
+
+#include <plumbline/core/graph.h>
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/graph_builder.h>
+#include <plumbline/frontend/map_check.h>
+#include <plumbline/frontend/open_ways.h>
+#include <plumbline/frontend/part_joining.h>
+#include <plumbline/frontend/scan.h>
+#include <plumbline/frontend/way_check.h>
+
+#include <functional>
+#include <vector>
+
+namespace plumbline {
+
+/// What the scans of a log say of a map that was made of them: whether it
+/// contradicts itself, and where (core/method.md, section 7).
+class MapReview {
+ public:
+  /// `trajectory` has the pose of every scan, map frame; `records` name the key
+  /// scans, at which the map is looked at. Scans, options and trajectory are
+  /// not copied and must outlive the review. Once `stop` (may be null) has
+  /// returned true, what is asked for comes back empty.
+  MapReview(const std::vector<Scan>& scans,
+            const std::vector<KeyScanRecord>& records,
+            const std::vector<Pose2>& trajectory, const MapCheckOptions& check,
+            const WayCheckOptions& way_check, std::function<bool()> stop);
+
+  /// Whether what the robot saw contradicts itself (FindContradictions).
+  bool HasContradictions() const;
+  /// Whether the length of a way hangs on odometry (FindOpenWays).
+  bool HasOpenWays() const { return !OpenWays().empty(); }
+  /// How far the map agrees with itself.
+  MapAgreement Agreement() const;
+
+  /// Revises `loose`, the parts of the track that hang on the rest by a single
+  /// match or a guess: adds those that contradict what was seen on other
+  /// visits, ways through walls of `graph` and, with `tell_open_ways`, ways
+  /// whose length hangs on odometry; drops those that turn out to be right.
+  /// Ordered by their first scans.
+  void Revise(const Graph& graph, bool tell_open_ways,
+              std::vector<LooseTrack>* loose) const;
+
+ private:
+  std::vector<OpenWay> OpenWays() const;
+  void DropConfirmed(std::vector<LooseTrack>* loose) const;
+
+  const std::vector<Scan>& scans_;
+  const std::vector<Pose2>& trajectory_;
+  const MapCheckOptions& check_;
+  const WayCheckOptions& way_check_;
+  std::function<bool()> stop_;
+  // The scans of the records, and where they are.
+  std::vector<int> keys_;
+  std::vector<Pose2> poses_;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PIPELINE_MAP_REVIEW_H_

@@ -1,0 +1,168 @@
+#include <plumbline/frontend/wall_completion.h>
+#include <plumbline/pipeline/bent_map.h>
+#include <plumbline/pipeline/log_solver.h>
+#include <plumbline/pipeline/loop_closures.h>
+#include <plumbline/pipeline/second_map.h>
+
+#include <cstdint>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// A second map with less than this share of the first one's length of walls has
+// lost what the scans show, and is no better.
+constexpr double kLeastSecondShare = 1.0 / 3.0;
+
+}  // namespace
+
+SecondMap::SecondMap(const Registry& registry, const LogSolverOptions& options,
+                     LogRun* run, SolvedMap* map)
+    : registry_(registry), options_(options), run_(*run), map_(*map) {}
+
+SecondMap::~SecondMap() = default;
+
+void SecondMap::AdjustPoses() {
+  KeepFirst();
+  // What was taken for walls must not make odometry worse.
+  const std::vector<Pose2> by_odometry =
+      PosesByMotions(run_.result.records, run_.keys);
+  const bool is_bent = IsBent(run_.keys, by_odometry);
+  AdjustFrom(is_bent ? by_odometry : run_.keys);
+  TryFrom(is_bent ? run_.keys : by_odometry);
+  if (run_.IsStopped()) ReturnToFirst();
+}
+
+void SecondMap::KeepFirst() {
+  StateWriter first_map;
+  map_.WriteGraph(&first_map);
+  first_map_ = first_map.bytes();
+  first_trajectory_ = run_.result.trajectory;
+  if (first_length_ == 0.0) first_length_ = LengthOfWalls(map_.graph());
+  // RunFirst has kept them, perhaps those of several maps.
+  if (run_.result.closures.empty()) {
+    run_.result.closures = FindLoopClosures(map_.graph(), run_.result.records,
+                                            run_.result.trajectory);
+  }
+}
+
+void SecondMap::AdjustFrom(const std::vector<Pose2>& start) {
+  adjustment_.reset();
+  map_.Clear();
+  adjustment_ = std::make_unique<JointAdjustment>(
+      &map_.graph(), &map_.session(), registry_, run_.scans,
+      run_.result.refined, run_.result.records, start, kNoId,
+      options_.adjustment, run_.control.stop);
+  run_.places = adjustment_->places();
+  adjustment_->Adjust();
+  if (!run_.IsStopped()) {
+    adjustment_->MatchAnew();
+    adjustment_->Adjust();
+  }
+  if (run_.IsStopped()) return;
+  adjustment_->EstimateVariances();
+  run_.TakeTrajectory(map_.graph(), options_.adjustment.place_stride);
+}
+
+void SecondMap::TryFrom(const std::vector<Pose2>& start) {
+  const bool has_contradictions = HasContradictions();
+  if (!has_contradictions && !HasOpenWays()) return;
+  const MapAgreement agreement = Review().Agreement();
+  const double misfit = adjustment_->Misfit();
+  const std::int64_t relations = adjustment_->num_relations();
+  StateWriter kept;
+  map_.WriteGraph(&kept);
+  adjustment_->WriteState(&kept);
+  std::vector<Pose2> trajectory = run_.result.trajectory;
+  AdjustFrom(start);
+  // Where scans agree everywhere, as in a round corridor, what was measured
+  // between them decides.
+  const MapAgreement now = Review().Agreement();
+  const bool is_better =
+      has_contradictions ? now.IsBetterThan(agreement)
+                         : now.contradicting <= agreement.contradicting &&
+                               adjustment_->FitsBetterThan(misfit, relations);
+  if (run_.IsStopped() || is_better) return;
+  const std::string bytes = kept.bytes();
+  StateReader reader(bytes);
+  adjustment_.reset();
+  map_.RestoreGraph(&reader);
+  ReadAdjustment(&reader);
+  run_.places = adjustment_->places();
+  run_.result.trajectory = std::move(trajectory);
+}
+
+MapReview SecondMap::Review() const {
+  return MapReview(run_.scans, run_.result.records, run_.result.trajectory,
+                   options_.check, options_.way_check,
+                   [this] { return run_.IsStopped(); });
+}
+
+bool SecondMap::HasContradictions() const {
+  return options_.check_map && !run_.IsStopped() &&
+         Review().HasContradictions();
+}
+
+bool SecondMap::HasOpenWays() {
+  if (!options_.check_map || run_.IsStopped()) return false;
+  run_.may_have_open_ways = Review().HasOpenWays();
+  return run_.may_have_open_ways;
+}
+
+void SecondMap::MakeWalls() {
+  // Half of a second map is worth less than the whole of the first.
+  if (run_.IsStopped()) return ReturnToFirst();
+  adjustment_->AddWalls(FindGlimpsedWalls(
+      map_.graph(), registry_, run_.scans, run_.result.trajectory,
+      options_.completion, run_.control.stop));
+}
+
+void SecondMap::AdjustWalls() {
+  if (run_.IsStopped()) return ReturnToFirst();
+  LogSolverResult& result = run_.result;
+  adjustment_->Adjust();
+  if (!run_.IsStopped()) adjustment_->EstimateVariances();
+  if (run_.IsStopped()) return ReturnToFirst();
+  run_.TakeTrajectory(map_.graph(), options_.adjustment.place_stride);
+  result.scan_relations = adjustment_->num_relations();
+  result.wall_votes = adjustment_->num_votes();
+  vote_excess_ = adjustment_->vote_variance_excess();
+  result.second_map_refused =
+      LengthOfWalls(map_.graph()) < kLeastSecondShare * first_length_ &&
+      !IsBent(first_trajectory_, result.trajectory);
+  if (result.second_map_refused) return ReturnToFirst();
+  adjustment_.reset();
+  first_map_.clear();
+  first_trajectory_.clear();
+}
+
+void SecondMap::ReturnToFirst() {
+  LogSolverResult& result = run_.result;
+  adjustment_.reset();
+  StateReader reader(first_map_);
+  map_.RestoreGraph(&reader);
+  run_.places.clear();
+  result.trajectory = std::move(first_trajectory_);
+  first_trajectory_.clear();
+  first_map_.clear();
+  // They stand in the map.
+  result.closures.clear();
+  result.scan_relations = result.wall_votes = 0;
+}
+
+void SecondMap::TakeSession() {
+  if (adjustment_ != nullptr) adjustment_->SetSession(&map_.session());
+}
+
+void SecondMap::WriteAdjustment(StateWriter* state) {
+  if (adjustment_ != nullptr) adjustment_->WriteState(state);
+}
+
+void SecondMap::ReadAdjustment(StateReader* state) {
+  adjustment_ = std::make_unique<JointAdjustment>(
+      &map_.graph(), &map_.session(), registry_, run_.scans,
+      run_.result.refined, run_.result.records, state, options_.adjustment,
+      run_.control.stop);
+}
+
+}  // namespace plumbline

@@ -1,0 +1,91 @@
+#ifndef PLUMBLINE_PIPELINE_SECOND_MAP_H_
+#define PLUMBLINE_PIPELINE_SECOND_MAP_H_
+
+#include <plumbline/core/registry.h>
+#include <plumbline/core/state_archive.h>
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/joint_adjustment.h>
+#include <plumbline/pipeline/log_run.h>
+#include <plumbline/pipeline/map_review.h>
+#include <plumbline/pipeline/solved_map.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace plumbline {
+
+/// The second map of full refinement (core/method.md, section 7): poses that
+/// are adjusted by all scans alone, walls that the returns show from there, and
+/// both adjusted jointly, in three steps. It takes the first map's place in the
+/// SolvedMap; the first one is kept until the second stands, and comes back
+/// when it was time to stop or the second one is no better.
+class SecondMap {
+ public:
+  /// Nothing is copied, and all must outlive this. `run` has the trajectory of
+  /// the first map, which lies in `map`.
+  SecondMap(const Registry& registry, const LogSolverOptions& options,
+            LogRun* run, SolvedMap* map);
+  ~SecondMap();
+
+  /// Whether it is under way.
+  bool is_begun() const { return adjustment_ != nullptr; }
+
+  /// Length of the first map's walls, m, that this one's are measured by, where
+  /// the first map does not lie in the SolvedMap; 0: it does.
+  void SetFirstLength(double length) { first_length_ = length; }
+
+  /// Adjusts the poses alone, from the key poses of the run or from odometry,
+  /// whichever agrees better with what was seen. Sets the places and the
+  /// trajectory of the run. Throws Error when a solve fails; likewise below.
+  void AdjustPoses();
+  /// Adds walls to adjusted poses.
+  void MakeWalls();
+  /// Adjusts poses and walls; then this map stands, or is refused
+  /// (LogSolverResult::second_map_refused) and the first one is back.
+  void AdjustWalls();
+
+  /// JointAdjustment::vote_variance_excess of the map that stands.
+  double vote_excess() const { return vote_excess_; }
+
+  /// Goes on with the map's session, which was made anew.
+  void TakeSession();
+
+  /// What is kept of the first map, as a StateWriter or StateReader.
+  template <typename Archive>
+  void ExchangeFirst(Archive& archive) {
+    ExchangeAll(archive, first_map_, first_trajectory_, first_length_,
+                vote_excess_);
+  }
+  /// The adjustment that is under way; nothing where none is.
+  void WriteAdjustment(StateWriter* state);
+  void ReadAdjustment(StateReader* state);
+
+ private:
+  void KeepFirst();
+  void ReturnToFirst();
+  // The poses alone by all scans, from these of the key scans.
+  void AdjustFrom(const std::vector<Pose2>& start);
+  // A start that is far off ends in a wrong place: where scans contradict each
+  // other, or lengths hang on odometry, the better of two starts stands.
+  void TryFrom(const std::vector<Pose2>& start);
+  MapReview Review() const;
+  // Not when the map is not to be checked.
+  bool HasContradictions() const;
+  bool HasOpenWays();
+
+  const Registry& registry_;
+  const LogSolverOptions& options_;
+  LogRun& run_;
+  SolvedMap& map_;
+  std::unique_ptr<JointAdjustment> adjustment_;
+  // While it is under way.
+  std::string first_map_;
+  std::vector<Pose2> first_trajectory_;
+  double first_length_ = 0.0;
+  double vote_excess_ = 1.0;
+};
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PIPELINE_SECOND_MAP_H_

@@ -1,0 +1,108 @@
+#include <plumbline/plan/furniture_rows.h>
+#include <plumbline/plan/room_shape.h>
+#include <plumbline/plan/sides.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+// A gap between pieces of furniture, m, and how far apart two of them are at
+// most, m: of two doors of one room the wall between them is longer.
+constexpr double kLeastGap = 0.3;
+constexpr double kLongestBetween = 2.0;
+// What stands between two gaps is longer than a post in an opening, m.
+constexpr double kLeastBetween = 0.3;
+// A way out is as wide as this, m: beside a cupboard may be a crack.
+constexpr double kLeastWayOut = 0.7;
+// What is smaller is no room that a way could lead to, m^2.
+constexpr double kLeastRoom = 2.0;
+
+// What leads from one region to another.
+struct Ways {
+  double widest = 0.0;
+  // Two gaps lie near to each other on one line.
+  bool has_row = false;
+};
+
+// Ways between regions, by both numbers, either first.
+std::map<int, std::map<int, Ways>> WaysBetween(
+    const Arrangement& arrangement, const std::vector<DrawnLine>& drawn,
+    const std::vector<int>& region) {
+  std::map<int, std::map<int, Ways>> ways;
+  const std::vector<Sides> sides = SidesOf(arrangement, region, drawn);
+  for (std::size_t line = 0; line < drawn.size(); ++line) {
+    const WallProfile& profile = drawn[line].profile;
+    const auto pair_at = [&](int i) -> std::pair<int, int> {
+      return std::minmax(sides[line].left[static_cast<std::size_t>(i)],
+                         sides[line].right[static_cast<std::size_t>(i)]);
+    };
+    const auto is_open = [&](int i) {
+      return profile.At(i) == Mark::kOpen || profile.At(i) == Mark::kDoor;
+    };
+    int end_of_last = -1;
+    std::pair<int, int> last;
+    for (int i = 0; i < profile.size();) {
+      const std::pair<int, int> pair = pair_at(i);
+      if (pair != last) end_of_last = -1;
+      last = pair;
+      int j = i;
+      while (j < profile.size() && is_open(j) && pair_at(j) == pair) ++j;
+      const double width = (j - i) * WallProfile::kStep;
+      if (pair.first >= 0 && width >= kLeastGap) {
+        const double between = (i - end_of_last) * WallProfile::kStep;
+        const bool is_row = end_of_last >= 0 && between >= kLeastBetween &&
+                            between <= kLongestBetween;
+        for (const auto& [from, to] :
+             {pair, std::make_pair(pair.second, pair.first)}) {
+          Ways& way = ways[from][to];
+          way.widest = std::max(way.widest, width);
+          way.has_row = way.has_row || is_row;
+        }
+        end_of_last = j;
+      }
+      i = std::max(j, i + 1);
+    }
+  }
+  return ways;
+}
+
+}  // namespace
+
+void JoinAcrossFurniture(const Arrangement& arrangement,
+                         const std::vector<DrawnLine>& drawn,
+                         std::vector<int>* region) {
+  for (bool is_changed = true; is_changed;) {
+    is_changed = false;
+    std::map<int, std::vector<Polygon>> faces;
+    std::map<int, double> areas;
+    for (std::size_t i = 0; i < region->size(); ++i) {
+      const int id = (*region)[i];
+      if (id < 0) continue;
+      faces[id].push_back(arrangement.faces[i]);
+      areas[id] += arrangement.faces[i].Area();
+    }
+    for (const auto& [part, others] :
+         WaysBetween(arrangement, drawn, *region)) {
+      int into = -1;
+      int ways_out = 0;
+      for (const auto& [other, way] : others) {
+        if (areas[other] < kLeastRoom) continue;
+        if (way.has_row) into = other;
+        ways_out += way.has_row || way.widest >= kLeastWayOut;
+      }
+      if (into < 0 || ways_out != 1 || areas[part] > areas[into] ||
+          IsLongAndNarrow(UnionOf(faces[into]).front())) {
+        continue;
+      }
+      std::replace(region->begin(), region->end(), part, into);
+      is_changed = true;
+      break;
+    }
+  }
+}
+
+}  // namespace plumbline

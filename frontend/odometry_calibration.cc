@@ -1,0 +1,82 @@
+#include <plumbline/frontend/odometry_calibration.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+namespace plumbline {
+namespace {
+
+// Shorter motions are noise, m.
+constexpr double kLeastWay = 0.1;
+// The returns' variance along the way is no larger than this share of
+// odometry's.
+constexpr double kClearShare = 0.25;
+// Where the returns say nothing, 1/m^2 and 1/rad^2.
+constexpr double kRidge = 1e-6;
+// Standard deviation of the ratio of a motion by match to that by odometry. One
+// that is more than kFarthest of these off is a slip.
+constexpr double kRatioSigma = 0.1;
+constexpr double kFarthest = 3.0;
+// Standard deviation of the direction of a match over such a motion, rad. One
+// that is more than kFarthest of these off is a slip to the side.
+constexpr double kCourseSigma = DegToRad(3.0);
+// By how much the scale may change over a metre: a hundredth over 100 m.
+constexpr double kDriftVariance = 1e-6;
+// By how much the course may change over a metre, rad^2: two tenths of a degree
+// over 1 km.
+constexpr double kCourseDriftVariance = 1e-8;
+// Where the robot turns by more, rad, where the laser sits tells on the course.
+constexpr double kMostTurn = 0.05;
+// Shorter than this share of odometry's motion a match has no direction.
+constexpr double kLeastRatio = 0.5;
+
+}  // namespace
+
+Pose2 OdometryCalibration::Corrected(const Pose2& motion) const {
+  const double along = scale_ * std::cos(course_);
+  const double across = scale_ * std::sin(course_);
+  return Pose2(along * motion[0] - across * motion[1],
+               across * motion[0] + along * motion[1], motion[2]);
+}
+
+void OdometryCalibration::Compare(const Pose2& motion,
+                                  const Eigen::Matrix3d& covariance,
+                                  const Pose2& matched,
+                                  const Eigen::Matrix3d& information) {
+  const double way = motion.head<2>().norm();
+  variance_ += kDriftVariance * way;
+  course_variance_ += kCourseDriftVariance * way;
+  if (way < kLeastWay) return;
+  const Eigen::Vector3d along(motion[0] / way, motion[1] / way, 0.0);
+  const Eigen::Matrix3d returns =
+      (information + kRidge * Eigen::Matrix3d::Identity()).inverse();
+  const bool is_clear =
+      along.dot(returns * along) <= kClearShare * along.dot(covariance * along);
+  const double ratio = along.dot(matched) / way;
+  if (is_clear && is_anchored_ &&
+      std::abs(ratio - scale_) <= kFarthest * kRatioSigma) {
+    const double gain = variance_ / (variance_ + kRatioSigma * kRatioSigma);
+    scale_ += gain * (ratio - scale_);
+    variance_ *= 1.0 - gain;
+  }
+  is_anchored_ = is_clear;
+
+  const Eigen::Vector3d across(-along[1], along[0], 0.0);
+  if (across.dot(returns * across) >
+          kClearShare * across.dot(covariance * across) ||
+      ratio < kLeastRatio || std::abs(matched[2]) > kMostTurn) {
+    return;
+  }
+  // Where odometry turns more than the scans do, half of that is in the
+  // direction of its chord.
+  const double apart = NormalizeAngle(
+      std::atan2(matched[1], matched[0]) - std::atan2(motion[1], motion[0]) -
+      0.5 * NormalizeAngle(matched[2] - motion[2]));
+  if (std::abs(apart - course_) > kFarthest * kCourseSigma) return;
+  const double gain =
+      course_variance_ / (course_variance_ + kCourseSigma * kCourseSigma);
+  course_ += gain * (apart - course_);
+  course_variance_ *= 1.0 - gain;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,159 @@
+#include <gtest/gtest.h>
+#include <plumbline/core/builtins.h>
+#include <plumbline/core/graph_json.h>
+#include <plumbline/core/transaction.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/pipeline/second_map.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+// A room of 10 m by 6 m with a pillar, driven round twice. Every scan is a key
+// scan; the first map has one wall of 4 m, and the second round half off.
+class SecondMapTest : public ::testing::Test {
+ protected:
+  SecondMapTest()
+      : map_(Registered(&registry_), {}, {}),
+        run_(scans_, control_),
+        second_(registry_, options_, &run_, &map_) {
+    std::vector<testing::WallEnds> world = testing::Room(10.0, 6.0);
+    for (const testing::WallEnds& wall :
+         testing::Moved(testing::Room(0.8, 0.8), Pose2(1.0, 0.3, 0.0))) {
+      world.push_back(wall);
+    }
+    testing::Laser laser;
+    laser.sigma = 0.01;
+    testing::Noise noise(11);
+    for (int i = 0; i < 120; ++i) {
+      const double angle = 2.0 * kPi * i / 60.0;
+      truth_.emplace_back(3.2 * std::cos(angle), 1.9 * std::sin(angle),
+                          NormalizeAngle(angle + 0.5 * kPi));
+      scans_.push_back(testing::MakeScan(world, truth_.back(), laser, &noise));
+      RefinedScan refined;
+      KeyScanRecord record;
+      record.scan = i;
+      if (i > 0) {
+        record.motion.mean = Compose(Between(truth_[i - 1], truth_[i]),
+                                     Pose2(0.0005, 0.0, DegToRad(0.01)));
+        record.motion.covariance =
+            Eigen::Vector3d(1e-4, 1e-4, 1e-5).asDiagonal();
+        refined.since_key = record.motion;
+      }
+      refined.is_key = true;
+      run_.result.refined.push_back(refined);
+      run_.result.records.push_back(record);
+      run_.keys.push_back(
+          i < 60 ? truth_[i]
+                 : Compose(Pose2(0.1, -0.08, DegToRad(1.0)), truth_[i]));
+    }
+    run_.result.trajectory = run_.keys;
+    Transaction transaction;
+    Feature wall;
+    wall.type = &registry_.GetFeature("segment");
+    wall.parameters = {0.0, -3.0, 0.0};
+    wall.extent_begin = -2.0;
+    wall.extent_end = 2.0;
+    transaction.AddFeature(wall);
+    map_.graph().Apply(std::move(transaction));
+    first_ = Json();
+    control_.stop = [this] { return is_stopped_; };
+  }
+
+  static const Registry& Registered(Registry* registry) {
+    RegisterBuiltinRelations(registry);
+    return *registry;
+  }
+
+  std::string Json() const {
+    std::ostringstream text;
+    WriteGraphJson(map_.graph(), text);
+    return text.str();
+  }
+
+  double WorstPosition() const {
+    double worst = 0.0;
+    for (std::size_t i = 0; i < truth_.size(); ++i) {
+      worst = std::max(
+          worst, (run_.result.trajectory[i] - truth_[i]).head<2>().norm());
+    }
+    return worst;
+  }
+
+  void ExpectFirst() const {
+    EXPECT_FALSE(second_.is_begun());
+    EXPECT_EQ(Json(), first_);
+    EXPECT_EQ(run_.result.trajectory, run_.keys);
+    EXPECT_TRUE(run_.places.empty());
+    EXPECT_EQ(run_.result.scan_relations, 0);
+  }
+
+  bool is_stopped_ = false;
+  Registry registry_;
+  LogSolverOptions options_;
+  std::vector<Scan> scans_;
+  std::vector<Pose2> truth_;
+  RunControl control_;
+  SolvedMap map_;
+  LogRun run_;
+  SecondMap second_;
+  std::string first_;
+};
+
+TEST_F(SecondMapTest, TakesTheFirstOnesPlace) {
+  EXPECT_FALSE(second_.is_begun());
+  second_.AdjustPoses();
+  EXPECT_TRUE(second_.is_begun());
+  EXPECT_EQ(run_.places.size(), 40u);
+  EXPECT_EQ(map_.graph().num_features(), 40u);
+  EXPECT_GT(WorstPosition(), 0.0);
+  EXPECT_LT(WorstPosition(), 0.02);
+  second_.MakeWalls();
+  EXPECT_GE(map_.graph().num_features(), 44u);
+  second_.AdjustWalls();
+  EXPECT_FALSE(second_.is_begun());
+  EXPECT_FALSE(run_.result.second_map_refused);
+  EXPECT_GT(LengthOfWalls(map_.graph()), 20.0);
+  EXPECT_LT(WorstPosition(), 0.02);
+  EXPECT_GT(run_.result.scan_relations, 10);
+  EXPECT_GT(run_.result.wall_votes, 40);
+  EXPECT_GE(second_.vote_excess(), 1.0);
+}
+
+TEST_F(SecondMapTest, TheFirstOneComesBackWhenItIsStopped) {
+  second_.AdjustPoses();
+  second_.MakeWalls();
+  is_stopped_ = true;
+  second_.AdjustWalls();
+  ExpectFirst();
+  EXPECT_FALSE(run_.result.second_map_refused);
+  EXPECT_TRUE(run_.result.interrupted);
+}
+
+TEST_F(SecondMapTest, TheFirstOneComesBackBeforeThereAreWalls) {
+  second_.AdjustPoses();
+  is_stopped_ = true;
+  second_.MakeWalls();
+  ExpectFirst();
+}
+
+TEST_F(SecondMapTest, IsRefusedWhereItHasHardlyAnyOfTheWalls) {
+  second_.SetFirstLength(500.0);
+  second_.AdjustPoses();
+  second_.MakeWalls();
+  second_.AdjustWalls();
+  EXPECT_TRUE(run_.result.second_map_refused);
+  ExpectFirst();
+}
+
+}  // namespace
+}  // namespace plumbline

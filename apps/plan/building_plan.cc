@@ -306,13 +306,15 @@ struct Division {
 };
 
 Division Divide(const std::vector<WallLine>& lines, const SpaceGrid& space,
+                const std::vector<Pose2>& path,
                 const BuildingPlanOptions& options) {
   Division division;
   division.drawn = DrawLines(lines, options.reach);
   MeasureLines(space, options.doors, &division.drawn);
   division.arrangement = Arrange(division.drawn, space);
   division.region = FindRegions(division.arrangement, options.regions);
-  JoinAcrossFurniture(division.arrangement, division.drawn, &division.region);
+  JoinAcrossFurniture(division.arrangement, division.drawn, path,
+                      &division.region);
   return division;
 }
 
@@ -706,17 +708,17 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
         .push_back(lines[i]);
   }
   lines = std::move(long_lines);
-  Division division = Divide(lines, space, options);
+  Division division = Divide(lines, space, path, options);
   const Partitions partitions =
       FindPartitions(short_lines, division.drawn, space, options.reach);
   if (!partitions.sure.empty()) {
     Append(partitions.sure, &lines);
-    division = Divide(lines, space, options);
+    division = Divide(lines, space, path, options);
   }
   if (!partitions.likely.empty()) {
     std::vector<WallLine> with = lines;
     Append(partitions.likely, &with);
-    const Division trial = Divide(with, space, options);
+    const Division trial = Divide(with, space, path, options);
     const std::vector<int> kept = LinesBetweenRoomsWithDoors(
         trial.arrangement, trial.region, static_cast<int>(lines.size()),
         static_cast<int>(with.size()));
@@ -724,7 +726,7 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
       for (const int line : kept) {
         lines.push_back(with[static_cast<std::size_t>(line)]);
       }
-      division = Divide(lines, space, options);
+      division = Divide(lines, space, path, options);
     }
   }
   for (int i = 0; i < kUnseenRounds; ++i) {
@@ -733,7 +735,7 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
                         space, options.unseen);
     if (unseen.empty()) break;
     Append(unseen, &lines);
-    division = Divide(lines, space, options);
+    division = Divide(lines, space, path, options);
   }
   const auto& [drawn, arrangement, region] = division;
 

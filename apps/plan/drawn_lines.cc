@@ -41,6 +41,11 @@ constexpr double kUnseenBeside = 0.5;
 // this distance before or after the crossing, m.
 constexpr double kBesideCrossing = 0.3;
 constexpr double kWallThere = 0.6;
+// What stands before a wall hides it along so many samples at most, to either
+// side of the crossing.
+constexpr int kHiddenBeside = 20;
+// So many of them may look open: laser points go astray.
+constexpr int kStraySamples = 2;
 // It goes straight on when that holds on both sides, within this, m.
 constexpr double kStraightOn = 1.5;
 // What stands before a wall in a corridor is no deeper than this, m.
@@ -506,6 +511,23 @@ void Weigh(const DoorOptions& options, bool is_wall, const Crossings& crossings,
   }
 }
 
+// Whether a place that was not seen lies between two pieces of a wall, behind
+// what stands before it.
+bool IsHiddenWithin(const WallProfile& profile, double t) {
+  const auto wall_at = [&](int step) {
+    const int first = profile.IndexOf(t);
+    int open = 0;
+    for (int i = 0; i <= kHiddenBeside && open <= kStraySamples; ++i) {
+      const int at = first + i * step;
+      if (at < 0 || at >= profile.size()) return false;
+      if (profile.At(at) == Mark::kWall) return true;
+      open += profile.At(at) != Mark::kUnknown;
+    }
+    return false;
+  };
+  return wall_at(-1) && wall_at(1);
+}
+
 // Where a line meets a wall first on its way from `from` on, along it, within
 // `reach`; `sign` 1: forwards. Negative when it meets none.
 double WayToWall(const WallLine& line, double from, int sign,
@@ -524,7 +546,8 @@ double WayToWall(const WallLine& line, double from, int sign,
     if (std::max(WallShare(other.profile, t_other - kBesideCrossing,
                            kBesideCrossing),
                  WallShare(other.profile, t_other + kBesideCrossing,
-                           kBesideCrossing)) >= kWallThere) {
+                           kBesideCrossing)) >= kWallThere ||
+        IsHiddenWithin(other.profile, t_other)) {
       nearest = std::max(0.0, way);
     }
   }

@@ -10,13 +10,16 @@
 namespace plumbline {
 namespace {
 
+using Eigen::Vector2d;
+
 // A gap between pieces of furniture, m, and how far apart two of them are at
 // most, m: of two doors of one room the wall between them is longer.
 constexpr double kLeastGap = 0.3;
 constexpr double kLongestBetween = 2.0;
 // What stands between two gaps is longer than a post in an opening, m.
 constexpr double kLeastBetween = 0.3;
-// A way out is as wide as this, m: beside a cupboard may be a crack.
+// A way out is as wide as this, m, or the robot drove through it: beside a
+// cupboard may be a crack.
 constexpr double kLeastWayOut = 0.7;
 // What is smaller is no room that a way could lead to, m^2.
 constexpr double kLeastRoom = 2.0;
@@ -28,9 +31,35 @@ struct Ways {
   bool has_row = false;
 };
 
+// By line, which of its samples the robot drove across.
+std::vector<std::vector<bool>> DrivenAcross(const std::vector<DrawnLine>& drawn,
+                                            const std::vector<Pose2>& path) {
+  std::vector<std::vector<bool>> driven;
+  for (const DrawnLine& line : drawn) {
+    std::vector<bool> samples(static_cast<std::size_t>(line.profile.size()));
+    for (std::size_t i = 1; i < path.size(); ++i) {
+      const Vector2d from = path[i - 1].head<2>();
+      const Vector2d to = path[i].head<2>();
+      const double before = line.line.Across(from);
+      const double after = line.line.Across(to);
+      if ((before > 0.0) == (after > 0.0)) continue;
+      const double share = before / (before - after);
+      const double along = line.line.Along(from + share * (to - from));
+      if (along < line.from || along > line.to) continue;
+      const int at = line.profile.IndexOf(along);
+      if (at >= 0 && at < line.profile.size()) {
+        samples[static_cast<std::size_t>(at)] = true;
+      }
+    }
+    driven.push_back(std::move(samples));
+  }
+  return driven;
+}
+
 // Ways between regions, by both numbers, either first.
 std::map<int, std::map<int, Ways>> WaysBetween(
     const Arrangement& arrangement, const std::vector<DrawnLine>& drawn,
+    const std::vector<std::vector<bool>>& driven,
     const std::vector<int>& region) {
   std::map<int, std::map<int, Ways>> ways;
   const std::vector<Sides> sides = SidesOf(arrangement, region, drawn);
@@ -50,7 +79,10 @@ std::map<int, std::map<int, Ways>> WaysBetween(
       if (pair != last) end_of_last = -1;
       last = pair;
       int j = i;
-      while (j < profile.size() && is_open(j) && pair_at(j) == pair) ++j;
+      bool is_driven = false;
+      for (; j < profile.size() && is_open(j) && pair_at(j) == pair; ++j) {
+        is_driven = is_driven || driven[line][static_cast<std::size_t>(j)];
+      }
       const double width = (j - i) * WallProfile::kStep;
       if (pair.first >= 0 && width >= kLeastGap) {
         const double between = (i - end_of_last) * WallProfile::kStep;
@@ -59,7 +91,7 @@ std::map<int, std::map<int, Ways>> WaysBetween(
         for (const auto& [from, to] :
              {pair, std::make_pair(pair.second, pair.first)}) {
           Ways& way = ways[from][to];
-          way.widest = std::max(way.widest, width);
+          way.widest = std::max(way.widest, is_driven ? kLeastWayOut : width);
           way.has_row = way.has_row || is_row;
         }
         end_of_last = j;
@@ -74,7 +106,9 @@ std::map<int, std::map<int, Ways>> WaysBetween(
 
 void JoinAcrossFurniture(const Arrangement& arrangement,
                          const std::vector<DrawnLine>& drawn,
+                         const std::vector<Pose2>& path,
                          std::vector<int>* region) {
+  const std::vector<std::vector<bool>> driven = DrivenAcross(drawn, path);
   for (bool is_changed = true; is_changed;) {
     is_changed = false;
     std::map<int, std::vector<Polygon>> faces;
@@ -86,7 +120,7 @@ void JoinAcrossFurniture(const Arrangement& arrangement,
       areas[id] += arrangement.faces[i].Area();
     }
     for (const auto& [part, others] :
-         WaysBetween(arrangement, drawn, *region)) {
+         WaysBetween(arrangement, drawn, driven, *region)) {
       int into = -1;
       int ways_out = 0;
       for (const auto& [other, way] : others) {

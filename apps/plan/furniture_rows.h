@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_PLAN_FURNITURE_ROWS_H_
 #define PLUMBLINE_PLAN_FURNITURE_ROWS_H_
 
+#include <plumbline/factors/pose2.h>
 #include <plumbline/plan/arrangement.h>
 
 #include <vector>
@@ -11,9 +12,12 @@ namespace plumbline {
 /// leads out of them but into that room, which is no corridor, through two gaps
 /// and more, near to each other, in what stands between. A row of cupboards and
 /// screens across a room looks like a partition with doors, but a room behind a
-/// partition has one door to its neighbor, or one elsewhere.
+/// partition has one door to its neighbor, or one elsewhere. `path`: poses of
+/// the robot in the order of time, map frame; what it drove through is a way
+/// out even where it looks like a crack.
 void JoinAcrossFurniture(const Arrangement& arrangement,
                          const std::vector<DrawnLine>& drawn,
+                         const std::vector<Pose2>& path,
                          std::vector<int>* region);
 
 }  // namespace plumbline

@@ -3,6 +3,7 @@
 #include <plumbline/plan/regions.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -201,13 +202,20 @@ class Regions {
   // part of a room that was seen through its door. Walls that lie between the
   // two elsewhere, on other lines, do not matter: a corridor that is cut may
   // run beside its other part.
-  void JoinThrough(const RegionOptions& options) {
+  // `left`: two that are left as they are.
+  void JoinThrough(const RegionOptions& options,
+                   std::array<int, 2> left = {-1, -1}) {
+    const auto is_left = [&](int region) {
+      return region == left[0] || region == left[1];
+    };
     for (;;) {
       double best = 0.0;
       int best_a = -1;
       int best_b = -1;
       for (std::size_t a = 0; a < borders_.size(); ++a) {
+        if (is_left(static_cast<int>(a))) continue;
         for (const auto& [b, border] : borders_[a]) {
+          if (is_left(b)) continue;
           const double width =
               std::max(extents_[a].Width(),
                        extents_[static_cast<std::size_t>(b)].Width());
@@ -246,7 +254,7 @@ class Regions {
       const auto [closed, a, b] = *queue.begin();
       // Slivers with walls on both sides are pockets (FillPockets).
       if (closed >= (only_slivers ? 0.0 : options.holds_apart)) break;
-      if (closed >= options.doors_hold_apart && HaveOwnDoors(a, b)) {
+      if (closed >= options.doors_hold_apart && HaveOwnDoors(a, b, options)) {
         // It comes back with other borders when one of them grows.
         queue.erase(queue.begin());
         continue;
@@ -310,8 +318,40 @@ class Regions {
                options.min_area;
   }
 
-  // Each has a door to one and the same third, as offices along a corridor do.
-  bool HaveOwnDoors(int a, int b) {
+  // Each has a door to one and the same third, as offices along a corridor do,
+  // of which lines that cross it may have made several until now.
+  bool HaveOwnDoors(int a, int b, const RegionOptions& options) const {
+    Regions trial = *this;
+    trial.JoinSpacesInWalls({a, b});
+    trial.JoinThrough(options, {a, b});
+    return trial.HaveDoorsToOne(a, b);
+  }
+
+  // What lies in a doorway, between two lines of one wall, goes to the space
+  // that it is most open to. `left`: two that are left as they are.
+  void JoinSpacesInWalls(std::array<int, 2> left) {
+    for (std::size_t i = 0; i < borders_.size(); ++i) {
+      const int small = static_cast<int>(i);
+      if (borders_[i].empty() || small == left[0] || small == left[1] ||
+          !IsSliver(small)) {
+        continue;
+      }
+      double most = kLeastOpening;
+      int to = -1;
+      for (const auto& [b, border] : borders_[i]) {
+        if (b == left[0] || b == left[1]) continue;
+        const double open =
+            border.all.Of(Mark::kOpen) + border.all.Of(Mark::kDoor);
+        if (open >= most) {
+          most = open;
+          to = b;
+        }
+      }
+      if (to >= 0) Join(to, small);
+    }
+  }
+
+  bool HaveDoorsToOne(int a, int b) {
     const std::map<int, Border>& others = BordersOf(b);
     const auto& around = BordersOf(a);
     return std::any_of(around.begin(), around.end(), [&](const auto& entry) {

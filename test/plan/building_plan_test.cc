@@ -503,6 +503,38 @@ TEST(BuildingPlanTest, CupboardsAcrossARoomDoNotDivideIt) {
   EXPECT_EQ(rooms({4.2, 9.0}, false), 3u);
 }
 
+// The same, and an opening to the corridor that the leaf of its door hides all
+// but 0.6 m of: a crack, unless the robot drove through it.
+TEST(BuildingPlanTest, WhatTheRobotDroveThroughIsAWayOut) {
+  Drawing drawing(14.0, 12.0);
+  drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 13.0, 10.0);
+  drawing.Free(2.0, 2.9, 2.9, 3.3).Free(11.0, 2.9, 11.6, 3.3);
+  drawing.Fill(8.0, 3.2, 8.05, 10.0, Space::kOccupied);
+  for (const double gap : {4.2, 6.6, 9.0}) {
+    drawing.Free(8.0, gap, 8.05, gap + 0.7);
+  }
+  EXPECT_EQ(PlanOf(drawing).rooms.size(), 2u);
+  std::vector<Pose2> path;
+  for (double y = 2.0; y < 6.0; y += 0.1) path.emplace_back(11.3, y, 1.57);
+  EXPECT_EQ(PlanOf(drawing, path).rooms.size(), 3u);
+}
+
+// A partition of 1.9 m begins where something before the outer wall hides 1 m
+// of that; where 2 m of it are hidden nobody knows that it is met.
+TEST(BuildingPlanTest, APartitionMeetsAWallThatIsHiddenThere) {
+  const auto rooms = [](double hidden) {
+    Drawing drawing(14.0, 12.0);
+    drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 13.0, 8.0);
+    drawing.Free(2.0, 2.9, 2.9, 3.3).Free(10.0, 2.9, 10.9, 3.3);
+    drawing.Fill(7.0, 4.6, 7.05, 6.5, Space::kOccupied);
+    drawing.Fill(7.0 - 0.5 * hidden, 6.5, 7.0 + 0.5 * hidden, 8.05,
+                 Space::kUnknown);
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms(1.0), 3u);
+  EXPECT_EQ(rooms(2.6), 2u);
+}
+
 // A room with one wall that is an arc, whose chords are all shorter than a wall
 // must be.
 TEST(BuildingPlanTest, ChordsOfAnArcCloseARoom) {

@@ -158,6 +158,47 @@ TEST(RegionsTest, RoomsWithADoorEachStayApart) {
   EXPECT_TRUE(are_apart(0.4, 0.0));
 }
 
+// The same, but a line of walls crosses the corridor at an opening as wide as
+// it is, between the two doors, and the second door leads through two lines of
+// one wall, 0.2 m apart.
+TEST(RegionsTest, DoorsToTwoPartsOfOneCorridorLeadToOne) {
+  const auto are_apart = [](double opening) {
+    Arrangement arrangement;
+    AddFace({{0.0, 2.0}, {5.0, 2.0}, {5.0, 2.2}, {5.0, 7.0}, {0.0, 7.0}},
+            &arrangement);
+    AddFace({{5.0, 2.2}, {10.0, 2.2}, {10.0, 7.0}, {5.0, 7.0}}, &arrangement);
+    AddFace({{0.0, 0.0}, {5.0, 0.0}, {5.0, 2.0}, {0.0, 2.0}}, &arrangement);
+    AddFace({{5.0, 0.0}, {10.0, 0.0}, {10.0, 2.0}, {5.0, 2.0}}, &arrangement);
+    AddFace({{5.0, 2.0}, {10.0, 2.0}, {10.0, 2.2}, {5.0, 2.2}}, &arrangement);
+    AddEdge({0.0, 2.0}, {5.0, 2.0}, 0, 2, 0.9, 0.9, &arrangement);
+    AddEdge({5.0, 2.0}, {10.0, 2.0}, 4, 3, 0.9, 0.9, &arrangement);
+    AddEdge({5.0, 2.2}, {10.0, 2.2}, 1, 4, 0.9, 0.9, &arrangement);
+    AddEdge({5.0, 2.0}, {5.0, 2.2}, 0, 4, 1.0, 0.0, &arrangement);
+    AddEdge({5.0, 2.2}, {5.0, 7.0}, 0, 1, 0.2, 0.0, &arrangement);
+    // The corridor: as an opening holds that is as wide as a wide door.
+    AddEdge({5.0, 0.0}, {5.0, 2.0}, 2, 3, 0.5, opening, &arrangement);
+    arrangement.edges.back().lengths.metres = {};
+    arrangement.edges.back()
+        .lengths.metres[static_cast<std::size_t>(Mark::kDoor)] = opening;
+    arrangement.edges.back()
+        .lengths.metres[static_cast<std::size_t>(Mark::kWall)] = 2.0 - opening;
+    AddEdge({5.0, 7.0}, {0.0, 7.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 7.0}, {0.0, 2.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 2.2}, {10.0, 7.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 7.0}, {5.0, 7.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 2.0}, {10.0, 2.2}, 4, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 2.0}, {0.0, 0.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 0.0}, {5.0, 0.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({5.0, 0.0}, {10.0, 0.0}, 3, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 0.0}, {10.0, 2.0}, 3, -1, 1.0, 0.0, &arrangement);
+    const std::vector<int> region = FindRegions(arrangement);
+    return region[0] != region[1];
+  };
+  EXPECT_TRUE(are_apart(1.9));
+  // Two rooms behind a door each.
+  EXPECT_FALSE(are_apart(0.9));
+}
+
 // Half of the wall between two rooms is open; before the other half stands a
 // cupboard, whose front is a line of its own. The cupboard belongs to the room
 // on its open side, and then the wall is whole.

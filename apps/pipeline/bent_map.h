@@ -21,6 +21,15 @@ std::vector<Pose2> PosesByMotions(const std::vector<KeyScanRecord>& records,
 /// differ. A way shorter than 10 m bends nothing.
 bool IsBent(const std::vector<Pose2>& map, const std::vector<Pose2>& odometry);
 
+/// Whether poses that were adjusted together with walls turn otherwise than the
+/// same poses adjusted by scans alone, at the median by more than 0.45 degrees
+/// over ways of 30 m, or by more than 0.6 over 60 m: a corridor that bends by a
+/// little everywhere, which straight walls have drawn straight. Each of them
+/// fits such a bend to a centimetre, and matches of scans that are nearer to
+/// each other than the walls are long do not tell, so no residual shows it.
+bool AreBentByWalls(const std::vector<Pose2>& with_walls,
+                    const std::vector<Pose2>& by_scans);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_PIPELINE_BENT_MAP_H_

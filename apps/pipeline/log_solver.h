@@ -141,6 +141,9 @@ struct LogSolverResult {
   std::int64_t features_created = 0;
   /// The second map had hardly any of the walls of the first, which stands.
   bool second_map_refused = false;
+  /// The building bends by a little everywhere, which straight walls had drawn
+  /// straight (AreBentByWalls): they hold the poses loosely.
+  bool loose_walls = false;
   /// Ended early because `stop` said so: what there is, is whole.
   bool interrupted = false;
   /// What the front-end made of each scan and of the key scans: enough to

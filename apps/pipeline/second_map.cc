@@ -1,9 +1,11 @@
+#include <plumbline/factors/angle.h>
 #include <plumbline/frontend/wall_completion.h>
 #include <plumbline/pipeline/bent_map.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/loop_closures.h>
 #include <plumbline/pipeline/second_map.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 
@@ -13,6 +15,14 @@ namespace {
 // A second map with less than this share of the first one's length of walls has
 // lost what the scans show, and is no better.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
+
+// Of walls that must not straighten a building: what their votes weigh, and the
+// least turn at which one is two, rad. Structure would straighten it, too, were
+// matches of scans given more room than they need: the least factor of their
+// variances.
+constexpr double kLooseVotes = 0.03;
+constexpr double kSmallKink = DegToRad(0.2);
+constexpr double kSmallVarianceFactor = 0.02;
 
 }  // namespace
 
@@ -28,7 +38,7 @@ void SecondMap::AdjustPoses() {
   const std::vector<Pose2> by_odometry =
       PosesByMotions(run_.result.records, run_.keys);
   const bool is_bent = IsBent(run_.keys, by_odometry);
-  AdjustFrom(is_bent ? by_odometry : run_.keys);
+  AdjustFrom(is_bent ? by_odometry : run_.keys, options_.adjustment);
   TryFrom(is_bent ? run_.keys : by_odometry);
   if (run_.IsStopped()) ReturnToFirst();
 }
@@ -46,13 +56,14 @@ void SecondMap::KeepFirst() {
   }
 }
 
-void SecondMap::AdjustFrom(const std::vector<Pose2>& start) {
+void SecondMap::AdjustFrom(const std::vector<Pose2>& start,
+                           const JointAdjustmentOptions& options) {
   adjustment_.reset();
   map_.Clear();
   adjustment_ = std::make_unique<JointAdjustment>(
       &map_.graph(), &map_.session(), registry_, run_.scans,
-      run_.result.refined, run_.result.records, start, kNoId,
-      options_.adjustment, run_.control.stop);
+      run_.result.refined, run_.result.records, start, kNoId, options,
+      run_.control.stop);
   run_.places = adjustment_->places();
   adjustment_->Adjust();
   if (!run_.IsStopped()) {
@@ -74,7 +85,7 @@ void SecondMap::TryFrom(const std::vector<Pose2>& start) {
   map_.WriteGraph(&kept);
   adjustment_->WriteState(&kept);
   std::vector<Pose2> trajectory = run_.result.trajectory;
-  AdjustFrom(start);
+  AdjustFrom(start, options_.adjustment);
   // Where scans agree everywhere, as in a round corridor, what was measured
   // between them decides.
   const MapAgreement now = Review().Agreement();
@@ -112,16 +123,37 @@ bool SecondMap::HasOpenWays() {
 void SecondMap::MakeWalls() {
   // Half of a second map is worth less than the whole of the first.
   if (run_.IsStopped()) return ReturnToFirst();
-  adjustment_->AddWalls(FindGlimpsedWalls(
-      map_.graph(), registry_, run_.scans, run_.result.trajectory,
-      options_.completion, run_.control.stop));
+  AddWalls(options_.completion);
+}
+
+void SecondMap::AddWalls(const WallCompletionOptions& completion) {
+  adjustment_->AddWalls(FindGlimpsedWalls(map_.graph(), registry_, run_.scans,
+                                          run_.result.trajectory, completion,
+                                          run_.control.stop));
+}
+
+void SecondMap::AdjustBoth() {
+  adjustment_->Adjust();
+  if (!run_.IsStopped()) adjustment_->EstimateVariances();
 }
 
 void SecondMap::AdjustWalls() {
   if (run_.IsStopped()) return ReturnToFirst();
   LogSolverResult& result = run_.result;
-  adjustment_->Adjust();
-  if (!run_.IsStopped()) adjustment_->EstimateVariances();
+  const std::vector<Pose2> by_scans = adjustment_->KeyPoses();
+  AdjustBoth();
+  if (!run_.IsStopped() && AreBentByWalls(adjustment_->KeyPoses(), by_scans)) {
+    JointAdjustmentOptions adjustment = options_.adjustment;
+    adjustment.votes.independence *= kLooseVotes;
+    adjustment.min_variance_factor =
+        std::min(adjustment.min_variance_factor, kSmallVarianceFactor);
+    WallCompletionOptions completion = options_.completion;
+    completion.min_kink = std::min(completion.min_kink, kSmallKink);
+    AdjustFrom(by_scans, adjustment);
+    if (!run_.IsStopped()) AddWalls(completion);
+    if (!run_.IsStopped()) AdjustBoth();
+    result.loose_walls = true;
+  }
   if (run_.IsStopped()) return ReturnToFirst();
   run_.TakeTrajectory(map_.graph(), options_.adjustment.place_stride);
   result.scan_relations = adjustment_->num_relations();
@@ -148,6 +180,7 @@ void SecondMap::ReturnToFirst() {
   // They stand in the map.
   result.closures.clear();
   result.scan_relations = result.wall_votes = 0;
+  result.loose_walls = false;
 }
 
 void SecondMap::TakeSession() {

@@ -42,7 +42,10 @@ class SecondMap {
   /// Adds walls to adjusted poses.
   void MakeWalls();
   /// Adjusts poses and walls; then this map stands, or is refused
-  /// (LogSolverResult::second_map_refused) and the first one is back.
+  /// (LogSolverResult::second_map_refused) and the first one is back. Where
+  /// walls bend what the scans say (AreBentByWalls), all of it is done again
+  /// with shorter walls that hold the poses loosely
+  /// (LogSolverResult::loose_walls).
   void AdjustWalls();
 
   /// JointAdjustment::vote_variance_excess of the map that stands.
@@ -65,7 +68,11 @@ class SecondMap {
   void KeepFirst();
   void ReturnToFirst();
   // The poses alone by all scans, from these of the key scans.
-  void AdjustFrom(const std::vector<Pose2>& start);
+  void AdjustFrom(const std::vector<Pose2>& start,
+                  const JointAdjustmentOptions& options);
+  void AddWalls(const WallCompletionOptions& completion);
+  // Poses and walls.
+  void AdjustBoth();
   // A start that is far off ends in a wrong place: where scans contradict each
   // other, or lengths hang on odometry, the better of two starts stands.
   void TryFrom(const std::vector<Pose2>& start);

@@ -69,6 +69,13 @@ void TellOfTrack(const std::string& name, const std::vector<Scan>& scans,
         "front-end stands");
     Remark("%s: %s", name.c_str(), summary->notes.back().c_str());
   }
+  if (result.loose_walls) {
+    summary->notes.push_back(
+        "long straight walls turned the map by more than half a degree over 30 "
+        "m against what the scans say: the building may bend by a little "
+        "everywhere, and walls hold the poses loosely");
+    Remark("%s: %s", name.c_str(), summary->notes.back().c_str());
+  }
 }
 
 std::vector<TimedPose> TimedTrajectory(const std::vector<Scan>& scans,

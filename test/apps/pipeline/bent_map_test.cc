@@ -82,5 +82,35 @@ TEST(IsBentTest, NothingWithoutAWayOfTenMetres) {
   EXPECT_FALSE(IsBent(standing, jumped));
 }
 
+// Poses 0.5 m apart: 60 steps to 30 m, 120 to 60 m.
+TEST(AreBentByWallsTest, WhereWaysTurnAtTheMedian) {
+  const auto arc = [](int count, double degrees_a_metre) {
+    return Arc(Pose2(1.0, 2.0, 3.0), count, DegToRad(0.5 * degrees_a_metre));
+  };
+  // 0.48 degrees over 30 m.
+  EXPECT_TRUE(AreBentByWalls(arc(80, 0.0), arc(80, 0.016)));
+  EXPECT_TRUE(AreBentByWalls(arc(80, 0.016), arc(80, 0.0)));
+  // 0.42 over 30 m, but 0.84 over 60 m.
+  EXPECT_FALSE(AreBentByWalls(arc(80, 0.0), arc(80, 0.014)));
+  EXPECT_TRUE(AreBentByWalls(arc(160, 0.0), arc(160, 0.014)));
+  // 0.27 and 0.54.
+  EXPECT_FALSE(AreBentByWalls(arc(160, 0.0), arc(160, 0.009)));
+  // Where they stand does not count, nor a bend that both have.
+  EXPECT_FALSE(AreBentByWalls(Arc(Pose2(-5.0, 7.0, -kPi), 160, DegToRad(2.0)),
+                              Arc(Pose2::Zero(), 160, DegToRad(2.0))));
+  // Too short to tell.
+  EXPECT_FALSE(AreBentByWalls(arc(50, 0.0), arc(50, 1.0)));
+  EXPECT_FALSE(AreBentByWalls({}, {}));
+}
+
+TEST(AreBentByWallsTest, NotByOneCorner) {
+  const std::vector<Pose2> straight = Arc(Pose2::Zero(), 400, 0.0);
+  std::vector<Pose2> corner = Arc(Pose2::Zero(), 200, 0.0);
+  const std::vector<Pose2> after =
+      Arc(Compose(corner.back(), Pose2(0.5, 0.0, 0.1)), 200, 0.0);
+  corner.insert(corner.end(), after.begin(), after.end());
+  EXPECT_FALSE(AreBentByWalls(corner, straight));
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -14,12 +14,12 @@ namespace plumbline {
 ///
 ///     wall x1 y1 x2 y2 [thickness]      centre line; thickness 0 if not given
 ///     door x y width                    gap in the walls that pass through x y
-///     doorway x1 y1 x2 y2 [thickness]   gap that is there already, by its
-///     jambs opening x1 y1 x2 y2 [thickness]   the same where a corridor ends,
-///     no door circle x y radius                 round column arc x y radius
-///     begin_deg end_deg  curved wall, counter-clockwise box x y length width
-///     angle_deg    furniture, clutter path x1 y1 [x2 y2 ...]            way
-///     points; lines add up
+///     doorway x1 y1 x2 y2 [thickness]   gap that is there already: its jambs
+///     opening x1 y1 x2 y2 [thickness]   the same where a corridor ends
+///     circle x y radius                 round column
+///     arc x y radius begin_deg end_deg  curved wall, counter-clockwise
+///     box x y length width angle_deg    furniture, clutter
+///     path x1 y1 [x2 y2 ...]            way points; lines add up
 ///
 /// Doors apply to all walls of the file wherever they stand. Throws Error with
 /// the line on anything else, and on a door that meets no wall.

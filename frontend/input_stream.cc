@@ -5,14 +5,17 @@
 #include <plumbline/core/utf8.h>
 #include <plumbline/frontend/bzip2_decoder.h>
 #include <plumbline/frontend/input_stream.h>
+#include <plumbline/frontend/read_ahead.h>
 #include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 namespace plumbline {
@@ -20,6 +23,8 @@ namespace {
 
 constexpr std::size_t kChunk = std::size_t{1} << 18;
 constexpr std::size_t kLeastChunk = std::size_t{1} << 12;
+// Pieces of a chunk that are unpacked ahead at most.
+constexpr std::size_t kMostAhead = 16;
 // Of as many bytes at once without any other it is plain that no text comes.
 constexpr std::size_t kManyZeros = std::size_t{1} << 14;
 
@@ -48,6 +53,7 @@ class StoredBytes {
   const char* data() const { return buffer_.data() + begin_; }
   std::size_t size() const { return end_ - begin_; }
   void Consume(std::size_t count) { begin_ += count; }
+  void SetStop(std::function<bool()> stop) { stop_ = std::move(stop); }
   std::int64_t bytes_read() const { return bytes_read_; }
   // How many bytes it is worth to unpack at a time.
   std::size_t chunk() const {
@@ -146,10 +152,16 @@ class InputStream::Unpacker {
   virtual bool is_plain() const { return true; }
 
   const std::string& damage() const { return damage_; }
-  std::int64_t bytes_read() const { return bytes_->bytes_read(); }
-  std::size_t chunk() const { return bytes_->chunk(); }
+  // Stored bytes that what was unpacked is made of.
+  virtual std::int64_t bytes_read() const { return bytes_->bytes_read(); }
+  virtual std::size_t chunk() const { return bytes_->chunk(); }
 
   static std::unique_ptr<Unpacker> Create(std::unique_ptr<StoredBytes> bytes);
+
+  // The same ahead of who reads, in a thread of its own. `stop`: that of the
+  // stored bytes.
+  static std::unique_ptr<Unpacker> Ahead(std::unique_ptr<Unpacker> unpacker,
+                                         std::function<bool()> stop);
 
  protected:
   std::unique_ptr<StoredBytes> bytes_;
@@ -159,6 +171,7 @@ class InputStream::Unpacker {
   class Gzip;
   class Bzip2;
   class Archive;
+  class InThread;
 };
 
 class InputStream::Unpacker::Gzip : public Unpacker {
@@ -348,6 +361,73 @@ class InputStream::Unpacker::Archive : public Unpacker {
   bool done_ = false;
 };
 
+// Takes what another one unpacks in a thread.
+class InputStream::Unpacker::InThread : public Unpacker {
+ public:
+  InThread(std::unique_ptr<Unpacker> unpacker, std::function<bool()> stop)
+      : Unpacker(std::make_unique<StoredBytes>(std::string(), std::string())),
+        unpacker_(std::move(unpacker)),
+        chunk_(unpacker_->chunk()),
+        stop_(std::move(stop)) {
+    // Who reads is asked by its own thread alone.
+    unpacker_->bytes_->SetStop([this] { return is_stopped_.load(); });
+    pieces_.emplace(kMostAhead, [this](Piece* piece) { return Make(piece); });
+    if (!pieces_->has_thread()) unpacker_->bytes_->SetStop(stop_);
+  }
+  ~InThread() override { is_stopped_ = true; }
+  bool is_plain() const override { return unpacker_->is_plain(); }
+  std::int64_t bytes_read() const override { return piece_.bytes_read; }
+  std::size_t chunk() const override { return chunk_; }
+
+  std::size_t Unpack(char* output, std::size_t capacity) override {
+    if (taken_ == piece_.bytes.size()) {
+      taken_ = 0;
+      if (!pieces_->Next(&piece_, stop_)) piece_.bytes.clear();
+      damage_ = piece_.damage;
+    }
+    const std::size_t count = std::min(capacity, piece_.bytes.size() - taken_);
+    std::copy_n(piece_.bytes.data() + taken_, count, output);
+    taken_ += count;
+    return count;
+  }
+
+ private:
+  struct Piece {
+    // Empty at the end.
+    std::vector<char> bytes;
+    std::int64_t bytes_read = 0;
+    std::string damage;
+  };
+
+  // In the thread.
+  bool Make(Piece* piece) {
+    if (is_ended_) return false;
+    piece->bytes.resize(chunk_);
+    const std::size_t count = unpacker_->Unpack(piece->bytes.data(), chunk_);
+    piece->bytes.resize(count);
+    piece->bytes_read = unpacker_->bytes_read();
+    piece->damage = unpacker_->damage();
+    // The end says what was wrong, too.
+    is_ended_ = count == 0;
+    return true;
+  }
+
+  std::unique_ptr<Unpacker> unpacker_;
+  const std::size_t chunk_;
+  std::function<bool()> stop_;
+  std::atomic<bool> is_stopped_{false};
+  bool is_ended_ = false;
+  Piece piece_;
+  std::size_t taken_ = 0;
+  // Ends before what its thread uses.
+  std::optional<ReadAhead<Piece>> pieces_;
+};
+
+std::unique_ptr<InputStream::Unpacker> InputStream::Unpacker::Ahead(
+    std::unique_ptr<Unpacker> unpacker, std::function<bool()> stop) {
+  return std::make_unique<InThread>(std::move(unpacker), std::move(stop));
+}
+
 std::unique_ptr<InputStream::Unpacker> InputStream::Unpacker::Create(
     std::unique_ptr<StoredBytes> bytes) {
   bytes->Require(4);
@@ -378,8 +458,7 @@ InputStream::InputStream(const std::string& path, std::function<bool()> stop)
   struct stat status = {};
   const bool is_known = fstat(descriptor, &status) == 0;
   auto bytes = std::make_unique<StoredBytes>(
-      name_, descriptor, owned, is_known && S_ISFIFO(status.st_mode),
-      std::move(stop));
+      name_, descriptor, owned, is_known && S_ISFIFO(status.st_mode), stop);
   if (is_known && S_ISDIR(status.st_mode))
     throw Error(name_, 0, "is a directory", "a file");
   if (owned) {
@@ -388,6 +467,9 @@ InputStream::InputStream(const std::string& path, std::function<bool()> stop)
   if (S_ISREG(status.st_mode)) size_ = status.st_size;
   unpacker_ = Unpacker::Create(std::move(bytes));
   is_plain_file_ = owned && S_ISREG(status.st_mode) && unpacker_->is_plain();
+  if (ThreadsHere() > 1) {
+    unpacker_ = Unpacker::Ahead(std::move(unpacker_), std::move(stop));
+  }
   SkipByteOrderMark();
 }
 

@@ -20,6 +20,10 @@ namespace plumbline {
 /// was unpacked before is read as usual and damage() then says what happened.
 /// Checksums stand at the end of a block, so the last bytes before corrupt
 /// data ends may be wrong themselves.
+///
+/// A file is read and unpacked up to 4 MiB ahead in a thread of its own where
+/// ThreadsHere() is more than 1 (ReadAhead), and as it is asked for otherwise.
+/// What is to be called back is called in the thread that reads.
 class InputStream {
  public:
   /// Longest line that is accepted, bytes.
@@ -65,8 +69,8 @@ class InputStream {
   /// larger than the file, and a device may have no end.
   std::string ReadRest(std::size_t limit = std::size_t{1} << 30);
 
-  /// `progress` is called whenever more was unpacked, with the bytes taken from
-  /// the file so far, as they are stored, and the file's size (0 when it is not
+  /// `progress` is called whenever more that was unpacked is taken, with the
+  /// stored bytes of the file up to there and the file's size (0 when it is not
   /// known: standard input from a pipe).
   void SetProgress(
       std::function<void(std::int64_t done, std::int64_t size)> progress);

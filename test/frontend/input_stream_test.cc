@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/input_stream.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -13,6 +14,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -310,6 +312,64 @@ TEST(InputStreamTest, TellsHowFarItIs) {
   EXPECT_TRUE(input.ReadRest() == text);
   EXPECT_EQ(last, static_cast<std::int64_t>(packed.size()));
   EXPECT_GT(calls, 3);
+  std::remove(path.c_str());
+}
+
+// All that is to be had of a file: its bytes and what is wrong with them.
+std::pair<std::string, std::string> ContentsOfFile(const std::string& path) {
+  InputStream input(path);
+  std::string bytes = input.ReadRest();
+  return {std::move(bytes), input.damage()};
+}
+
+// A thread that unpacks ahead changes nothing: whole, cut, wrong and empty
+// files are the same to the byte.
+TEST(InputStreamTest, TheSameWithAThreadThatReadsAhead) {
+  std::string text;
+  for (int i = 0; i < 16; ++i) text += LongText();
+  // More than is read ahead.
+  ASSERT_GT(text.size(), std::size_t{1} << 22);
+  const std::string path = ::testing::TempDir() + "input_stream_ahead";
+  for (const std::string& stored :
+       {text, Gzip(text), Bzip2(text), std::string(), std::string("a")}) {
+    for (const double part : {1.0, 0.7}) {
+      for (const bool is_wrong : {false, true}) {
+        std::string bytes =
+            stored.substr(0, static_cast<std::size_t>(
+                                 part * static_cast<double>(stored.size())));
+        if (is_wrong && bytes.size() > 100) bytes[2 * bytes.size() / 3] ^= 16;
+        std::ofstream(path, std::ios::binary) << bytes;
+        const auto alone = ContentsOfFile(path);
+        const ThreadsScope scope(2);
+        const auto ahead = ContentsOfFile(path);
+        EXPECT_TRUE(ahead.first == alone.first)
+            << ahead.first.size() << ", expected " << alone.first.size();
+        EXPECT_EQ(ahead.second, alone.second);
+      }
+    }
+  }
+  std::remove(path.c_str());
+}
+
+// Who has seen enough, or is told to stop, does not wait for the rest; an
+// endless file has none.
+TEST(InputStreamTest, AThreadThatReadsAheadEndsWithWhoReads) {
+  const ThreadsScope scope(2);
+  for (const std::size_t count :
+       {std::size_t{0}, std::size_t{1} << 16, std::size_t{1} << 24}) {
+    InputStream zeros("/dev/zero");
+    EXPECT_EQ(zeros.Peek(count).size(), count);
+  }
+  int asked = 0;
+  InputStream stopped("/dev/zero", [&asked] { return ++asked > 10; });
+  EXPECT_GT(stopped.Consume(std::uint64_t{1} << 40), 0u);
+  // Nobody ever writes.
+  const std::string path = ::testing::TempDir() + "input_stream_silent";
+  std::remove(path.c_str());
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  asked = 0;
+  InputStream silent(path, [&asked] { return ++asked > 2; });
+  EXPECT_THAT(Lines(&silent), IsEmpty());
   std::remove(path.c_str());
 }
 

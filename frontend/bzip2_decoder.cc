@@ -5,6 +5,7 @@
 #include <plumbline/frontend/bzip2_decoder.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <deque>
 #include <string>
@@ -19,6 +20,7 @@ constexpr std::uint64_t kEndMark = 0x177245385090;
 constexpr std::uint64_t kMarkBits = 48;
 constexpr std::uint64_t kMarkMask = (std::uint64_t{1} << kMarkBits) - 1;
 constexpr std::uint64_t kCrcBits = 32;
+constexpr int kInMark = 16;
 // "BZh" and the size of blocks, a digit.
 constexpr std::size_t kHeadBytes = 4;
 constexpr std::size_t kOutputStep = std::size_t{1} << 20;
@@ -102,11 +104,28 @@ class StoredBits {
   std::uint64_t first_bit() const { return 8 * first_; }
 
  private:
+  // Whether a mark of which a bit of the last byte is the end may have this
+  // byte so many bits (kInMark) before that byte's end: one in 16 passes.
+  static bool MayBeInMark(unsigned char byte) {
+    static const std::array<bool, 256> is_in_mark = [] {
+      std::array<bool, 256> made = {};
+      for (const std::uint64_t mark : {kBlockMark, kEndMark}) {
+        for (int shift = 0; shift < 8; ++shift) {
+          made[mark << shift >> kInMark & 255] = true;
+        }
+      }
+      return made;
+    }();
+    return is_in_mark[byte];
+  }
+
   // Looks for marks in what there is.
   void Scan() {
     const std::uint64_t end = first_ + bytes_.size();
     for (; scanned_ < end; ++scanned_) {
       window_ = window_ << 8 | Byte(scanned_);
+      if (!MayBeInMark(static_cast<unsigned char>(window_ >> kInMark)))
+        continue;
       for (std::uint64_t shift = 8; shift-- > 0;) {
         const std::uint64_t bits = window_ >> shift & kMarkMask;
         if (bits != kBlockMark && bits != kEndMark) continue;

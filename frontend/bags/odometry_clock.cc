@@ -1,6 +1,8 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/bags/odometry_clock.h>
+#include <plumbline/frontend/beam_directions.h>
 
 #include <algorithm>
 #include <array>
@@ -55,7 +57,7 @@ class PolarView {
 
   // What the scan says of a return there, in the frame of its laser.
   Answer Ask(double x, double y) const {
-    const double range = std::hypot(x, y);
+    const double range = std::sqrt(x * x + y * y);
     const double tolerance = kAgreement + kAgreementShare * range;
     const int cell = Cell(std::atan2(y, x));
     Answer answer = Answer::kUnseen;
@@ -158,31 +160,32 @@ class ClockSearch {
     motion.MoveBy(difference);
     ScanMaker maker(options_, &motion, scans_);
     SkipCounter skips;
+    BeamDirections directions;
     std::vector<double> shares;
     for (const Pair& pair : pairs_) {
       const BagScan& a = scans_[pair.first];
       const BagScan& b = scans_[pair.second];
       shares.push_back(ShareOf(maker.Make(a, mount_of_(a), &skips),
-                               maker.Make(b, mount_of_(b), &skips)));
+                               maker.Make(b, mount_of_(b), &skips),
+                               &directions));
     }
     return shares;
   }
 
-  static double ShareOf(const Scan& a, const Scan& b) {
+  static double ShareOf(const Scan& a, const Scan& b,
+                        BeamDirections* directions) {
     const Pose2 between = Between(Compose(a.odometry, a.laser_offset),
                                   Compose(b.odometry, b.laser_offset));
     const PolarView view(a);
-    const double cosine = std::cos(between[2]);
-    const double sine = std::sin(between[2]);
+    const PoseTransform transform(between);
+    const std::vector<Eigen::Vector2d>& beams = directions->Of(b);
     int agree = 0;
     int seen = 0;
     for (std::size_t i = 0; i < b.ranges.size(); ++i) {
       if (!(b.ranges[i] > 0.0f)) continue;
-      const double x = b.ranges[i] * std::cos(b.Bearing(i));
-      const double y = b.ranges[i] * std::sin(b.Bearing(i));
-      const PolarView::Answer answer =
-          view.Ask(between[0] + cosine * x - sine * y,
-                   between[1] + sine * x + cosine * y);
+      const Eigen::Vector2d point =
+          transform.Point(static_cast<double>(b.ranges[i]) * beams[i]);
+      const PolarView::Answer answer = view.Ask(point.x(), point.y());
       if (answer == PolarView::Answer::kUnseen) continue;
       ++seen;
       if (answer == PolarView::Answer::kAgrees) ++agree;
@@ -202,20 +205,26 @@ class ClockSearch {
     return votes >= kFewestVotes && votes > 2 * against;
   }
 
-  // The best of the differences about a middle.
+  // The best of the differences about a middle; the first one of those that are
+  // as good.
   void Search(std::int64_t middle, double radius, double step,
               std::int64_t* best, std::vector<double>* best_shares) const {
-    double most = SumOf(*best_shares);
     const int steps = static_cast<int>(std::lround(radius / step));
+    std::vector<std::int64_t> differences;
     for (int k = -steps; k <= steps; ++k) {
-      const std::int64_t difference =
-          middle + static_cast<std::int64_t>(std::llround(k * step * kSecond));
-      std::vector<double> shares = SharesAt(difference);
-      const double sum = SumOf(shares);
+      differences.push_back(
+          middle + static_cast<std::int64_t>(std::llround(k * step * kSecond)));
+    }
+    std::vector<std::vector<double>> shares(differences.size());
+    ParallelFor(differences.size(), ThreadsHere(),
+                [&](std::size_t k) { shares[k] = SharesAt(differences[k]); });
+    double most = SumOf(*best_shares);
+    for (std::size_t k = 0; k < differences.size(); ++k) {
+      const double sum = SumOf(shares[k]);
       if (sum <= most) continue;
       most = sum;
-      *best = difference;
-      *best_shares = std::move(shares);
+      *best = differences[k];
+      *best_shares = std::move(shares[k]);
     }
   }
 

@@ -6,8 +6,10 @@
 #include <plumbline/frontend/bags/rosbag1.h>
 
 #include <algorithm>
+#include <future>
 #include <map>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -414,16 +416,41 @@ class Rosbag1 : public ChunkedBag {
     SetChunk(std::move(unpacked));
   }
 
+  // A chunk that is unpacked ahead.
+  struct Job {
+    std::string compression;
+    // Of its stored bytes: where they begin in the input, how many they are by
+    // its record, and the bytes.
+    std::uint64_t begin = 0;
+    std::size_t stored_size = 0;
+    std::string stored;
+    std::size_t size = 0;
+    UnpackedChunk unpacked;
+  };
+
   // The chunk whose stored bytes the input is at, unpacked, where it and its
-  // record's sizes are as they should be; false else, and where nothing is
-  // gained. Chunks hold a block of bzip2 or so: the next ones are unpacked with
-  // it, one for each thread.
+  // record's sizes are as they should be; false else, and where there is one
+  // thread. Chunks hold a block of bzip2 or so: the next ones are unpacked with
+  // it, one for each thread, and those behind them while their messages are
+  // taken.
   bool TakeAhead(const std::string& compression, std::size_t stored_size,
                  std::size_t size, UnpackedChunk* unpacked) {
+    if (ThreadsHere() < 2) return false;
     const std::uint64_t place = input()->position();
     if (ahead_.count(place) == 0) {
       ahead_.clear();
-      if (ThreadsHere() > 1) LookAhead(compression, stored_size, size);
+      std::vector<Job> jobs;
+      if (next_.valid()) jobs = next_.get();
+      if (jobs.empty() || jobs.front().begin != place) {
+        Job first;
+        first.compression = compression;
+        first.begin = place;
+        first.stored_size = stored_size;
+        first.size = size;
+        jobs = Unpacked(JobsFrom(std::move(first)), ThreadsHere());
+      }
+      UnpackBehind(jobs);
+      for (Job& job : jobs) ahead_[job.begin] = std::move(job.unpacked);
     }
     const auto found = ahead_.find(place);
     if (found == ahead_.end()) return false;
@@ -432,22 +459,25 @@ class Rosbag1 : public ChunkedBag {
     return unpacked->is_whole && unpacked->consumed == stored_size;
   }
 
-  // Unpacks the chunk whose stored bytes the input is at, and those that
-  // follow.
-  void LookAhead(const std::string& compression, std::size_t stored_size,
-                 std::size_t size) {
-    struct Job {
-      std::string compression;
-      std::size_t begin;
-      std::size_t stored_size;
-      std::size_t size;
-      UnpackedChunk unpacked;
-    };
-    std::vector<Job> jobs;
-    jobs.push_back({compression, 0, stored_size, size, {}});
-    std::size_t end = stored_size;
+  // A chunk and those that follow, one for each thread, as far as they are near
+  // and whole. `job` may be empty: the first one then lies behind `begin` and
+  // `stored_size`.
+  std::vector<Job> JobsFrom(Job job) {
     const auto most = static_cast<std::size_t>(ThreadsHere());
-    while (jobs.size() < most && end <= kFarthestAhead) {
+    const std::uint64_t place = input()->position();
+    std::vector<Job> jobs;
+    while (true) {
+      const std::uint64_t begin = job.begin - place;
+      const std::uint64_t end = begin + job.stored_size;
+      if (end > kFarthestAhead) break;
+      if (!job.compression.empty()) {
+        const std::string_view view = input()->Peek(end);
+        // What breaks off is left to who says so.
+        if (view.size() < end) break;
+        job.stored = view.substr(begin);
+        jobs.push_back(std::move(job));
+        if (jobs.size() == most) break;
+      }
       const std::string_view view = input()->Peek(end + kUsualHeader);
       Record record;
       if (view.size() <= end ||
@@ -455,29 +485,42 @@ class Rosbag1 : public ChunkedBag {
           (record.op != kIndex && record.op != kChunk)) {
         break;
       }
-      const std::size_t begin = end + record.header_size;
-      end = begin + record.data_size;
+      job = Job();
+      job.begin = place + end + record.header_size;
+      job.stored_size = record.data_size;
       if (record.op == kIndex) continue;
-      std::uint64_t next_size = 0;
-      Number(record.fields, "size", 4, &next_size);
-      jobs.push_back({Text(record.fields, "compression"),
-                      begin,
-                      record.data_size,
-                      static_cast<std::size_t>(next_size),
-                      {}});
+      std::uint64_t size = 0;
+      Number(record.fields, "size", 4, &size);
+      job.size = static_cast<std::size_t>(size);
+      job.compression = Text(record.fields, "compression");
+      // There is nothing to unpack.
+      if (!IsKnownCompression(job.compression)) break;
     }
-    if (jobs.size() < 2 || end > kFarthestAhead) return;
-    const std::string_view view = input()->Peek(end);
-    ParallelFor(jobs.size(), ThreadsHere(), [&](std::size_t i) {
-      Job& job = jobs[i];
-      // What breaks off is left to who says so.
-      if (job.begin + job.stored_size > view.size()) return;
-      job.unpacked =
-          UnpackChunk(job.compression, view.substr(job.begin, job.stored_size),
-                      job.size, kLargestRecord);
+    return jobs;
+  }
+
+  static std::vector<Job> Unpacked(std::vector<Job> jobs, int num_threads) {
+    ParallelFor(jobs.size(), num_threads, [&jobs](std::size_t i) {
+      jobs[i].unpacked = UnpackChunk(jobs[i].compression, jobs[i].stored,
+                                     jobs[i].size, kLargestRecord);
+      jobs[i].stored = std::string();
     });
-    for (Job& job : jobs) {
-      ahead_[input()->position() + job.begin] = std::move(job.unpacked);
+    return jobs;
+  }
+
+  // Begins to unpack the chunks behind these.
+  void UnpackBehind(const std::vector<Job>& jobs) {
+    if (jobs.empty()) return;
+    Job last;
+    last.begin = jobs.back().begin;
+    last.stored_size = jobs.back().stored_size;
+    std::vector<Job> behind = JobsFrom(std::move(last));
+    if (behind.empty()) return;
+    try {
+      next_ = std::async(std::launch::async, Unpacked, std::move(behind),
+                         ThreadsHere());
+    } catch (const std::system_error&) {
+      // They are unpacked when it is their turn.
     }
   }
 
@@ -508,8 +551,10 @@ class Rosbag1 : public ChunkedBag {
   static constexpr std::size_t kUsualHeader = 512;
 
   std::map<std::uint64_t, std::size_t> connections_;
-  // Chunks that are unpacked, by the place of their stored bytes.
+  // Chunks that are unpacked, by the place of their stored bytes, and those
+  // that are being unpacked.
   std::map<std::uint64_t, UnpackedChunk> ahead_;
+  std::future<std::vector<Job>> next_;
   std::int64_t chunks_stated_ = 0;
   std::int64_t chunks_found_ = 0;
   bool has_index_ = false;

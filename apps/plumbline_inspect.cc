@@ -4,13 +4,16 @@
 #include <gflags/gflags.h>
 #include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/inspection/log_inspection.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/frontend/builtins.h>
 #include <plumbline/frontend/log_reader.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <string>
+#include <thread>
 #include <vector>
 
 DEFINE_bool(json, false, "Write JSON in place of text.");
@@ -28,6 +31,8 @@ int Run(const std::vector<std::string>& arguments) {
     std::fprintf(stderr, "plumbline_inspect: expected one log; see --help\n");
     return kExitUsage;
   }
+  const ThreadsScope threads(GrantedThreads(
+      std::max(1, static_cast<int>(std::thread::hardware_concurrency()))));
   Registry readers;
   RegisterBuiltinLogReaders(&readers);
   LaserOptions options;

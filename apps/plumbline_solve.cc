@@ -96,6 +96,8 @@ int Run() {
     throw Error("--ellipse_sigmas", 0, "ellipses of nothing",
                 "features named by --marginals");
   }
+  // Inputs are read ahead from when they are opened on.
+  const ThreadsScope threads(NumThreadsFromFlags());
   const LogReaderType* reader =
       FLAGS_log_reader.empty()
           ? nullptr
@@ -133,7 +135,6 @@ int Run() {
   }
   LiveMap live(clock);
   const RunContext run{registry, &clock, &live, &folder};
-  const ThreadsScope threads(NumThreadsFromFlags());
   if (inputs.size() > 1 || earlier != nullptr) {
     return SolveLogs(inputs, starts, earlier.get(), run);
   }

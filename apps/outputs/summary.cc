@@ -112,7 +112,9 @@ Json TimesToJson(const Summary& summary) {
     steps[name] = seconds;
   }
   return {{"total", summary.total_seconds},
-          {"parse", summary.parse_seconds},
+          {"parse", summary.reading.seconds},
+          {"parse_idle", summary.reading.idle_seconds},
+          {"parse_cpu", summary.reading.cpu_seconds},
           {"frontend", summary.frontend_seconds},
           {"detect", summary.detect_seconds},
           {"solve", summary.solve_seconds},

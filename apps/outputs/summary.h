@@ -96,7 +96,22 @@ struct Summary {
 
   /// Seconds.
   double total_seconds = 0.0;
-  double parse_seconds = 0.0;
+  /// Of reading: what the run waited for it, for how much of that its own
+  /// thread did nothing (it waited for the disk, for threads that unpack, for a
+  /// processor), and what all threads computed meanwhile.
+  struct Reading {
+    double seconds = 0.0;
+    double idle_seconds = 0.0;
+    double cpu_seconds = 0.0;
+
+    /// Adds that of another log, or of another part.
+    void Add(const Reading& other) {
+      seconds += other.seconds;
+      idle_seconds += other.idle_seconds;
+      cpu_seconds += other.cpu_seconds;
+    }
+  };
+  Reading reading;
   double frontend_seconds = 0.0;
   double detect_seconds = 0.0;
   double solve_seconds = 0.0;

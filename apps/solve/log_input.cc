@@ -1,6 +1,7 @@
 #include <plumbline/apps/cli/app.h>
 #include <plumbline/apps/cli/progress.h>
 #include <plumbline/apps/solve/log_input.h>
+#include <plumbline/apps/solve/reading_meter.h>
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/stopwatch.h>
@@ -172,6 +173,7 @@ ReadingProgress::ReadingProgress(InputStream* input, RunClock* clock)
 std::unique_ptr<OpenInput> Open(const std::string& name,
                                 const Registry& registry,
                                 const LogReaderType* reader) {
+  const ReadingMeter meter;
   auto input = std::make_unique<OpenInput>();
   input->log.name = name;
   if (name != "-") {
@@ -194,16 +196,22 @@ std::unique_ptr<OpenInput> Open(const std::string& name,
   input->log.reader = reader;
   input->log.stream = &*input->stream;
   input->log.name = input->stream->name();
+  input->log.opening = meter.Read();
   return input;
 }
 
 Log ReadLog(const LogInput& input, RunClock* clock, Summary* summary) {
   clock->Begin("reading");
-  const Stopwatch reading;
+  const ReadingMeter meter;
   Log log = ReadInput(input, clock);
-  summary->parse_seconds = reading.Seconds();
+  summary->reading = input.opening;
+  summary->reading.Add(meter.Read());
   TellOfLog(input.name, log, summary);
-  Detail("read %zu scans in %.1f s", log.scans.size(), summary->parse_seconds);
+  Detail(
+      "read %zu scans in %.2f s, %.2f s of them idle; all threads computed for "
+      "%.2f s",
+      log.scans.size(), summary->reading.seconds, summary->reading.idle_seconds,
+      summary->reading.cpu_seconds);
   return log;
 }
 

@@ -34,6 +34,8 @@ struct LogInput {
   std::string name;
   const LogReaderType* reader = nullptr;
   InputStream* stream = nullptr;
+  /// Opening it, which reads its beginning.
+  Summary::Reading opening;
 };
 
 /// An input, and its stream where it is not read by its path.

@@ -3,6 +3,7 @@
 #include <plumbline/apps/cli/progress.h>
 #include <plumbline/apps/solve/flag_remarks.h>
 #include <plumbline/apps/solve/log_input.h>
+#include <plumbline/apps/solve/reading_meter.h>
 #include <plumbline/apps/solve/run_outputs.h>
 #include <plumbline/apps/solve/run_summary.h>
 #include <plumbline/apps/solve/solve_graph.h>
@@ -99,11 +100,11 @@ int SolveGraph(InputStream* input, const RunContext& run) {
                      {"solving", 1.0},
                      {"writing", 0.3}});
   clock->Begin("reading");
-  const Stopwatch reading;
+  const ReadingMeter reading;
   Graph graph;
   const std::optional<G2oFile> g2o = ReadGraph(input, registry, clock, &graph);
   if (!g2o) return kExitInterrupted;
-  summary.parse_seconds = reading.Seconds();
+  summary.reading = reading.Read();
   for (const auto& tag : g2o->unknown_tags) {
     Remark("%s: %d lines with the unknown tag %s kept as they are",
            input->name().c_str(), tag.second, PrintableUtf8(tag.first).c_str());

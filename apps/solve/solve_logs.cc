@@ -126,7 +126,7 @@ std::vector<Log> ReadLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
     const std::string& name = input->log.name;
     Summary of_log;
     Log log = ReadLog(input->log, clock, &of_log);
-    summary->parse_seconds += of_log.parse_seconds;
+    summary->reading.Add(of_log.reading);
     if (log.scans.empty()) throw Error(name, 0, "no scans", "a log with scans");
     CompleteLog(name, options, clock, &log, &of_log);
     AddNotes(TitleOf(name), of_log, summary);

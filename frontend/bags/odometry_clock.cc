@@ -37,6 +37,9 @@ constexpr int kFewestVotes = 5;
 constexpr double kSearchRadius = 2.5;
 constexpr double kSearchStep = 0.1;
 constexpr double kFineStep = 0.02;
+// Returns of a scan that the steps about the difference are compared by, at
+// least; the finer ones, and what decides, take all.
+constexpr std::size_t kCoarseReturns = 100;
 // Scans farther from odometry than this, s, are out of its time.
 constexpr double kFarOdometry = 1.0;
 
@@ -100,14 +103,14 @@ class ClockSearch {
       return {OverlapsAsStamped() ? 0 : difference, false};
     }
     ChoosePairs(difference);
-    const std::vector<double> as_stamped = SharesAt(0);
-    std::vector<double> moved = SharesAt(difference);
-    if (Beats(as_stamped, moved)) return {0, true};
-    std::int64_t best = difference;
-    Search(difference, kSearchRadius, kSearchStep, &best, &moved);
-    if (Beats(moved, as_stamped)) {
-      Search(best, kSearchStep, kFineStep, &best, &moved);
-      return {best, true};
+    const std::vector<double> as_stamped = SharesAt(0, Returns::kAll);
+    if (Beats(as_stamped, SharesAt(difference, Returns::kAll))) {
+      return {0, true};
+    }
+    const std::int64_t near =
+        Best(difference, kSearchRadius, kSearchStep, Returns::kSome);
+    if (Beats(SharesAt(near, Returns::kAll), as_stamped)) {
+      return {Best(near, kSearchStep, kFineStep, Returns::kAll), true};
     }
     return {OverlapsAsStamped() ? 0 : difference, false};
   }
@@ -153,9 +156,11 @@ class ClockSearch {
     return static_cast<double>(scans_[b].stamp - scans_[a].stamp) / kSecond;
   }
 
+  enum class Returns { kAll, kSome };
+
   // Of each pair, the share of returns that lie on what the other scan saw;
   // negative where there are too few.
-  std::vector<double> SharesAt(std::int64_t difference) const {
+  std::vector<double> SharesAt(std::int64_t difference, Returns returns) const {
     BagMotion motion = motion_;
     motion.MoveBy(difference);
     ScanMaker maker(options_, &motion, scans_);
@@ -166,22 +171,26 @@ class ClockSearch {
       const BagScan& a = scans_[pair.first];
       const BagScan& b = scans_[pair.second];
       shares.push_back(ShareOf(maker.Make(a, mount_of_(a), &skips),
-                               maker.Make(b, mount_of_(b), &skips),
+                               maker.Make(b, mount_of_(b), &skips), returns,
                                &directions));
     }
     return shares;
   }
 
-  static double ShareOf(const Scan& a, const Scan& b,
+  static double ShareOf(const Scan& a, const Scan& b, Returns returns,
                         BeamDirections* directions) {
     const Pose2 between = Between(Compose(a.odometry, a.laser_offset),
                                   Compose(b.odometry, b.laser_offset));
     const PolarView view(a);
     const PoseTransform transform(between);
     const std::vector<Eigen::Vector2d>& beams = directions->Of(b);
+    const std::size_t step =
+        returns == Returns::kAll
+            ? 1
+            : std::max<std::size_t>(1, b.ranges.size() / kCoarseReturns);
     int agree = 0;
     int seen = 0;
-    for (std::size_t i = 0; i < b.ranges.size(); ++i) {
+    for (std::size_t i = 0; i < b.ranges.size(); i += step) {
       if (!(b.ranges[i] > 0.0f)) continue;
       const Eigen::Vector2d point =
           transform.Point(static_cast<double>(b.ranges[i]) * beams[i]);
@@ -190,7 +199,9 @@ class ClockSearch {
       ++seen;
       if (answer == PolarView::Answer::kAgrees) ++agree;
     }
-    return seen < kFewestReturns ? -1.0 : static_cast<double>(agree) / seen;
+    return static_cast<int>(step) * seen < kFewestReturns
+               ? -1.0
+               : static_cast<double>(agree) / seen;
   }
 
   static bool Beats(const std::vector<double>& one,
@@ -205,27 +216,23 @@ class ClockSearch {
     return votes >= kFewestVotes && votes > 2 * against;
   }
 
-  // The best of the differences about a middle; the first one of those that are
-  // as good.
-  void Search(std::int64_t middle, double radius, double step,
-              std::int64_t* best, std::vector<double>* best_shares) const {
+  // The best of the differences about a middle: that itself unless others are
+  // better, and the first one of those that are as good.
+  std::int64_t Best(std::int64_t middle, double radius, double step,
+                    Returns returns) const {
     const int steps = static_cast<int>(std::lround(radius / step));
-    std::vector<std::int64_t> differences;
+    std::vector<std::int64_t> differences = {middle};
     for (int k = -steps; k <= steps; ++k) {
+      if (k == 0) continue;
       differences.push_back(
           middle + static_cast<std::int64_t>(std::llround(k * step * kSecond)));
     }
-    std::vector<std::vector<double>> shares(differences.size());
-    ParallelFor(differences.size(), ThreadsHere(),
-                [&](std::size_t k) { shares[k] = SharesAt(differences[k]); });
-    double most = SumOf(*best_shares);
-    for (std::size_t k = 0; k < differences.size(); ++k) {
-      const double sum = SumOf(shares[k]);
-      if (sum <= most) continue;
-      most = sum;
-      *best = differences[k];
-      *best_shares = std::move(shares[k]);
-    }
+    std::vector<double> sums(differences.size());
+    ParallelFor(differences.size(), ThreadsHere(), [&](std::size_t k) {
+      sums[k] = SumOf(SharesAt(differences[k], returns));
+    });
+    return differences[static_cast<std::size_t>(
+        std::max_element(sums.begin(), sums.end()) - sums.begin())];
   }
 
   static double SumOf(const std::vector<double>& shares) {

@@ -189,7 +189,7 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   summary.em_termination = EmTermination::kConvergence;
   summary.total_seconds = 6.0;
   summary.step_seconds = {{"reading", 1.5}, {"writing", 4.5}};
-  summary.parse_seconds = std::nan("");
+  summary.reading.seconds = std::nan("");
   summary.peak_memory_bytes = 123;
   summary.skipped = {{"too short", 2, {7, 9}}};
   summary.tracking.loose = {{2.5, 7.25, "a gap"}};
@@ -222,7 +222,8 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   EXPECT_EQ(json["em"].dump(), R"({"iterations":3,"converged":true,)"
                                R"("termination":"convergence"})");
   EXPECT_EQ(json["time_s"].dump(),
-            R"({"total":6.0,"parse":null,"frontend":0.0,"detect":0.0,)"
+            R"({"total":6.0,"parse":null,"parse_idle":0.0,"parse_cpu":0.0,)"
+            R"("frontend":0.0,"detect":0.0,)"
             R"("solve":0.0,"write":0.0,)"
             R"("steps":{"reading":1.5,"writing":4.5}})");
   EXPECT_EQ(json["peak_memory_bytes"], 123);

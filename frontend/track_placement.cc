@@ -38,8 +38,6 @@ constexpr double kContradictionWeight = 2.0;
 // The share of the best place's support from which on another one may be the
 // place where the best contradicts the map.
 constexpr double kNearlyAsMuch = 0.9;
-// The share of the best place's support from which on a rival is told.
-constexpr double kToldRival = 0.4;
 // Doors of a mirror image that were seen in passing speak one way only: of all
 // places that changed so many are openings, and so many walls.
 constexpr int kLeastEachWay = 2;
@@ -162,8 +160,10 @@ class Search {
   // Looks for a window in the whole map.
   void Look(std::size_t w) {
     for (const ScoredPose& peak :
+         // Where nothing was seen from nearby no window agrees, and looking
+         // there would be too much in a large building.
          whole_.Peaks(windows_[w].sparse, center_, reach_, kPi, kLeastScore,
-                      kPeakShare, options_.max_peaks)) {
+                      kPeakShare, options_.max_peaks, options_.radius)) {
       Candidate candidate;
       candidate.pose = Compose(peak.pose, Inverse(windows_[w].middle));
       candidate.window = w;
@@ -232,7 +232,7 @@ class Search {
     for (Candidate& rival : judged_) {
       if (&rival == best || rival.support() <= placement.rival ||
           AreOne(*best, rival, windows_, kRivalDistance, kRivalTurn) ||
-          (rival.support() > kToldRival * best->support() &&
+          (rival.support() > options_.max_certain_rival * best->support() &&
            IsRather(best, &rival))) {
         continue;
       }
@@ -240,12 +240,26 @@ class Search {
     }
     placement.misfit = Misfit(*best);
     placement.why_not = WhyNot(best, &placement);
+    if (placement.why_not.empty()) {
+      const std::string uncertain = WhyUncertain(*best, placement);
+      (start_ ? placement.doubt : placement.why_not) = uncertain;
+      placement.is_candidate = !start_ && !uncertain.empty();
+    }
     placement.found = placement.why_not.empty();
     if (placement.found) {
-      placement.doubt = Doubt(*best, placement);
+      AddDoubts(*best, placement, &placement.doubt);
       TakeTie(*best, &placement);
     }
     return placement;
+  }
+
+  // Support of the place that most windows speak for.
+  double MostSupport() const {
+    double most = 0.0;
+    for (const Candidate& candidate : judged_) {
+      most = std::max(most, candidate.support());
+    }
+    return most;
   }
 
  private:
@@ -332,6 +346,7 @@ class Search {
              Parts(best->contradicting) + " would contradict";
     }
     if (placement->rival > options_.rival_share * best->support()) {
+      placement->is_candidate = true;
       return "it would fit in more than one place";
     }
     if (placement->misfit >
@@ -339,13 +354,7 @@ class Search {
       return "its parts fit, but not together: they lie " +
              ShortText(placement->misfit) + " m (RMS) from where it has them";
     }
-    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-    for (const WindowJudgement& judgement : best->judgements) {
-      information += judgement.information;
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(information);
-    if (solver.eigenvalues()[0] <
-        options_.min_information_share * solver.eigenvalues()[1]) {
+    if (InformationShare(*best) < options_.min_information_share) {
       return "it could be moved along the walls that it shares with the map";
     }
     const WallContradictions& contradictions = ContradictionsOf(best);
@@ -354,7 +363,25 @@ class Search {
     placement->walls_through_track =
         static_cast<int>(contradictions.of_map.size());
     placement->contradicting_length = contradictions.length();
+    const int moved = CountMovedDoors(contradictions);
+    placement->is_candidate =
+        contradictions.longest() <= options_.max_contradicting_stretch &&
+        moved >= options_.min_moved_doors &&
+        moved < options_.min_moved_doors_at_start;
     return WhyAnother(best->agreeing, contradictions);
+  }
+
+  // What the returns say of the direction that they say least of, as a share of
+  // what they say across it.
+  static double InformationShare(const Candidate& place) {
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    for (const WindowJudgement& judgement : place.judgements) {
+      information += judgement.information;
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(information);
+    return solver.eigenvalues()[1] > 0.0
+               ? solver.eigenvalues()[0] / solver.eigenvalues()[1]
+               : 0.0;
   }
 
   // Why the contradictions of a place say that it is another building, though
@@ -395,32 +422,66 @@ class Search {
     return "";
   }
 
-  // What else the place that was found might be; empty when there is no doubt.
-  std::string Doubt(const Candidate& best,
-                    const TrackPlacement& placement) const {
-    std::string doubt;
-    const auto add = [&doubt](const std::string& reason) {
-      doubt += (doubt.empty() ? "" : "; ") + reason;
+  // Why the place may well be another, or of another building, though nothing
+  // says that it is; empty when it is clear.
+  std::string WhyUncertain(const Candidate& best,
+                           const TrackPlacement& placement) const {
+    if (InformationShare(best) < options_.min_certain_information_share) {
+      return "what it shares with the map is little more than a straight "
+             "corridor, and corridors look alike";
+    }
+    if (best.doubtful + best.contradicting >= best.agreeing) {
+      return "as many parts of it lie where the map is known and do not fit";
+    }
+    if (placement.rival > options_.max_certain_rival * best.support()) {
+      return "much of it would fit in another place, too";
+    }
+    if (placement.rival > 0.0 &&
+        best.agreeing < kClear * options_.min_agreeing) {
+      return "only " + std::to_string(best.agreeing) + " of " +
+             std::to_string(windows_.size()) +
+             " parts of it agree with the map, and some would fit in another "
+             "place, too";
+    }
+    const int changed =
+        placement.walls_through_map + placement.walls_through_track;
+    if (changed * options_.min_agreeing_per_change > best.agreeing) {
+      return Changed(placement) + ", and only " + Parts(best.agreeing) +
+             " of it agree with the map";
+    }
+    if (changed > 0 &&
+        MirroredSupport() > options_.max_mirrored_share * best.support()) {
+      return Changed(placement) +
+             ", and its mirror image fits in the map nearly as well";
+    }
+    return "";
+  }
+
+  // Where it has wall and the map has not, and the other way round.
+  static std::string Changed(const TrackPlacement& placement) {
+    return "it has wall at " + std::to_string(placement.walls_through_map) +
+           " and openings at " + std::to_string(placement.walls_through_track) +
+           " places where the map has it the other way";
+  }
+
+  // What else is to be said of the place that was found.
+  void AddDoubts(const Candidate& best, const TrackPlacement& placement,
+                 std::string* doubt) const {
+    const auto add = [doubt](const std::string& reason) {
+      *doubt += (doubt->empty() ? "" : "; ") + reason;
     };
     if (!start_ && best.agreeing < kClear * options_.min_agreeing) {
       add("only " + std::to_string(best.agreeing) + " of " +
           std::to_string(windows_.size()) + " parts of it agree with the map");
     }
-    if (best.doubtful + best.contradicting >= best.agreeing) {
-      add("as many parts of it lie where the map is known and do not fit");
-    }
-    if (placement.rival > kToldRival * best.support()) {
-      add("much of it would fit in another place, too");
-    }
-    // A single one may be all that is seen of another building.
     if (placement.walls_through_map > 0 || placement.walls_through_track > 0) {
-      add("it has wall at " + std::to_string(placement.walls_through_map) +
-          " and openings at " + std::to_string(placement.walls_through_track) +
-          " places where the map has it the other way: doors that were opened "
-          "or shut, or another building");
+      add(Changed(placement) +
+          ": doors that were opened or shut, or another building");
     }
-    return doubt;
   }
+
+  // How much of the track's mirror image finds a place in the map.
+  double MirroredSupport() const;
 
   // Where the tie is best.
   void TakeTie(const Candidate& best, TrackPlacement* placement) const {
@@ -459,6 +520,31 @@ class Search {
   std::vector<Candidate> found_;
   std::vector<Candidate> judged_;
 };
+
+// A track through the mirror image of the building.
+std::vector<KeyView> Mirrored(std::vector<KeyView> track) {
+  for (KeyView& view : track) {
+    view.pose.tail<2>() *= -1.0;
+    view.laser.y() *= -1.0;
+    for (ScanPoint& point : view.points) {
+      point.position.y() *= -1.0;
+      point.normal.y() *= -1.0;
+    }
+  }
+  return track;
+}
+
+double Search::MirroredSupport() const {
+  const std::vector<KeyView> mirrored = Mirrored(track_);
+  Search search(map_, mirrored, std::nullopt, options_);
+  const std::size_t windows = search.num_windows();
+  const std::size_t searches = std::min(windows, kBatch);
+  for (std::size_t i = 0; i < searches; ++i) {
+    search.Look((2 * i + 1) * windows / (2 * searches));
+  }
+  search.JudgeFound(static_cast<std::size_t>(options_.max_candidates), nullptr);
+  return search.MostSupport();
+}
 
 }  // namespace
 

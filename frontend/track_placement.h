@@ -39,8 +39,13 @@ struct TrackPlacement {
   int to = 0;
   /// Why it was not found, for people.
   std::string why_not;
-  /// Why it may not be its place though it was found, for people: few parts
-  /// speak for it, or places speak against it. Empty when it is clear.
+  /// It was not found, but `pose` is where it may lie: what speaks for it does
+  /// not tell the building from others like it, or the place from another one.
+  /// Whoever knows that it is its place gives that as the start.
+  bool is_candidate = false;
+  /// What is to be said of the place though it was found, for people: few parts
+  /// speak for it, or doors were opened or shut; with a start also what would
+  /// have made it a mere candidate. Empty when it is clear.
   std::string doubt;
 };
 
@@ -50,6 +55,8 @@ struct TrackPlacement {
 /// place that a window speaks for is judged by all windows of the track: what
 /// the track saw has to be solid and free where the map is, all along the way
 /// that they share, and clearly more so than at every other place.
+/// What is not certain is not found: two buildings in one map do more harm than
+/// one in two maps, which whoever knows it can mend (`start`).
 ///
 /// `map` and `track` are the views of either in its own frame, in the order of
 /// the way. `start`: pose of the track's first view in the map's frame, if

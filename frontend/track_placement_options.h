@@ -72,6 +72,19 @@ struct TrackPlacementOptions {
   /// that is kept apart without need does less harm than two buildings in one
   /// map.
   int min_moved_doors = 1;
+  /// What makes a place no more than a candidate. The share of the returns'
+  /// information (min_information_share) below which the map and the track
+  /// share little but a straight corridor, which many buildings have. The share
+  /// of the best place's support from which on a rival is one where more than a
+  /// few windows agree; else any is. Agreeing windows for each place that has a
+  /// wall in one and an opening in the other. And the share of the agreeing
+  /// windows that the mirror image of the track may find in the map where there
+  /// is such a place: a building that looks like its own mirror image, or
+  /// nearly, is not told from that by anything but what differs.
+  double min_certain_information_share = 0.3;
+  double max_certain_rival = 0.3;
+  int min_agreeing_per_change = 6;
+  double max_mirrored_share = 0.5;
   /// With a start that somebody gave: windows that have to agree, doors that
   /// stand elsewhere, and how far from it the track may start, m and rad.
   int min_agreeing_at_start = 1;

@@ -93,8 +93,17 @@ void AppendUncertain(const Summary& summary, std::string* list) {
   const auto uncertain = static_cast<std::int64_t>(
       std::count_if(summary.logs.begin(), summary.logs.end(),
                     [](const auto& log) { return !log.uncertain.empty(); }));
-  if (uncertain == 0) return;
-  Append(Counted(uncertain, "log") + " may be of another building", list);
+  if (uncertain > 0) {
+    Append(Counted(uncertain, "log") + " may be of another building", list);
+  }
+  const auto candidates = static_cast<std::int64_t>(
+      std::count_if(summary.logs.begin(), summary.logs.end(),
+                    [](const auto& log) { return log.candidate.has_value(); }));
+  if (candidates > 0) {
+    Append(Counted(candidates, "log") +
+               " kept apart may be of the first one's building",
+           list);
+  }
 }
 
 std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {

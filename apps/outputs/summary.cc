@@ -181,7 +181,11 @@ Json LogToJson(const Summary::LogInput& log) {
           {"uncertain",
            log.uncertain.empty() ? Json(nullptr) : Json(log.uncertain)},
           {"why_apart",
-           log.why_apart.empty() ? Json(nullptr) : Json(log.why_apart)}};
+           log.why_apart.empty() ? Json(nullptr) : Json(log.why_apart)},
+          {"candidate", log.candidate
+                            ? Json({(*log.candidate)[0], (*log.candidate)[1],
+                                    RadToDeg((*log.candidate)[2])})
+                            : Json(nullptr)}};
 }
 
 Json TrackingToJson(const Summary::Tracking& tracking) {

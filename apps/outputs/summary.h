@@ -181,11 +181,14 @@ struct Summary {
     int contradicting = 0;
     /// Where it or the rest of the map has wall that the other looks through.
     int changed_places = 0;
-    /// Why it may not be its place though it was placed; empty when it is
+    /// What is to be said of its place though it was placed; empty when it is
     /// clear.
     std::string uncertain;
     /// Why it was kept apart; empty when it was not.
     std::string why_apart;
+    /// Where it may begin all the same, in the first map's frame, m and rad:
+    /// --start_pose puts it there.
+    std::optional<Pose2> candidate;
   };
   /// Empty where there is one.
   std::vector<LogInput> logs;
@@ -244,7 +247,8 @@ std::string CountsAsJson(const Summary& summary);
 /// there were several logs
 /// [{input, trajectory, scans, map, parts, agreeing, contradicting,
 /// changed_places, uncertain (why it may be another building; or null),
-/// why_apart (or null)}]. Numbers that are not finite become null.
+/// why_apart (or null), candidate ([x, y, degrees] that --start_pose takes; or
+/// null)}]. Numbers that are not finite become null.
 void WriteSummary(const Summary& summary, std::ostream& output);
 
 /// Writes it to a file, whole or not at all. Throws Error when it cannot be

@@ -219,6 +219,11 @@ class Merger {
     return placement;
   }
 
+  // Starts are given in the first log's frame, or the earlier map's.
+  bool TakesStarts(const Group& group) const {
+    return options_.earlier != nullptr || group.logs.front() == 0;
+  }
+
   std::optional<Pose2> StartOf(std::size_t i) const {
     return i < options_.starts.size() ? options_.starts[i] : std::nullopt;
   }
@@ -306,12 +311,9 @@ class Merger {
     FirstMap& log = maps_[i];
     const double noise_scale =
         std::max(group->noise_scale, log.result.noise_scale);
-    // The start is given in the first log's frame.
     const auto place = [&] {
       return PlaceTrack(group->views, log.views,
-                        options_.earlier != nullptr || group->logs.front() == 0
-                            ? StartOf(i)
-                            : std::nullopt,
+                        TakesStarts(*group) ? StartOf(i) : std::nullopt,
                         PlacementWith(noise_scale), control_.run.stop);
     };
     TrackPlacement placement = place();
@@ -328,6 +330,11 @@ class Merger {
     TrackPlacement& told = result_.logs[i].placement;
     if (placement.found || placement.agreeing >= told.agreeing) {
       told = placement;
+      std::optional<Pose2>& candidate = result_.logs[i].candidate;
+      candidate.reset();
+      if (placement.is_candidate && TakesStarts(*group)) {
+        candidate = Compose(placement.pose, log.views.front().pose);
+      }
     }
     if (!placement.found) return false;
     log.tie = TieOf(placement, log, *group);

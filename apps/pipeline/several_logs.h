@@ -44,6 +44,10 @@ struct LogInMap {
   /// How it was placed among the logs before it; not found for the first log
   /// of a map.
   TrackPlacement placement;
+  /// Where its first scan may lie though it was kept apart
+  /// (TrackPlacement::is_candidate): what SeveralLogsOptions::starts needs to
+  /// put it there. None but in the first log's map, or the earlier one.
+  std::optional<Pose2> candidate;
 };
 
 /// A map of one log or more.
@@ -83,7 +87,8 @@ struct SeveralLogsControl {
 
 /// Solves several logs, each with odometry of its own, together. Each log gets
 /// its first map; then the logs are placed in each other's buildings by what
-/// they saw (PlaceTrack), whatever the order in which they are given; those
+/// they saw (PlaceTrack), whatever the order in which they are given, and only
+/// where that is certain; those
 /// that were placed become one track, in which the robot was lost and found
 /// again between the logs, and go on as such: poses, walls and structure are
 /// adjusted together in one second map. A log that fits nowhere begins a map of

@@ -11,6 +11,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/core/utf8.h>
+#include <plumbline/factors/angle.h>
 #include <plumbline/pipeline/several_logs.h>
 
 #include <cstddef>
@@ -39,6 +40,15 @@ void AddNotes(const std::string& title, const Summary& log, Summary* summary) {
   summary->odometry_source = log.odometry_source;
 }
 
+// The flag that puts a log where it may lie.
+std::string StartThatPlaces(std::size_t log, const Pose2& start) {
+  char text[120];
+  std::snprintf(text, sizeof text,
+                "--start_pose=%zu:%.2f,%.2f,%.1f puts it there", log + 1,
+                start[0], start[1], RadToDeg(start[2]));
+  return text;
+}
+
 // What became of each log.
 std::vector<Summary::LogInput> DescribeLogs(
     const std::vector<std::unique_ptr<OpenInput>>& inputs,
@@ -57,7 +67,10 @@ std::vector<Summary::LogInput> DescribeLogs(
     log.contradicting = placement.contradicting;
     log.changed_places =
         placement.walls_through_map + placement.walls_through_track;
-    if (!placement.found && in_map.map > 0) log.why_apart = placement.why_not;
+    if (!placement.found && in_map.map > 0) {
+      log.why_apart = placement.why_not;
+      log.candidate = in_map.candidate;
+    }
     if (placement.found) {
       Remark(
           "%s: placed in the map: %d of %d parts of it agree with it, to "
@@ -79,6 +92,11 @@ std::vector<Summary::LogInput> DescribeLogs(
       Remark("%s: kept apart, in %s: %s", log.input.c_str(),
              (std::filesystem::path(FLAGS_output_dir) / log.map).c_str(),
              log.why_apart.c_str());
+      if (log.candidate) {
+        Remark("%s: may lie in the map of %s all the same: %s",
+               log.input.c_str(), inputs.front()->log.name.c_str(),
+               StartThatPlaces(i, *log.candidate).c_str());
+      }
     }
     logs.push_back(std::move(log));
   }
@@ -171,6 +189,10 @@ void TellElsewhere(const std::vector<std::unique_ptr<OpenInput>>& inputs,
     std::fprintf(stderr, "%s fits nowhere in %s: %s\n",
                  PrintableUtf8(inputs[i]->log.name).c_str(),
                  PrintableUtf8(FLAGS_map).c_str(), placement.why_not.c_str());
+    if (solved.logs[i].candidate) {
+      std::fprintf(stderr, "it may lie there all the same: %s\n",
+                   StartThatPlaces(i, *solved.logs[i].candidate).c_str());
+    }
   }
   std::fprintf(stderr, "nothing is written\n");
 }

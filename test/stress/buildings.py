@@ -8,10 +8,12 @@ writes, each as driven one way (NAME_a.world) and the other way or another time
 
   corridor_0 ... 8   30 or 40 m, straight, shut doors in niches of 0.12, 0.25 or
                      0.4 m, at places drawn at random
-  bend_0 ... 3       the same round a corner
+  bend_0 ... 3       the same round a corner, two by two with the same legs
   rows_0 ... 5       rooms along both sides of a corridor; those of one side are
                      the mirror images of those of the other but for one to three
                      doors, 0.7 or 1.5 m elsewhere
+  twin_0 ... 5       rows_0 ... 5, but without doors elsewhere: as the next floor
+                     of a house may be
 
 and pairs.txt: a line "KIND A B" for each pair, with "same" for what is one
 building, "other" for two buildings, and for B "~NAME" where the log of NAME is to
@@ -125,10 +127,12 @@ def main():
         worlds["corridor_%d" % i] = corridor(
             random_, (30.0, 40.0)[i % 2], (0.12, 0.25, 0.4)[i // 3])
     for i in range(4):
-        worlds["bend_%d" % i] = bend(random_, 18.0 + 2.0 * i,
-                                     (0.12, 0.4)[i % 2])
+        worlds["bend_%d" % i] = bend(random_, 18.0 + 5.0 * (i // 2),
+                                     (0.12, 0.25, 0.25, 0.4)[i])
     for i in range(6):
-        worlds["rows_%d" % i] = rows(random_, 1 + i % 3, (0.7, 1.5)[i // 3])
+        for name, moved in (("rows", 1 + i % 3), ("twin", 0)):
+            worlds["%s_%d" % (name, i)] = rows(
+                random.Random(100 * args.seed + i), moved, (0.7, 1.5)[i // 3])
     for name, (lines, there, back) in worlds.items():
         for letter, way in (("a", there), ("b", back)):
             file = os.path.join(args.folder, "%s_%s.world" % (name, letter))
@@ -141,8 +145,11 @@ def main():
         pairs += [("other", a + "_a", b + "_b")]
     for a, b in itertools.combinations(bends, 2):
         pairs += [("other", a + "_a", b + "_a")]
+    pairs += [("other", "rows_%d_a" % i, "twin_%d_b" % i) for i in range(6)]
+    # The mirror image of a twin is the twin.
     for name in worlds:
-        pairs += [("other", name + "_a", "~" + name + "_b")]
+        if not name.startswith("twin"):
+            pairs += [("other", name + "_a", "~" + name + "_b")]
     with open(os.path.join(args.folder, "pairs.txt"), "w") as file:
         file.write("".join("%s %s %s\n" % pair for pair in pairs))
 

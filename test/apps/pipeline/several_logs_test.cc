@@ -9,8 +9,11 @@
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/key_scan_archive.h>
+#include <plumbline/frontend/key_views.h>
+#include <plumbline/frontend/track_placement.h>
 #include <plumbline/pipeline/several_logs.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -205,6 +208,16 @@ struct Rows {
   std::set<std::size_t> moved;
 };
 
+Log DriveThrough(const std::string& world, std::uint64_t seed) {
+  std::istringstream text(world);
+  const SimulatorOptions options;
+  std::ostringstream log;
+  WriteCarmenLog(Simulate(ReadWorld(text, "world"), options, seed),
+                 options.laser, {}, log);
+  InputStream input("world", log.str());
+  return ReadCarmenLog(&input, {});
+}
+
 Log Drive(const Rows& rows, std::uint64_t seed) {
   const std::vector<double>& ends = rows.ends;
   std::ostringstream walls;
@@ -243,13 +256,34 @@ Log Drive(const Rows& rows, std::uint64_t seed) {
     wall(0.0, 6.1 * side, ends.back(), 6.1 * side);
   }
   path << ' ' << ends.back() - 1.0 << " 0\n";
-  std::istringstream world(walls.str() + path.str());
-  const SimulatorOptions options;
-  std::ostringstream log;
-  WriteCarmenLog(Simulate(ReadWorld(world, "rows"), options, seed),
-                 options.laser, {}, log);
-  InputStream input("rows", log.str());
-  return ReadCarmenLog(&input, {});
+  return DriveThrough(walls.str() + path.str(), seed);
+}
+
+// A straight corridor of 40 m, with shut doors in niches to its left and right,
+// driven there or back.
+Log NichedCorridor(double depth, const std::vector<double>& left,
+                   const std::vector<double>& right, bool is_back,
+                   std::uint64_t seed) {
+  std::ostringstream world;
+  const auto wall = [&world](double x1, double y1, double x2, double y2) {
+    world << "wall " << x1 << ' ' << y1 << ' ' << x2 << ' ' << y2 << " 0.12\n";
+  };
+  wall(0.0, -1.0, 0.0, 1.0);
+  wall(40.0, -1.0, 40.0, 1.0);
+  for (const double side : {1.0, -1.0}) {
+    double from = 0.0;
+    for (const double door : side > 0.0 ? left : right) {
+      const double back = side * (1.0 + depth);
+      wall(from, side, door - 0.45, side);
+      wall(door - 0.45, side, door - 0.45, back);
+      wall(door - 0.45, back, door + 0.45, back);
+      wall(door + 0.45, back, door + 0.45, side);
+      from = door + 0.45;
+    }
+    wall(from, side, 40.0, side);
+  }
+  world << (is_back ? "path 39 0 1 0\n" : "path 1 0 39 0\n");
+  return DriveThrough(world.str(), seed);
 }
 
 // The doors of the last rooms are those that moved.
@@ -315,8 +349,8 @@ TEST_F(SeveralLogsTest, AMirrorImageWithTwoOtherDoorsIsKeptApart) {
       1u);
 }
 
-// One door elsewhere makes another building, or is told.
-TEST_F(SeveralLogsTest, OneOtherDoorIsNotMergedWithoutAWord) {
+// One door elsewhere makes another building where the mirror image is one.
+TEST_F(SeveralLogsTest, AMirrorImageWithOneOtherDoorIsKeptApart) {
   const SeveralLogsResult same =
       SolveSeveralLogs(registry_, {RowsOfRooms(1, 1), RowsOfRooms(1, 2)}, {});
   ASSERT_EQ(same.maps.size(), 1u);
@@ -325,8 +359,8 @@ TEST_F(SeveralLogsTest, OneOtherDoorIsNotMergedWithoutAWord) {
   EXPECT_EQ(same.logs[1].placement.doubt, "");
   const SeveralLogsResult other = SolveSeveralLogs(
       registry_, {RowsOfRooms(1, 1), Mirrored(RowsOfRooms(1, 2))}, {});
-  const TrackPlacement& placement = other.logs[1].placement;
-  EXPECT_FALSE(placement.found && placement.doubt.empty());
+  EXPECT_EQ(other.maps.size(), 2u);
+  EXPECT_TRUE(other.logs[1].candidate.has_value());
 }
 
 // A door that both drives went through or along, which is not where it was.
@@ -346,6 +380,66 @@ TEST_F(SeveralLogsTest, ADoorThatMovedIsAnotherBuildingUnlessSomebodyKnows) {
   ASSERT_EQ(known.maps.size(), 1u);
   EXPECT_THAT(known.logs[1].placement.doubt,
               ::testing::HasSubstr("another building"));
+}
+
+// All parts of one corridor may agree with another one, and their ends: that is
+// what corridors have. Where it may lie is told, and who knows better is heard.
+TEST_F(SeveralLogsTest, CorridorsThatLookAlikeAreKeptApart) {
+  const Log one = NichedCorridor(
+      0.25, {5.35, 7.01, 9.6, 14.69, 18.05, 20.33, 24.3, 28.96, 33.5, 36.68},
+      {4.99, 9.99, 13.84, 17.1, 20.81, 22.44, 24.14, 28.8, 34.73}, false, 1);
+  const Log other = NichedCorridor(0.4,
+                                   {3.19, 7.5, 10.55, 12.37, 14.59, 18.46,
+                                    20.72, 23.44, 28.15, 31.69, 34.64, 38.27},
+                                   {4.44, 7.83, 10.18, 12.17, 17.72, 21.51,
+                                    23.95, 28.18, 33.36, 34.95, 36.53, 38.69},
+                                   true, 2);
+  SeveralLogsOptions options;
+  const SeveralLogsResult apart =
+      SolveSeveralLogs(registry_, {one, other}, options);
+  EXPECT_EQ(apart.maps.size(), 2u);
+  const TrackPlacement& placement = apart.logs[1].placement;
+  EXPECT_FALSE(placement.found);
+  ASSERT_TRUE(placement.is_candidate) << placement.why_not;
+  ASSERT_TRUE(apart.logs[1].candidate.has_value());
+  options.starts = {std::nullopt, apart.logs[1].candidate};
+  const SeveralLogsResult known =
+      SolveSeveralLogs(registry_, {one, other}, options);
+  ASSERT_EQ(known.maps.size(), 1u);
+  EXPECT_TRUE(known.logs[1].placement.found);
+  EXPECT_FALSE(known.logs[1].placement.doubt.empty());
+  EXPECT_FALSE(known.logs[1].candidate.has_value());
+}
+
+// What was seen far off makes the building large, but no place in it harder to
+// find: a search of all of it would be given up.
+TEST_F(SeveralLogsTest, ATrackIsFoundInALargeBuilding) {
+  const Log office = Office();
+  const std::size_t half = office.scans.size() / 2;
+  const SeveralLogsOptions options;
+  const auto views = [&](std::size_t begin, std::size_t end) {
+    std::vector<int> keys;
+    std::vector<Pose2> poses;
+    for (std::size_t i = begin; i < end; i += 3) {
+      keys.push_back(static_cast<int>(i));
+      poses.push_back(TruthOf(office.scans[i]));
+    }
+    return MakeKeyViews(office.scans, keys, poses,
+                        options.solver.odometry.points);
+  };
+  std::vector<KeyView> map = views(0, half);
+  const std::vector<KeyView> track = views(half, office.scans.size());
+  for (const bool is_large : {false, true}) {
+    if (is_large) {
+      KeyView far = map.front();
+      far.pose.head<2>() += Eigen::Vector2d(600.0, 500.0);
+      map.push_back(far);
+    }
+    const TrackPlacement placement =
+        PlaceTrack(map, track, std::nullopt, options.placement);
+    ASSERT_TRUE(placement.found) << placement.why_not;
+    EXPECT_LT(placement.pose.norm(), 0.1);
+  }
 }
 
 TEST_F(SeveralLogsTest, AWrongStartKeepsALogApart) {

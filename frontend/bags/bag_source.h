@@ -37,7 +37,7 @@ struct BagMessage {
 };
 
 /// The messages of a bag in the order of the file, one at a time: no more than
-/// a chunk for each thread is in memory. What is damaged is passed over and
+/// two chunks for each thread are in memory. What is damaged is passed over and
 /// counted.
 class BagSource {
  public:

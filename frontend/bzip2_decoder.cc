@@ -1,7 +1,6 @@
 #include <bzlib.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
-#include <plumbline/frontend/bzip2_block.h>
 #include <plumbline/frontend/bzip2_decoder.h>
 
 #include <algorithm>
@@ -24,8 +23,6 @@ constexpr int kInMark = 16;
 // "BZh" and the size of blocks, a digit.
 constexpr std::size_t kHeadBytes = 4;
 constexpr std::size_t kOutputStep = std::size_t{1} << 20;
-// Bytes that a block may have, for each digit of the size of blocks.
-constexpr std::size_t kSizeStep = 100000;
 
 // A mark in the stored bytes, at a bit counted from their beginning.
 struct Mark {
@@ -99,11 +96,9 @@ class StoredBits {
 
   std::uint64_t end() const { return 8 * (first_ + bytes_.size()); }
 
-  // What is held, and the bit that it begins with.
-  std::string_view bytes() const { return bytes_; }
+ private:
   std::uint64_t first_bit() const { return 8 * first_; }
 
- private:
   // Whether a mark of which a bit of the last byte is the end may have this
   // byte so many bits (kInMark) before that byte's end: one in 16 passes.
   static bool MayBeInMark(unsigned char byte) {
@@ -328,10 +323,7 @@ class Bzip2Decoder::Decoder {
       return;
     }
     std::vector<Block> blocks = FindBlocks();
-    if (fast_.size() < blocks.size()) fast_.resize(blocks.size());
     ParallelFor(blocks.size(), ThreadsHere(), [&](std::size_t i) {
-      blocks[i].unpacked = UnpackFast(blocks[i], &fast_[i]);
-      if (blocks[i].unpacked.outcome == Outcome::kRight) return;
       blocks[i].unpacked =
           UnpackWithLibbz2(StreamOf(blocks[i], level_, stored_));
     });
@@ -367,19 +359,6 @@ class Bzip2Decoder::Decoder {
     block.is_whole = stored_.FindMark(least_end, &next);
     block.end = block.is_whole ? next.bit : stored_.end();
     return block;
-  }
-
-  // What is as it should be; libbz2 says what there is of the rest.
-  UnpackedBlock UnpackFast(const Block& block, Bzip2Block* decoder) const {
-    UnpackedBlock unpacked;
-    const std::uint64_t first = stored_.first_bit();
-    if (block.is_whole &&
-        decoder->Decode(stored_.bytes(), block.begin - first, block.end - first,
-                        kSizeStep * static_cast<std::size_t>(level_ - '0'),
-                        &unpacked.bytes)) {
-      unpacked.outcome = Outcome::kRight;
-    }
-    return unpacked;
   }
 
   // Takes what a block was unpacked to; false where the stream cannot be
@@ -433,8 +412,6 @@ class Bzip2Decoder::Decoder {
   }
 
   StoredBits stored_;
-  // One for each block that is unpacked at a time.
-  std::vector<Bzip2Block> fast_;
   // Of what was unpacked and taken, and of what was decoded.
   State state_ = State::kGoingOn;
   State decoded_ = State::kGoingOn;

@@ -9,12 +9,10 @@
 
 namespace plumbline {
 
-/// Unpacks bzip2 streams, ThreadsHere() blocks at a time: a block of up to
-/// 900 kB depends on no other one. Blocks are found by the 48 bits that each
-/// begins with. Bzip2Block decodes them; one that it does not make the right
-/// bytes of, by the block's checksum, is given to libbz2 as a stream of its
-/// own, which says what there is of it. Format: J. Tsai, "BZIP2: Format
-/// Specification" (2016).
+/// Unpacks bzip2 streams with libbz2, ThreadsHere() blocks at a time: a block
+/// of up to 900 kB depends on no other one. Blocks are found by the 48 bits
+/// that each begins with, and given to libbz2 as streams of their own. Format:
+/// J. Tsai, "BZIP2: Format Specification" (2016).
 class Bzip2Decoder {
  public:
   /// How far the present stream is unpacked.

@@ -1,15 +1,18 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/wall.h>
 #include <plumbline/detectors/place_match.h>
+#include <plumbline/factors/solve_symmetric.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numeric>
-#include <set>
 #include <utility>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -79,6 +82,57 @@ class Mover {
   Eigen::Matrix2d rotation_;
 };
 
+// Cells of displacements, in an open table: there are some hundred for a pair
+// of places, and most are asked for more than once.
+class DisplacementCells {
+ public:
+  using Cell = std::array<long, 3>;
+
+  // False when it is there already.
+  bool Insert(const Cell& cell) {
+    if (2 * (size_ + 1) > slots_.size()) Grow();
+    Slot& slot = slots_[PlaceOf(cell)];
+    if (slot.is_taken) return false;
+    slot = {cell, true};
+    ++size_;
+    return true;
+  }
+
+ private:
+  struct Slot {
+    Cell cell;
+    bool is_taken = false;
+  };
+  static constexpr std::size_t kFewest = 256;
+
+  std::size_t PlaceOf(const Cell& cell) const {
+    constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15u;
+    std::uint64_t hash = 0;
+    for (const long part : cell) {
+      hash = (hash ^ static_cast<std::uint64_t>(part)) * kGolden;
+      hash ^= hash >> 32;
+    }
+    // As many as a power of two.
+    const std::size_t mask = slots_.size() - 1;
+    std::size_t place = static_cast<std::size_t>(hash) & mask;
+    while (slots_[place].is_taken && slots_[place].cell != cell) {
+      place = (place + 1) & mask;
+    }
+    return place;
+  }
+
+  void Grow() {
+    std::vector<Slot> old(std::max(kFewest, 2 * slots_.size()));
+    old.swap(slots_);
+    for (const Slot& slot : old) {
+      if (slot.is_taken) slots_[PlaceOf(slot.cell)] = slot;
+    }
+  }
+
+  std::vector<Slot> slots_;
+  std::size_t size_ = 0;
+};
+
 // How `second` lies beside `first`.
 struct Comparison {
   double overlap;  // m, negative for a gap
@@ -137,17 +191,18 @@ class Matcher {
       result.outcome = PlaceMatch::Outcome::kTurnUnknown;
       return result;
     }
+    MeasureCandidates();
     const std::vector<bool> is_paired = WallsToPair();
     Try(Vector3d::Zero());
+    std::vector<char> crosses;
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       Try(Solve(std::array<Candidate, 1>{candidates_[i]}));
       if (!is_paired[candidates_[i].second]) continue;
+      if (crosses.empty()) crosses = CrossingWalls();
+      const std::size_t row = candidates_[i].first * first_.size();
       for (std::size_t j = 0; j < i; ++j) {
         if (!is_paired[candidates_[j].second]) continue;
-        const double cross =
-            std::abs(std::sin(first_[candidates_[i].first].angle -
-                              first_[candidates_[j].first].angle));
-        if (cross < std::sin(kParallel)) continue;
+        if (crosses[row + candidates_[j].first] == 0) continue;
         if (candidates_[i].second == candidates_[j].second) continue;
         Try(Solve(std::array<Candidate, 2>{candidates_[i], candidates_[j]}));
       }
@@ -206,12 +261,14 @@ class Matcher {
     ranges_.resize(second_.size());
     rivals_.resize(second_.size());
     by_second_.resize(second_.size());
+    first_candidate_.resize(second_.size());
     for (std::size_t j = 0; j < second_.size(); ++j) {
       const ComparedWall& wall = second_[j];
       const Vector2d middle = wall.Middle();
       const double across = Range(wall.normal(), middle) + options_.tolerance;
       const double along = Range(wall.direction, middle);
       ranges_[j] = across;
+      first_candidate_[j] = candidates_.size();
       std::vector<double> offsets;
       for (std::size_t i = 0; i < first_.size(); ++i) {
         if (std::abs(Turn(first_[i], wall)) >
@@ -266,41 +323,107 @@ class Matcher {
     return is_paired;
   }
 
+  // Pairs of walls of the first place that are not parallel, by rows.
+  std::vector<char> CrossingWalls() const {
+    const std::size_t count = first_.size();
+    std::vector<char> crosses(count * count, 0);
+    const double least = std::sin(kParallel);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        const bool is_crossing =
+            std::abs(std::sin(first_[i].angle - first_[j].angle)) >= least;
+        crosses[i * count + j] = crosses[j * count + i] = is_crossing ? 1 : 0;
+      }
+    }
+    return crosses;
+  }
+
+  // What a pair of walls adds to the normal equations of a displacement.
+  struct Pull {
+    // Of the offset.
+    Matrix3d normal;
+    Vector3d right;
+    // Of the direction.
+    double turn_information;
+    double turn;
+
+    void AddTo(Matrix3d* normal_sum, Vector3d* right_sum) const {
+      *normal_sum += normal;
+      *right_sum -= right;
+      (*normal_sum)(2, 2) += turn_information;
+      (*right_sum)[2] -= turn;
+    }
+  };
+
+  Pull PullOf(const Candidate& pair, const Mover& mover,
+              const Vector3d& displacement) const {
+    const double sigma_offset = 0.5 * options_.tolerance;
+    const ComparedWall& first = first_[pair.first];
+    const ComparedWall moved = mover.Move(second_[pair.second]);
+    Comparison c = Compare(first, moved);
+    if (c.overlap <= 0.0) {
+      // Not side by side yet: the second's own middle.
+      c.second_middle = 0.5 * (moved.begin + moved.end);
+      c.offset = first.Across(moved.At(c.second_middle));
+    }
+    const Vector2d lever =
+        moved.At(c.second_middle) - pivot_ - displacement.head<2>();
+    const Vector2d normal_of_first = first.normal();
+    const Vector3d across(normal_of_first.x(), normal_of_first.y(),
+                          normal_of_first.dot(Vector2d(-lever.y(), lever.x())));
+    const double weight = 1.0 / (sigma_offset * sigma_offset);
+    const double sigma_angle_squared =
+        options_.angle_tolerance * options_.angle_tolerance +
+        first.noise * first.noise + moved.noise * moved.noise;
+    Pull pull;
+    pull.normal = weight * across * across.transpose();
+    pull.right = weight * c.offset * across;
+    pull.turn_information = 1.0 / sigma_angle_squared;
+    pull.turn = c.angle / sigma_angle_squared;
+    return pull;
+  }
+
+  // Every solve begins where nothing is moved: what candidates say there is
+  // computed once, as are their gates.
+  void MeasureCandidates() {
+    const Vector3d unmoved = Vector3d::Zero();
+    const Mover mover(pivot_, unmoved);
+    unmoved_pulls_.reserve(candidates_.size());
+    angle_gates_.reserve(candidates_.size());
+    for (const Candidate& pair : candidates_) {
+      unmoved_pulls_.push_back(PullOf(pair, mover, unmoved));
+      angle_gates_.push_back(
+          AngleGate(first_[pair.first], second_[pair.second], 0.0));
+    }
+  }
+
+  const Pull& UnmovedPull(const Candidate& pair) const {
+    const std::vector<int>& firsts = by_second_[pair.second];
+    const auto found =
+        std::lower_bound(firsts.begin(), firsts.end(), pair.first);
+    return unmoved_pulls_[first_candidate_[pair.second] +
+                          static_cast<std::size_t>(found - firsts.begin())];
+  }
+
   // Most probable displacement when these pairs, a range of candidates, are one
   // wall each.
   template <typename Pairs>
   Vector3d Solve(const Pairs& pairs) const {
     Vector3d displacement = Vector3d::Zero();
-    const double sigma_offset = 0.5 * options_.tolerance;
     for (int round = 0; round < kSolverRounds; ++round) {
       Matrix3d normal = prior_;
       Vector3d right = -prior_ * displacement;
-      const Mover mover(pivot_, displacement);
-      for (const Candidate& pair : pairs) {
-        const ComparedWall& first = first_[pair.first];
-        const ComparedWall moved = mover.Move(second_[pair.second]);
-        Comparison c = Compare(first, moved);
-        if (c.overlap <= 0.0) {
-          // Not side by side yet: the second's own middle.
-          c.second_middle = 0.5 * (moved.begin + moved.end);
-          c.offset = first.Across(moved.At(c.second_middle));
+      if (round == 0) {
+        for (const Candidate& pair : pairs) {
+          UnmovedPull(pair).AddTo(&normal, &right);
         }
-        const Vector2d lever =
-            moved.At(c.second_middle) - pivot_ - displacement.head<2>();
-        const Vector2d normal_of_first = first.normal();
-        const Vector3d across(
-            normal_of_first.x(), normal_of_first.y(),
-            normal_of_first.dot(Vector2d(-lever.y(), lever.x())));
-        const double weight = 1.0 / (sigma_offset * sigma_offset);
-        normal += weight * across * across.transpose();
-        right -= weight * c.offset * across;
-        const double sigma_angle_squared =
-            options_.angle_tolerance * options_.angle_tolerance +
-            first.noise * first.noise + moved.noise * moved.noise;
-        normal(2, 2) += 1.0 / sigma_angle_squared;
-        right[2] -= c.angle / sigma_angle_squared;
+      } else {
+        const Mover mover(pivot_, displacement);
+        for (const Candidate& pair : pairs) {
+          PullOf(pair, mover, displacement).AddTo(&normal, &right);
+        }
       }
-      displacement += normal.ldlt().solve(right);
+      displacement += SolveSymmetric(normal, right);
     }
     return displacement;
   }
@@ -321,10 +444,11 @@ class Matcher {
       double least = options_.tolerance;
       double in_conflict = 0.0;
       found.clear();
+      const double* gate = angle_gates_.data() + first_candidate_[j];
       for (const int i : by_second_[j]) {
         // Most walls are across the other, which needs no more.
         const double turn = std::abs(Turn(first_[i], moved));
-        const bool is_parallel = turn <= AngleGate(first_[i], moved, 0.0);
+        const bool is_parallel = turn <= *gate++;
         if (!is_parallel && turn > kConflictAngle) continue;
         const Comparison c = Compare(first_[i], moved);
         if (c.overlap < options_.min_overlap) continue;
@@ -391,11 +515,11 @@ class Matcher {
           options_.gate * options_.gate) {
         return;
       }
-      const std::array<long, 3> cell = {
+      const DisplacementCells::Cell cell = {
           std::lround(displacement[0] / kCell),
           std::lround(displacement[1] / kCell),
           std::lround(displacement[2] / DegToRad(0.3))};
-      if (!tried_.insert(cell).second) return;
+      if (!tried_.Insert(cell)) return;
       const Explanation& explanation = Explain(displacement);
       if (explanation.matches.empty()) return;
       hypotheses_.push_back({displacement, explanation.worth});
@@ -495,7 +619,13 @@ class Matcher {
   std::vector<double> ranges_;
   std::vector<int> rivals_;
   std::vector<std::vector<int>> by_second_;
-  std::set<std::array<long, 3>> tried_;
+  // Of each wall of the second place its first candidate, and what each
+  // candidate says before anything is moved.
+  std::vector<std::size_t> first_candidate_;
+  std::vector<Pull> unmoved_pulls_;
+  // Of each candidate once it is moved.
+  std::vector<double> angle_gates_;
+  DisplacementCells tried_;
   std::vector<Hypothesis> hypotheses_;
   // Of Explain.
   Explanation explanation_;

@@ -17,6 +17,8 @@ using Eigen::Vector2d;
 // Places that are compared by all threads together, and between two questions
 // whether to stop.
 constexpr std::size_t kPlacesAtOnce = 32;
+// A bound times this is one whatever was rounded.
+constexpr double kOverRounding = 1.0 + 1e-9;
 
 // How well an anchor is known in the frame of its part of the graph: standard
 // deviations of the position (both coordinates together, m) and of the
@@ -37,10 +39,15 @@ class PlaceSearch {
         marginals_(*marginals),
         candidates_(*candidates),
         ways_(walls, options.place_links),
-        places_(FindPlaces(walls, options)) {}
+        parts_(ways_.Parts()),
+        places_in_(parts_.size(), 0),
+        places_(FindPlaces(walls, options)) {
+    for (const WallPlace& place : places_) ++places_in_[parts_[place.anchor]];
+  }
 
   void Run() {
     MeasureAnchors();
+    MeasureWaysFromFirst();
     // Comparisons change nothing; what they tell is taken in one by one.
     std::vector<Comparison> compared(kPlacesAtOnce);
     for (std::size_t i = 0; i < places_.size(); i += kPlacesAtOnce) {
@@ -121,17 +128,19 @@ class PlaceSearch {
     return walls_.wall(places_[place].anchor);
   }
 
-  // Of each place that there is a way from to another. From then on nobody
-  // asks for covariances that are not known, which makes marginals_ safe to ask
-  // from several threads.
+  // Whether there is a way from this place to another.
+  bool IsCompared(const WallPlace& place) const {
+    return places_in_[parts_[place.anchor]] > 1;
+  }
+
+  // Of each place that is compared. From then on nobody asks for covariances
+  // that are not known, which makes marginals_ safe to ask from several
+  // threads.
   void MeasureAnchors() {
-    const std::vector<std::size_t> parts = ways_.Parts();
-    std::vector<int> places_in(parts.size(), 0);
-    for (const WallPlace& place : places_) ++places_in[parts[place.anchor]];
     std::vector<FeatureId> anchors(places_.size(), kNoId);
     std::vector<FeatureId> wanted;
     for (std::size_t p = 0; p < places_.size(); ++p) {
-      if (places_in[parts[places_[p].anchor]] < 2) continue;
+      if (!IsCompared(places_[p])) continue;
       anchors[p] = Anchor(p).id;
       wanted.push_back(anchors[p]);
     }
@@ -143,6 +152,22 @@ class PlaceSearch {
       sigmas_[p] = {
           std::sqrt(std::max(0.0, covariance(0, 0) + covariance(1, 1))),
           std::sqrt(std::max(0.0, covariance(2, 2)))};
+    }
+  }
+
+  void MeasureWaysFromFirst() {
+    ways_from_first_.assign(parts_.size(), 0.0);
+    std::vector<bool> is_measured(parts_.size(), false);
+    WallWays::Search search;
+    for (const WallPlace& place : places_) {
+      const std::size_t part = parts_[place.anchor];
+      if (is_measured[part] || !IsCompared(place)) continue;
+      is_measured[part] = true;
+      const std::vector<double> ways =
+          ways_.From(static_cast<int>(part), &search);
+      for (std::size_t i = 0; i < ways.size(); ++i) {
+        if (parts_[i] == part) ways_from_first_[i] = ways[i];
+      }
     }
   }
 
@@ -199,35 +224,55 @@ class PlaceSearch {
   void ComparePlace(std::size_t index, Comparison* comparison) const {
     comparison->found.clear();
     comparison->tally = Tally();
+    std::vector<std::size_t> others = PerhapsWithinReach(index, comparison);
+    if (others.empty()) return;
+    std::vector<int> anchors;
+    for (const std::size_t p : others) anchors.push_back(places_[p].anchor);
     const std::vector<double> ways =
-        ways_.From(places_[index].anchor, &comparison->search);
-    const std::vector<std::size_t> others =
-        WithinReach(index, ways, &comparison->tally);
+        ways_.From(places_[index].anchor, anchors, &comparison->search);
+    others.erase(std::remove_if(others.begin(), others.end(),
+                                [&](std::size_t p) {
+                                  return !MayBeWithinReach(
+                                      index, p, ways[places_[p].anchor]);
+                                }),
+                 others.end());
+    comparison->tally.out_of_reach +=
+        static_cast<std::int64_t>(anchors.size() - others.size());
     if (others.empty()) return;
     comparison->found = Match(index, others, ways, &comparison->tally);
   }
 
-  std::vector<std::size_t> WithinReach(std::size_t index,
-                                       const std::vector<double>& ways,
-                                       Tally* tally) const {
+  // Whether one place may be the other, when the way between them is so long.
+  bool MayBeWithinReach(std::size_t index, std::size_t p, double way) const {
+    const double sigma = options_.covariance_scale * LargestSigma(index, p);
+    return IsInReach(places_[index], places_[p],
+                     sigma * sigma + 2.0 * AddedVariance(way));
+  }
+
+  // Places before this one, of other visits, that may be within reach if the
+  // ways to them are as long as those by way of one wall: most are not, and no
+  // way to them is looked for.
+  std::vector<std::size_t> PerhapsWithinReach(std::size_t index,
+                                              Comparison* comparison) const {
     const WallPlace& own = places_[index];
+    Tally* tally = &comparison->tally;
     const std::map<int, int> near =
         walls_.Within(own.anchor, options_.min_links - 1);
     std::vector<std::size_t> others;
     for (std::size_t p = 0; p < index; ++p) {
       ++tally->pairs;
-      if (near.count(places_[p].anchor) > 0) {
+      const int anchor = places_[p].anchor;
+      if (near.count(anchor) > 0) {
         ++tally->same_visit;
         continue;
       }
-      const double way = ways[places_[p].anchor];
-      if (!std::isfinite(way)) {
+      if (parts_[anchor] != parts_[own.anchor]) {
         ++tally->no_way;
         continue;
       }
-      const double sigma = options_.covariance_scale * LargestSigma(index, p);
-      if (!IsInReach(own, places_[p],
-                     sigma * sigma + 2.0 * AddedVariance(way))) {
+      const double longest = kOverRounding * (ways_from_first_[own.anchor] +
+                                              ways_from_first_[anchor]);
+      if (!MayBeWithinReach(index, p, longest)) {
         ++tally->out_of_reach;
         continue;
       }
@@ -300,6 +345,12 @@ class PlaceSearch {
   Marginals& marginals_;
   ClosureCandidates& candidates_;
   WallWays ways_;
+  // Of each wall its part, and of each part its places.
+  std::vector<std::size_t> parts_;
+  std::vector<int> places_in_;
+  // Of each wall of a part with places that are compared: length of the way to
+  // the part's first wall, m.
+  std::vector<double> ways_from_first_;
   std::vector<WallPlace> places_;
   std::vector<AnchorSigma> sigmas_;
 

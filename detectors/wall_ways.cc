@@ -66,6 +66,16 @@ WallWays::WallWays(const WallGraph& walls, int closure_links) {
 }
 
 std::vector<double> WallWays::From(int wall, Search* search) const {
+  return Find(wall, nullptr, search);
+}
+
+std::vector<double> WallWays::From(int wall, const std::vector<int>& targets,
+                                   Search* search) const {
+  return Find(wall, &targets, search);
+}
+
+std::vector<double> WallWays::Find(int wall, const std::vector<int>* targets,
+                                   Search* search) const {
   std::vector<double> ways(begin_.size() - 1,
                            std::numeric_limits<double>::infinity());
   ways[wall] = 0.0;
@@ -74,6 +84,7 @@ std::vector<double> WallWays::From(int wall, Search* search) const {
   std::vector<std::vector<Way>>& buckets = search->buckets_;
   if (buckets.empty()) buckets.resize(1);
   buckets[0].push_back({wall, 0.0});
+  std::size_t known = 0;
   for (std::size_t b = 0; b < buckets.size(); ++b) {
     // Grows while it is gone through.
     for (std::size_t k = 0; k < buckets[b].size(); ++k) {
@@ -83,12 +94,23 @@ std::vector<double> WallWays::From(int wall, Search* search) const {
         const Way way = {ways_[w].to, nearest.length + ways_[w].length};
         if (!(way.length < ways[way.to])) continue;
         ways[way.to] = way.length;
-        const auto step = static_cast<std::size_t>(way.length / step_);
+        const std::size_t step = StepOf(way.length);
         if (step >= buckets.size()) buckets.resize(step + 1);
         buckets[step].push_back(way);
       }
     }
     buckets[b].clear();
+    if (targets == nullptr) continue;
+    // Nothing makes a way of this step shorter any more.
+    while (known < targets->size()) {
+      const double way = ways[static_cast<std::size_t>((*targets)[known])];
+      if (!std::isfinite(way) || StepOf(way) > b) break;
+      ++known;
+    }
+    if (known == targets->size()) {
+      for (std::vector<Way>& bucket : buckets) bucket.clear();
+      break;
+    }
   }
   return ways;
 }

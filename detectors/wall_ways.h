@@ -26,6 +26,11 @@ class WallWays {
   /// there is none. `search` may be of any call before, of this thread.
   std::vector<double> From(int wall, Search* search) const;
 
+  /// The same for some walls that there are ways to: the search ends once they
+  /// are known. What is returned of others is not less than their ways.
+  std::vector<double> From(int wall, const std::vector<int>& targets,
+                           Search* search) const;
+
   /// For each wall the number of its connected part, that is the smallest index
   /// in the part.
   std::vector<std::size_t> Parts() const;
@@ -35,6 +40,13 @@ class WallWays {
     int to = -1;
     double length = 0.0;  // m
   };
+
+  // To all walls when `targets` is null.
+  std::vector<double> Find(int wall, const std::vector<int>* targets,
+                           Search* search) const;
+  std::size_t StepOf(double length) const {
+    return static_cast<std::size_t>(length / step_);
+  }
 
   // Those of one wall after those of the one before.
   std::vector<Way> ways_;

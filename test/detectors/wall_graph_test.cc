@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <map>
+#include <vector>
 
 #include "detectors/wall_graph_world.h"
 
@@ -63,6 +64,34 @@ TEST_F(WallGraphTest, WaysGoAlongMeasurements) {
                             std::numeric_limits<double>::infinity()));
   }
   EXPECT_THAT(ways.Parts(), ElementsAre(0u, 0u, 0u, 0u, 0u, 5u));
+}
+
+TEST_F(WallGraphTest, WaysToSomeWallsAreThoseToAll) {
+  // A grid of walls, whose links are as long as they are apart.
+  constexpr int kColumns = 9;
+  constexpr int kRows = 7;
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      const double x = 3.0 * column + 0.1 * row * row;
+      AddWall(x, 2.0 * row, x + 1.0, 2.0 * row);
+    }
+  }
+  for (int i = 0; i < kRows * kColumns; ++i) {
+    // Some are left out, so that there are ways round.
+    if ((i + 1) % kColumns != 0 && i % 5 != 0) AddLink(i, i + 1);
+    if (i + kColumns < kRows * kColumns && i % 7 != 0) AddLink(i, i + kColumns);
+  }
+  const WallGraph walls(graph_);
+  const WallWays ways(walls, 2);
+  WallWays::Search search;
+  for (int from = 0; from < walls.size(); from += 4) {
+    const std::vector<double> all = ways.From(from, &search);
+    for (int to = 0; to < walls.size(); to += 3) {
+      const std::vector<int> targets = {to, (to + 11) % walls.size()};
+      const std::vector<double> some = ways.From(from, targets, &search);
+      for (const int target : targets) EXPECT_EQ(some[target], all[target]);
+    }
+  }
 }
 
 // With a wall across in common, nothing is free to move between the visits.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace plumbline {
 
@@ -79,9 +80,94 @@ void ReturnCells::FillBuckets() {
   num_slots_ = 0;
   for (Bucket& bucket : buckets_) {
     bucket.around = BucketsAround(bucket.middle);
-    bucket.FillLocal();
     bucket.first_slot = num_slots_;
-    num_slots_ += bucket.x.size();
+    num_slots_ += (bucket.entries.size() + kBlock - 1) / kBlock * kBlock;
+  }
+  cell_at_.resize(num_slots_);
+  local_x_.resize(num_slots_);
+  local_y_.resize(num_slots_);
+  for (const Bucket& bucket : buckets_) FillSlots(bucket);
+}
+
+void ReturnCells::FillSlots(const Bucket& bucket) {
+  constexpr float kNowhere = 1e6f;
+  std::size_t slot = bucket.first_slot;
+  for (const Bucket::Entry& entry : bucket.entries) {
+    const Eigen::Vector2d local = entry.mean - bucket.middle;
+    cell_at_[slot] = entry.index;
+    local_x_[slot] = static_cast<float>(local.x());
+    local_y_[slot] = static_cast<float>(local.y());
+    ++slot;
+  }
+  for (; slot % kBlock != 0; ++slot) {
+    cell_at_[slot] = -1;
+    local_x_[slot] = local_y_[slot] = kNowhere;
+  }
+}
+
+void ReturnCells::FindAlong(int index, double squared_gap,
+                            const Eigen::Vector2d& point,
+                            const Eigen::Vector2d& direction, double reach,
+                            Marks* marks) const {
+  using Block = Eigen::Array<float, kBlock, 1>;
+  constexpr std::uint8_t kAllSettled = 0xff;
+  static_assert(kBlock == 8);
+  const Block bits = (Block() << 1, 2, 4, 8, 16, 32, 64, 128).finished();
+  std::vector<std::size_t>& near = marks->near;
+  near.clear();
+  const Cell& cell = cells_[index];
+  const Bucket& own = buckets_[cell.bucket];
+  // Reach of a bucket's square along the axes and across the line.
+  const double half = 0.5 * bucket_size_ + kRounding;
+  const double farthest_across =
+      reach + kRounding +
+      half * (std::abs(direction.x()) + std::abs(direction.y()));
+  const Eigen::Vector2d from_line = own.middle - point;
+  const double own_across =
+      direction.x() * from_line.y() - direction.y() * from_line.x();
+  const Eigen::Vector2d own_place = cell.mean - own.middle;
+  const Eigen::Vector2f along = direction.cast<float>();
+  const auto per_gap = static_cast<float>(1.0 / squared_gap);
+  const auto per_reach = static_cast<float>(1.0 / reach);
+  for (int n = 0; n < 9; ++n) {
+    const int k = own.around[n];
+    if (k < 0) continue;
+    const Eigen::Vector2d step(bucket_size_ * (n % 3 - 1),
+                               bucket_size_ * (n / 3 - 1));
+    const double across =
+        own_across + direction.x() * step.y() - direction.y() * step.x();
+    if (std::abs(across) > farthest_across) continue;
+    const Eigen::Vector2d place = own_place - step;
+    const double outside_x = std::max(std::abs(place.x()) - half, 0.0);
+    const double outside_y = std::max(std::abs(place.y()) - half, 0.0);
+    if (outside_x * outside_x + outside_y * outside_y > squared_gap) continue;
+    const Bucket& bucket = buckets_[k];
+    const Eigen::Vector2f local = place.cast<float>();
+    const auto offset = static_cast<float>(across);
+    const std::size_t end = bucket.first_slot + bucket.entries.size();
+    for (std::size_t i = bucket.first_slot; i < end; i += kBlock) {
+      const std::uint8_t settled = marks->is_settled[i / kBlock];
+      if (settled == kAllSettled) continue;
+      const Eigen::Map<const Block> x(&local_x_[i]);
+      const Eigen::Map<const Block> y(&local_y_[i]);
+      const Block gaps =
+          ((x - local.x()).square() + (y - local.y()).square()) * per_gap;
+      const Block offsets =
+          (offset + (along.x() * y - along.y() * x)).abs() * per_reach;
+      // A bit for each that is near: 1 or 0 of it is left, so that nothing
+      // branches.
+      constexpr float kSteep = 1e30f;
+      const Block is_near = ((kFloatMargin - gaps.max(offsets)) * kSteep)
+                                .max(Block::Zero())
+                                .min(Block::Ones());
+      const auto hits =
+          static_cast<unsigned>(static_cast<int>((is_near * bits).sum()));
+      std::size_t slot = i;
+      for (unsigned open = hits & ~static_cast<unsigned>(settled); open != 0;
+           open >>= 1, ++slot) {
+        if ((open & 1u) != 0) near.push_back(slot);
+      }
+    }
   }
 }
 
@@ -121,7 +207,7 @@ void ReturnCells::DropUsed() {
                                    return cells_[entry.index].used;
                                  }),
                   entries.end());
-    buckets_[k].FillLocal();
+    FillSlots(buckets_[k]);
   }
   used_up_.clear();
 }

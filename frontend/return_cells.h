@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -65,22 +64,28 @@ class ReturnCells {
     int bucket = 0;
   };
 
+  /// Cells that are compared at a time.
+  static constexpr int kBlock = 8;
+
   /// What a search along lines marks, kept for its memory. All 0 between two
   /// searches.
   struct Marks {
-    /// By slot: taken in, or never to be.
+    /// By block of slots, a bit each: taken in, or never to be.
     std::vector<std::uint8_t> is_settled;
     /// Slots that are not 0.
     std::vector<std::size_t> settled;
+    /// Slots that a search is to look at.
+    std::vector<std::size_t> near;
 
     /// Marks a slot.
     void Settle(std::size_t slot) {
-      is_settled[slot] = 1;
+      std::uint8_t& block = is_settled[slot / kBlock];
+      block = static_cast<std::uint8_t>(block | 1u << (slot % kBlock));
       settled.push_back(slot);
     }
     /// Takes all marks away.
     void Clear() {
-      for (const std::size_t slot : settled) is_settled[slot] = 0;
+      for (const std::size_t slot : settled) is_settled[slot / kBlock] = 0;
       settled.clear();
     }
   };
@@ -126,7 +131,7 @@ class ReturnCells {
 
   /// Prepares marks, and marks a cell.
   void Mark(int index, Marks* marks) const {
-    marks->is_settled.resize(num_slots_, 0);
+    marks->is_settled.resize(num_slots_ / kBlock, 0);
     const Bucket& bucket = buckets_[cells_[index].bucket];
     marks->Settle(bucket.first_slot + bucket.SlotOf(index));
   }
@@ -137,23 +142,14 @@ class ReturnCells {
   /// the direction `direction`, which `look` must not change.
   template <typename Look>
   void VisitAlong(int index, double squared_gap, const Eigen::Vector2d& point,
-                  const Eigen::Vector2d& direction, double reach,
-                  const Marks& marks, const Look& look) const {
-    const Cell& cell = cells_[index];
-    // Reach of a bucket's square across the line.
-    const double half_width =
-        0.5 * bucket_size_ *
-            (std::abs(direction.x()) + std::abs(direction.y())) +
-        kRounding;
-    for (const int k : buckets_[cell.bucket].around) {
-      if (k < 0) continue;
-      const Bucket& bucket = buckets_[k];
-      const Eigen::Vector2d offset = bucket.middle - point;
-      const double across =
-          direction.x() * offset.y() - direction.y() * offset.x();
-      if (std::abs(across) > reach + half_width) continue;
-      bucket.VisitNear(cell.mean, squared_gap, direction, across, reach,
-                       marks.is_settled, look);
+                  const Eigen::Vector2d& direction, double reach, Marks* marks,
+                  const Look& look) const {
+    // What `look` does changes nothing of what is near, but its marks, each
+    // cell its own.
+    FindAlong(index, squared_gap, point, direction, reach, marks);
+    for (const std::size_t slot : marks->near) {
+      const int near = cell_at_[slot];
+      look(near, cells_[near].mean, slot);
     }
   }
 
@@ -164,8 +160,7 @@ class ReturnCells {
 
  private:
   static constexpr double kRounding = 1e-9;
-  // Cells that are compared at a time, and what single precision may be off by.
-  static constexpr int kBlock = 4;
+  // What single precision may be off by.
   static constexpr float kFloatMargin = 1.001f;
 
   // Cells that have not been used up, by place.
@@ -181,10 +176,7 @@ class ReturnCells {
     Eigen::Vector2d middle;
     // Itself and those beside it, -1 for none.
     std::array<int, 9> around;
-    // The means once more, from the middle on, to leave out what is clearly too
-    // far away several at a time.
-    std::vector<float> x, y;
-    // Number of its first entry's slot; every place in x has one.
+    // Number of its first entry's slot.
     std::size_t first_slot = 0;
 
     // Place of a cell that is among the entries.
@@ -193,64 +185,18 @@ class ReturnCells {
       while (entries[slot].index != index) ++slot;
       return slot;
     }
-
-    // After every change of the entries.
-    void FillLocal() {
-      constexpr float kNowhere = 1e6f;
-      x.assign(entries.size() + kBlock, kNowhere);
-      y.assign(entries.size() + kBlock, kNowhere);
-      for (std::size_t i = 0; i < entries.size(); ++i) {
-        const Eigen::Vector2d local = entries[i].mean - middle;
-        x[i] = static_cast<float>(local.x());
-        y[i] = static_cast<float>(local.y());
-      }
-    }
-
-    // Calls `look(entry, slot)`, in their order, with those within the gap of a
-    // place and within `reach` of a line that are not settled, and some more
-    // that are not. The line has a direction and passes the middle at `across`,
-    // which is to its left.
-    template <typename Look>
-    void VisitNear(const Eigen::Vector2d& place, double squared_gap,
-                   const Eigen::Vector2d& direction, double across,
-                   double reach, const std::vector<std::uint8_t>& is_settled,
-                   const Look& look) const {
-      using Block = Eigen::Array<float, kBlock, 1>;
-      const Eigen::Vector2f local = (place - middle).cast<float>();
-      const Eigen::Vector2f along = direction.cast<float>();
-      const auto offset = static_cast<float>(across);
-      const auto per_gap = static_cast<float>(1.0 / squared_gap);
-      const auto per_reach = static_cast<float>(1.0 / reach);
-      const std::size_t count = entries.size();
-      for (std::size_t i = 0; i < count; i += kBlock) {
-        std::uint32_t settled;
-        static_assert(sizeof(settled) == kBlock);
-        std::memcpy(&settled, &is_settled[first_slot + i], sizeof(settled));
-        if (settled == 0x01010101u) continue;
-        const Eigen::Map<const Block> own_x(&x[i]);
-        const Eigen::Map<const Block> own_y(&y[i]);
-        const Block dx = own_x - local.x();
-        const Block dy = own_y - local.y();
-        const Block gaps = (dx * dx + dy * dy) * per_gap;
-        const Block offsets =
-            (offset + (along.x() * own_y - along.y() * own_x)).abs() *
-            per_reach;
-        const Block farthest = gaps.max(offsets);
-        if (farthest.minCoeff() > kFloatMargin) continue;
-        const std::size_t end = std::min<std::size_t>(i + kBlock, count);
-        for (std::size_t j = i; j < end; ++j) {
-          if (is_settled[first_slot + j] == 0 &&
-              farthest[static_cast<Eigen::Index>(j - i)] <= kFloatMargin) {
-            look(entries[j].index, entries[j].mean, first_slot + j);
-          }
-        }
-      }
-    }
   };
 
   std::int64_t BucketKey(const Eigen::Vector2d& point, int dx, int dy) const;
   // The bucket of a point and those beside it; -1 for one without cells.
   std::array<int, 9> BucketsAround(const Eigen::Vector2d& point) const;
+  // Puts the slots of what VisitAlong looks at into `marks`, those clearly too
+  // far away left out several at a time.
+  void FindAlong(int index, double squared_gap, const Eigen::Vector2d& point,
+                 const Eigen::Vector2d& direction, double reach,
+                 Marks* marks) const;
+  // After every change of a bucket's entries.
+  void FillSlots(const Bucket& bucket);
   void SortLooks();
   void FillBuckets();
   void DropStrays(double least_share);
@@ -284,7 +230,11 @@ class ReturnCells {
   CellIndex bucket_of_;
   // Buckets that hold cells which have been used.
   std::vector<int> used_up_;
+  // By slot: the cell, and its mean from the middle of its bucket on. Every
+  // bucket has whole blocks of slots; those without an entry are nowhere.
   std::size_t num_slots_ = 0;
+  std::vector<int> cell_at_;
+  std::vector<float> local_x_, local_y_;
 };
 
 }  // namespace plumbline

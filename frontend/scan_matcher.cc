@@ -233,9 +233,12 @@ void ScanMatcher::VisitNear(int begin, int end, const Eigen::Vector2d& point,
     }
     const Block x = Eigen::Map<const Block>(&reference_x_[i]) - local.x();
     const Block y = Eigen::Map<const Block>(&reference_y_[i]) - local.y();
-    if ((x * x + y * y).minCoeff() > bound) continue;
-    const int block_end = std::min(i + kBlock, end);
-    for (int j = i; j < block_end; ++j) look(j);
+    const Block distances = x * x + y * y;
+    if (distances.minCoeff() > bound) continue;
+    const int count = std::min(kBlock, end - i);
+    for (int j = 0; j < count; ++j) {
+      if (distances[j] <= bound) look(i + j);
+    }
   }
 }
 

@@ -248,7 +248,7 @@ class WallGrower {
         fit.Add(place - line->origin, 1.0);
       };
       returns_.VisitAlong(members[k], squared_gap, line->point(),
-                          line->direction, reach, marks, look);
+                          line->direction, reach, &marks, look);
       if (members.size() >= kFewestCells && members.size() > size) {
         line->FitTo(fit);
       }

@@ -62,8 +62,7 @@ class WallGrid {
 
   // Of the cell that a point lies in.
   static std::int64_t Key(const Eigen::Vector2d& point) {
-    return CellKey(static_cast<std::int64_t>(std::floor(point.x() / kCell)),
-                   static_cast<std::int64_t>(std::floor(point.y() / kCell)));
+    return CellKey(Floor(point.x() / kCell), Floor(point.y() / kCell));
   }
   // Null where no wall is.
   const std::vector<int>* In(std::int64_t cell) const {
@@ -73,6 +72,12 @@ class WallGrid {
   const GridWall& wall(int index) const { return walls_[index]; }
 
  private:
+  // One is asked for with every return, and the library's is called.
+  static std::int64_t Floor(double value) {
+    const auto truncated = static_cast<std::int64_t>(value);
+    return truncated - (static_cast<double>(truncated) > value ? 1 : 0);
+  }
+
   std::vector<GridWall> walls_;
   CellIndex cell_of_;
   std::vector<std::vector<int>> cells_;
@@ -119,8 +124,9 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
         const GridWall& wall = grid.wall(index);
         const Eigen::Vector2d difference = position - wall.position;
         const double offset = std::abs(difference.dot(wall.normal()));
+        if (!(offset < best)) continue;
         const double along = difference.dot(wall.direction);
-        if (offset < best && along >= wall.begin && along <= wall.end &&
+        if (along >= wall.begin && along <= wall.end &&
             normal.dot(wall.normal()) >= min_cosine) {
           best = offset;
           hit = wall.id;

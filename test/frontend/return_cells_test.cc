@@ -146,7 +146,7 @@ TEST(ReturnCellsTest, CellsAlongALineAreFoundOnce) {
       found.push_back(index);
     };
     for (int times = 0; times < 2; ++times) {
-      returns.VisitAlong(seed, kGap * kGap, point, direction, kReach, marks,
+      returns.VisitAlong(seed, kGap * kGap, point, direction, kReach, &marks,
                          look);
     }
     std::sort(found.begin(), found.end());
@@ -160,8 +160,7 @@ TEST(ReturnCellsTest, CellsAlongALineAreFoundOnce) {
     }
     EXPECT_EQ(found, expected) << seed;
     marks.Clear();
-    EXPECT_EQ(std::count(marks.is_settled.begin(), marks.is_settled.end(), 1),
-              0);
+    EXPECT_THAT(marks.is_settled, ::testing::Each(0));
   }
 }
 

@@ -4,7 +4,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 #include <vector>
 
@@ -69,6 +71,60 @@ void FillBetween(const Eigen::Vector2d& laser, int parts,
   *goes_on = std::move(filled_goes_on);
 }
 
+// Neighbours of a point on its surface.
+struct Neighbours {
+  int point = 0;
+  int begin = 0;
+  int end = 0;
+
+  int count() const { return end - begin; }
+};
+
+// Scatter of neighbours about their mean.
+struct Scatter {
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+};
+
+// Of so many points at a time: each sum alone waits for the addition before.
+constexpr int kAtOnce = 4;
+
+std::array<Scatter, kAtOnce> ScattersOf(
+    const std::vector<Eigen::Vector2d>& positions,
+    const std::array<Neighbours, kAtOnce>& groups) {
+  int common = groups[0].count();
+  for (const Neighbours& group : groups) {
+    common = std::min(common, group.count());
+  }
+  // Calls `add(w, position)` with each neighbour of each group `w`, in order.
+  const auto add_all = [&](const auto& add) {
+    std::array<const Eigen::Vector2d*, kAtOnce> first;
+    for (int w = 0; w < kAtOnce; ++w) {
+      first[w] = positions.data() + groups[w].begin;
+    }
+    for (int k = 0; k < common; ++k) {
+      for (int w = 0; w < kAtOnce; ++w) add(w, first[w][k]);
+    }
+    for (int w = 0; w < kAtOnce; ++w) {
+      for (int k = common; k < groups[w].count(); ++k) add(w, first[w][k]);
+    }
+  };
+  std::array<Eigen::Vector2d, kAtOnce> means;
+  for (Eigen::Vector2d& mean : means) mean.setZero();
+  add_all(
+      [&](int w, const Eigen::Vector2d& position) { means[w] += position; });
+  for (int w = 0; w < kAtOnce; ++w) means[w] /= groups[w].count();
+  std::array<Scatter, kAtOnce> scatters;
+  add_all([&](int w, const Eigen::Vector2d& position) {
+    const Eigen::Vector2d d = position - means[w];
+    scatters[w].xx += d.x() * d.x();
+    scatters[w].xy += d.x() * d.y();
+    scatters[w].yy += d.y() * d.y();
+  });
+  return scatters;
+}
+
 // Parts into which the angle between neighbouring beams is cut.
 int BeamParts(const Scan& scan, const ScanPointsOptions& options) {
   constexpr int kMostParts = 20;
@@ -112,48 +168,58 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
   if (parts > 1) FillBetween(laser, parts, points, &goes_on);
   const double angle_step = std::abs(scan.angle_step) / parts;
   const int n = static_cast<int>(points->size());
+  std::vector<Eigen::Vector2d> positions;
+  positions.reserve(points->size());
+  for (const ScanPoint& point : *points) positions.push_back(point.position);
+  std::vector<Neighbours> groups;
+  groups.reserve(points->size() + kAtOnce);
   int surface_begin = 0;
   for (int i = 0; i < n; ++i) {
     if (!goes_on[i]) surface_begin = i;
-    ScanPoint& point = (*points)[i];
+    const ScanPoint& point = (*points)[i];
     // Far away neighbours are far apart: widen the fit to hold two on each
     // side where the surface allows.
     const double radius = std::max(
         options.normal_radius, 2.5 * std::sqrt(2.0) * point.range * angle_step);
     int begin = i;
     while (begin > surface_begin &&
-           ((*points)[begin - 1].position - point.position).squaredNorm() <=
+           (positions[begin - 1] - positions[i]).squaredNorm() <=
                radius * radius) {
       --begin;
     }
     int end = i + 1;
     while (end < n && goes_on[end] &&
-           ((*points)[end].position - point.position).squaredNorm() <=
-               radius * radius) {
+           (positions[end] - positions[i]).squaredNorm() <= radius * radius) {
       ++end;
     }
-    const int count = end - begin;
-    if (count < 3) continue;
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-    for (int j = begin; j < end; ++j) mean += (*points)[j].position;
-    mean /= count;
-    double sxx = 0.0, sxy = 0.0, syy = 0.0;
-    for (int j = begin; j < end; ++j) {
-      const Eigen::Vector2d d = (*points)[j].position - mean;
-      sxx += d.x() * d.x();
-      sxy += d.x() * d.y();
-      syy += d.y() * d.y();
+    if (end - begin >= 3) groups.push_back({i, begin, end});
+  }
+  const std::size_t fitted = groups.size();
+  // The last ones are fitted once more where they do not fill what is done at a
+  // time.
+  while (groups.size() % kAtOnce != 0) groups.push_back(groups.back());
+  for (std::size_t g = 0; g < groups.size(); g += kAtOnce) {
+    std::array<Neighbours, kAtOnce> together;
+    std::copy_n(groups.begin() + static_cast<std::ptrdiff_t>(g), kAtOnce,
+                together.begin());
+    const std::array<Scatter, kAtOnce> scatters =
+        ScattersOf(positions, together);
+    for (std::size_t w = 0; w < kAtOnce && g + w < fitted; ++w) {
+      ScanPoint& point = (*points)[static_cast<std::size_t>(together[w].point)];
+      const int count = together[w].count();
+      const Scatter& scatter = scatters[w];
+      const PrincipalAxis axis =
+          PrincipalAxisOf(scatter.xx, scatter.xy, scatter.yy);
+      const double across = axis.across / count;
+      const double along = axis.along / count;
+      if (across > options.normal_tolerance * options.normal_tolerance ||
+          across > 0.1 * along) {
+        continue;
+      }
+      Eigen::Vector2d normal(-axis.direction.y(), axis.direction.x());
+      if (normal.dot(laser - point.position) < 0.0) normal = -normal;
+      point.normal = normal;
     }
-    const PrincipalAxis axis = PrincipalAxisOf(sxx, sxy, syy);
-    const double across = axis.across / count;
-    const double along = axis.along / count;
-    if (across > options.normal_tolerance * options.normal_tolerance ||
-        across > 0.1 * along) {
-      continue;
-    }
-    Eigen::Vector2d normal(-axis.direction.y(), axis.direction.x());
-    if (normal.dot(laser - point.position) < 0.0) normal = -normal;
-    point.normal = normal;
   }
 }
 

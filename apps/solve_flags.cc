@@ -577,6 +577,7 @@ OccupancyOptions OccupancyOptionsFromFlags() {
   OccupancyOptions options;
   options.resolution = FLAGS_grid_resolution;
   options.usable_range = FLAGS_usable_range;
+  options.num_threads = NumThreadsFromFlags();
   return options;
 }
 

@@ -499,6 +499,32 @@ double ScanMatcher::Overlap(const std::vector<ScanPoint>& scan,
   return tried > 0 ? static_cast<double>(found) / tried : 0.0;
 }
 
+bool ScanMatcher::OverlapsBy(double least, const std::vector<ScanPoint>& scan,
+                             const Pose2& pose) const {
+  const auto tried = std::count_if(
+      scan.begin(), scan.end(),
+      [](const ScanPoint& point) { return point.normal.squaredNorm() > 0.0; });
+  if (tried == 0) return 0.0 >= least;
+  const auto is_enough = [&](std::ptrdiff_t found) {
+    return static_cast<double>(found) / static_cast<double>(tried) >= least;
+  };
+  if (is_enough(0)) return true;
+  const PoseTransform transform(pose);
+  std::ptrdiff_t found = 0;
+  std::ptrdiff_t left = tried;
+  int neighbour = -1;
+  for (const ScanPoint& point : scan) {
+    if (point.normal.squaredNorm() == 0.0) continue;
+    --left;
+    neighbour = AnyReference(transform.Point(point.position),
+                             transform.Direction(point.normal),
+                             options_.initial_radius, neighbour);
+    if (neighbour >= 0 && is_enough(++found)) return true;
+    if (neighbour < 0 && !is_enough(found + left)) return false;
+  }
+  return false;
+}
+
 void ScanMatcher::BuildField() const {
   const double resolution = options_.grid_resolution;
   field_columns_ =

@@ -151,6 +151,9 @@ class ScanMatcher {
   /// initial radius at this pose: what Refine would start from, at a fraction
   /// of its cost. 0 without such returns.
   double Overlap(const std::vector<ScanPoint>& scan, const Pose2& pose) const;
+  /// Whether that is at least so much: known before all points are looked at.
+  bool OverlapsBy(double least, const std::vector<ScanPoint>& scan,
+                  const Pose2& pose) const;
 
   /// The poses at which points fit the reference best, each at least
   /// `kPeakDistance` or `kPeakRotation` from the others, best first: all within

@@ -240,8 +240,8 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
       ++tried[i];
       Attempt attempt;
       attempt.pose = here.pose;
-      if (!matcher.empty() &&
-          matcher.Overlap(places_[k].scan, here.pose) >= options_.min_overlap) {
+      if (!matcher.empty() && matcher.OverlapsBy(options_.min_overlap,
+                                                 places_[k].scan, here.pose)) {
         const MatchResult match =
             matcher.Refine(places_[k].scan, here.pose, here);
         if (match.inlier_ratio >= options_.min_inlier_ratio) {

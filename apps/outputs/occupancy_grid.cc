@@ -1,6 +1,7 @@
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/number_text.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/outputs/occupancy_grid.h>
 #include <plumbline/outputs/reachable_space.h>
 
@@ -9,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <utility>
 
 namespace plumbline {
 namespace {
@@ -26,6 +28,8 @@ constexpr double kBehindFree = 0.3;
 constexpr double kLeastGap = 0.2;
 constexpr double kSlanted = 1.5;
 constexpr double kMostSpacing = 1e6;
+// Cells of the grids that are filled side by side, all together.
+constexpr double kMostCellsAtOnce = 3e7;
 
 std::string Number(double value) {
   std::string text;
@@ -213,6 +217,28 @@ void OccupancyGrid::AddScan(const Scan& scan, const Pose2& pose) {
   }
 }
 
+void OccupancyGrid::Merge(OccupancyGrid other) {
+  for (std::size_t i = 0; i < tiles_.size(); ++i) {
+    std::unique_ptr<Tile>& own = tiles_[i];
+    const std::unique_ptr<Tile>& added = other.tiles_[i];
+    if (added == nullptr) continue;
+    if (own == nullptr) {
+      own = std::move(other.tiles_[i]);
+      continue;
+    }
+    for (std::size_t k = 0; k < own->cells.size(); ++k) {
+      Cell& cell = own->cells[k];
+      cell.hits = static_cast<std::uint16_t>(cell.hits + added->cells[k].hits);
+      cell.misses =
+          static_cast<std::uint16_t>(cell.misses + added->cells[k].misses);
+    }
+    own->spacing = std::min(own->spacing, added->spacing);
+  }
+  for (const std::pair<int, int>& start : other.starts_) {
+    if (starts_.empty() || starts_.back() != start) starts_.push_back(start);
+  }
+}
+
 inline std::uint8_t OccupancyGrid::Shade(const Cell& cell) const {
   const int seen = cell.hits + cell.misses;
   if (seen == 0) return kUnknown;
@@ -293,18 +319,30 @@ void OccupancyGrid::ForgetUnreachable() {
   }
 }
 
-OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
-                                const std::vector<Pose2>& poses,
-                                const OccupancyOptions& options) {
-  if (scans.size() < poses.size()) {
-    throw PLUMBLINE_ERROR(std::to_string(poses.size()) + " poses for " +
-                              std::to_string(scans.size()) + " scans",
-                          "one scan per pose");
-  }
+namespace {
+
+// What a grid has to hold.
+struct Corners {
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;
+
+  void Add(const Vector2d& point) {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  void Add(const Corners& other) {
+    low = low.cwiseMin(other.low);
+    high = high.cwiseMax(other.high);
+  }
+};
+
+// Of the scans [begin, end).
+Corners CornersOf(const std::vector<Scan>& scans,
+                  const std::vector<Pose2>& poses, std::size_t begin,
+                  std::size_t end, const OccupancyOptions& options) {
+  Corners corners;
   BeamDirections directions;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
+  for (std::size_t i = begin; i < end; ++i) {
     const Scan& scan = scans[i];
     const std::vector<Vector2d>& beams = directions.Of(scan);
     const Pose2 laser = Compose(poses[i], scan.laser_offset);
@@ -315,22 +353,60 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
       if (!(scan.ranges[j] >= options.minimum_range)) continue;
       const double range =
           std::min<double>(scan.ranges[j], options.usable_range);
-      const Vector2d end(
-          laser[0] + range * (c * beams[j][0] - s * beams[j][1]),
-          laser[1] + range * (s * beams[j][0] + c * beams[j][1]));
-      low = low.cwiseMin(end);
-      high = high.cwiseMax(end);
+      corners.Add(
+          Vector2d(laser[0] + range * (c * beams[j][0] - s * beams[j][1]),
+                   laser[1] + range * (s * beams[j][0] + c * beams[j][1])));
     }
-    low = low.cwiseMin(laser.head<2>());
-    high = high.cwiseMax(laser.head<2>());
+    corners.Add(Vector2d(laser.head<2>()));
   }
-  OccupancyGrid grid(low, high, options);
+  return corners;
+}
+
+}  // namespace
+
+OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
+                                const std::vector<Pose2>& poses,
+                                const OccupancyOptions& options) {
+  if (scans.size() < poses.size()) {
+    throw PLUMBLINE_ERROR(std::to_string(poses.size()) + " poses for " +
+                              std::to_string(scans.size()) + " scans",
+                          "one scan per pose");
+  }
+  const auto threads =
+      static_cast<std::size_t>(std::max(1, options.num_threads));
+  const auto begin_of = [threads](std::size_t count, std::size_t part) {
+    return count * part / threads;
+  };
+  std::vector<Corners> corners(threads);
+  ParallelFor(threads, options.num_threads, [&](std::size_t part) {
+    corners[part] = CornersOf(scans, poses, begin_of(poses.size(), part),
+                              begin_of(poses.size(), part + 1), options);
+  });
+  for (const Corners& other : corners) corners[0].Add(other);
+  OccupancyGrid grid(corners[0].low, corners[0].high, options);
   const std::size_t step =
       options.max_scans == 0
           ? 1
           : (poses.size() + options.max_scans - 1) / options.max_scans;
-  for (std::size_t i = 0; i < poses.size(); i += step) {
-    grid.AddScan(scans[i], poses[i]);
+  const std::size_t count = (poses.size() + step - 1) / step;
+  const double cells = 1.0 * grid.width() * grid.height();
+  if (threads == 1 || count >= OccupancyGrid::kMostScansCounted ||
+      cells * static_cast<double>(threads) > kMostCellsAtOnce) {
+    for (std::size_t i = 0; i < poses.size(); i += step) {
+      grid.AddScan(scans[i], poses[i]);
+    }
+  } else {
+    std::vector<OccupancyGrid> grids;
+    for (std::size_t part = 0; part < threads; ++part) {
+      grids.emplace_back(corners[0].low, corners[0].high, options);
+    }
+    ParallelFor(threads, options.num_threads, [&](std::size_t part) {
+      for (std::size_t i = begin_of(count, part); i < begin_of(count, part + 1);
+           ++i) {
+        grids[part].AddScan(scans[i * step], poses[i * step]);
+      }
+    });
+    for (OccupancyGrid& other : grids) grid.Merge(std::move(other));
   }
   grid.ForgetUnreachable();
   return grid;

@@ -42,6 +42,9 @@ struct OccupancyOptions {
   std::size_t max_scans = 0;
   /// Most cells that the grid may have (width times height).
   std::int64_t max_cells = 100'000'000;
+  /// Threads that cast rays, with memory for a grid each; the grid does not
+  /// depend on their number.
+  int num_threads = 1;
 };
 
 /// A grid of what is free, occupied and unknown, from the rays of laser scans.
@@ -65,6 +68,14 @@ class OccupancyGrid {
   /// through. Readings without return are passed over: a laser also sees none
   /// on glass and on black things. What lies outside of the grid is left out.
   void AddScan(const Scan& scan, const Pose2& pose);
+
+  /// Takes in what later scans have added to another grid of the same corners
+  /// and options: as if they had been added here, as long as both together are
+  /// fewer than kMostScansCounted.
+  void Merge(OccupancyGrid other);
+  /// Counters of cells hold so many scans; from there on shares are kept.
+  static constexpr std::size_t kMostScansCounted =
+      std::numeric_limits<std::uint16_t>::max();
 
   /// Makes unknown what was seen of places that the robot cannot reach from
   /// where the scans were taken, as wide as OccupancyOptions::least_passage

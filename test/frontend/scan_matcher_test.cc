@@ -423,6 +423,12 @@ TEST(ScanMatcherTest, OverlapByTryingEveryReferencePoint) {
                            });
     }
     EXPECT_DOUBLE_EQ(matcher.Overlap(scan, pose), found / 100.0) << round;
+    for (const double least :
+         {0.0, found / 100.0 - 1e-9, found / 100.0 + 1e-9, 0.4, 1.0}) {
+      EXPECT_EQ(matcher.OverlapsBy(least, scan, pose),
+                matcher.Overlap(scan, pose) >= least)
+          << round << ' ' << least;
+    }
   }
 }
 

@@ -248,6 +248,43 @@ TEST(OccupancyGridTest, CountersDoNotRunOver) {
   EXPECT_EQ(Picture(grid), "..# \n");
 }
 
+TEST(OccupancyGridTest, ThreadsMakeTheSameGrid) {
+  // A robot that goes to and fro in a room, with a pillar that it looks past.
+  std::vector<Scan> scans;
+  std::vector<Pose2> poses;
+  for (int i = 0; i < 41; ++i) {
+    Scan scan;
+    scan.start_angle = -kPi;
+    scan.angle_step = DegToRad(2.0);
+    for (int beam = 0; beam < 180; ++beam) {
+      scan.ranges.push_back(
+          static_cast<float>(2.0 + 0.02 * ((beam * 7 + i * 13) % 50)));
+    }
+    scans.push_back(scan);
+    // Stands still where a thread's share ends.
+    poses.push_back({0.1 * std::abs(20 - std::min(i, 19)), 0.01 * i, 0.1 * i});
+  }
+  const OccupancyGrid expected = MakeOccupancyGrid(scans, poses, {});
+  for (const int threads : {2, 3, 5}) {
+    OccupancyOptions options;
+    options.num_threads = threads;
+    const OccupancyGrid grid = MakeOccupancyGrid(scans, poses, options);
+    ASSERT_EQ(grid.width(), expected.width());
+    ASSERT_EQ(grid.height(), expected.height());
+    EXPECT_EQ(grid.origin(), expected.origin());
+    std::string row, expected_row;
+    bool is_free = false;
+    for (int i = 0; i < grid.height(); ++i) {
+      grid.Row(i, &row);
+      expected.Row(i, &expected_row);
+      ASSERT_EQ(row, expected_row) << threads << ' ' << i;
+      is_free = is_free || row.find(static_cast<char>(OccupancyGrid::kFree)) !=
+                               std::string::npos;
+    }
+    EXPECT_TRUE(is_free);
+  }
+}
+
 TEST(OccupancyGridTest, WhatLiesOutsideIsLeftOut) {
   OccupancyGrid grid(Vector2d(0, 0), Vector2d(3.5, 0.5), Coarse());
   grid.AddScan(MakeScan(0.0, 180.0, {40.0f, 40.0f}), Pose2(1.5, 0.5, 0.0));

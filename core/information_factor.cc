@@ -141,32 +141,37 @@ InformationFactor::InverseOnPattern InformationFactor::InvertOnPattern() const {
   inverse.diagonal.resize(size_);
   // Of the column at hand: L by row, and what the entries of the inverse add
   // up to.
-  std::vector<double> l(static_cast<std::size_t>(size_), 0.0);
-  std::vector<bool> is_in(static_cast<std::size_t>(size_), false);
-  std::vector<double> sum(static_cast<std::size_t>(size_), 0.0);
+  struct OfRow {
+    double l = 0.0;
+    double sum = 0.0;
+    // Whether the column has this row.
+    bool is_in = false;
+  };
+  std::vector<OfRow> column(static_cast<std::size_t>(size_));
   for (int j = size_ - 1; j >= 0; --j) {
     for (int p = starts[j]; p < starts[j + 1]; ++p) {
-      l[rows[p]] = values[p];
-      is_in[rows[p]] = true;
-      sum[rows[p]] = 0.0;
+      column[static_cast<std::size_t>(rows[p])] = {values[p], 0.0, true};
     }
     for (int p = starts[j]; p < starts[j + 1]; ++p) {
       const int k = rows[p];
-      sum[k] += inverse.diagonal[k] * l[k];
+      OfRow& own = column[static_cast<std::size_t>(k)];
+      double sum = own.sum + inverse.diagonal[k] * own.l;
       for (int q = starts[k]; q < starts[k + 1]; ++q) {
-        const int i = rows[q];
-        if (!is_in[i]) continue;
+        OfRow& other = column[static_cast<std::size_t>(rows[q])];
+        if (!other.is_in) continue;
         const double z = inverse.below[static_cast<std::size_t>(q)];
-        sum[i] += z * l[k];
-        sum[k] += z * l[i];
+        other.sum += z * own.l;
+        sum += z * other.l;
       }
+      own.sum = sum;
     }
     double z_jj = 1.0 / pivots[j];
     for (int p = starts[j]; p < starts[j + 1]; ++p) {
-      const double z = -sum[rows[p]];
+      OfRow& own = column[static_cast<std::size_t>(rows[p])];
+      const double z = -own.sum;
       inverse.below[static_cast<std::size_t>(p)] = z;
       z_jj -= values[p] * z;
-      is_in[rows[p]] = false;
+      own.is_in = false;
     }
     inverse.diagonal[j] = z_jj;
   }

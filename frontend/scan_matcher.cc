@@ -117,28 +117,30 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
   bucket_rows_ = 0;
   field_valid_ = false;
   if (points.empty()) return;
-  // The grids reach so far around the middle of the points: one wild return
-  // cannot blow them up.
-  std::vector<double> xs, ys;
-  xs.reserve(points.size());
-  ys.reserve(points.size());
-  for (const ScanPoint& point : points) {
-    xs.push_back(point.position.x());
-    ys.push_back(point.position.y());
-  }
-  const auto middle = static_cast<std::ptrdiff_t>(points.size() / 2);
-  std::nth_element(xs.begin(), xs.begin() + middle, xs.end());
-  std::nth_element(ys.begin(), ys.begin() + middle, ys.end());
-  const Eigen::Vector2d center(xs[middle], ys[middle]);
-  const Eigen::Vector2d reach = Eigen::Vector2d::Constant(kReferenceReach);
-  Eigen::Vector2d minimum = center;
-  Eigen::Vector2d maximum = center;
+  Eigen::Vector2d minimum = points[0].position;
+  Eigen::Vector2d maximum = minimum;
   for (const ScanPoint& point : points) {
     minimum = minimum.cwiseMin(point.position);
     maximum = maximum.cwiseMax(point.position);
   }
-  minimum = minimum.cwiseMax(center - reach);
-  maximum = maximum.cwiseMin(center + reach);
+  // The grids reach so far around the middle of the points: one wild return
+  // cannot blow them up. Wherever it is, it reaches all of what is not larger.
+  if (!((maximum - minimum).maxCoeff() < kReferenceReach - kRounding)) {
+    std::vector<double> xs, ys;
+    xs.reserve(points.size());
+    ys.reserve(points.size());
+    for (const ScanPoint& point : points) {
+      xs.push_back(point.position.x());
+      ys.push_back(point.position.y());
+    }
+    const auto middle = static_cast<std::ptrdiff_t>(points.size() / 2);
+    std::nth_element(xs.begin(), xs.begin() + middle, xs.end());
+    std::nth_element(ys.begin(), ys.begin() + middle, ys.end());
+    const Eigen::Vector2d center(xs[middle], ys[middle]);
+    const Eigen::Vector2d reach = Eigen::Vector2d::Constant(kReferenceReach);
+    minimum = minimum.cwiseMax(center - reach);
+    maximum = maximum.cwiseMin(center + reach);
+  }
   const double margin = 1.0;
   origin_ = minimum.array() - margin;
   const Eigen::Vector2d size = (maximum - minimum).array() + 2.0 * margin;
@@ -148,6 +150,12 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
       static_cast<std::size_t>(bucket_columns_) * bucket_rows_;
   bucket_begin_.assign(cells + 1, 0);
   std::vector<int> cell_of(points.size(), -1);
+  // Of each row the columns with points: from the first to before the end.
+  struct Columns {
+    int begin = std::numeric_limits<int>::max();
+    int end = 0;
+  };
+  std::vector<Columns> columns_of(static_cast<std::size_t>(bucket_rows_));
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2d local = (points[i].position - origin_) / bucket_size_;
     if (!(local.x() >= 0.0 && local.y() >= 0.0 && local.x() < bucket_columns_ &&
@@ -158,9 +166,27 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
     const int row = static_cast<int>(local.y());
     cell_of[i] = row * bucket_columns_ + column;
     ++bucket_begin_[cell_of[i] + 1];
+    Columns& columns = columns_of[static_cast<std::size_t>(row)];
+    columns.begin = std::min(columns.begin, column);
+    columns.end = std::max(columns.end, column + 1);
   }
-  for (std::size_t c = 0; c < cells; ++c) {
-    bucket_begin_[c + 1] += bucket_begin_[c];
+  // Most cells are empty, and filled faster than they are added up.
+  int before = 0;
+  auto next_row = bucket_begin_.begin() + 1;
+  for (const Columns& columns : columns_of) {
+    const auto first = next_row;
+    next_row += bucket_columns_;
+    if (columns.end == 0) {
+      std::fill(first, next_row, before);
+      continue;
+    }
+    std::fill(first, first + columns.begin, before);
+    for (auto cell = first + columns.begin; cell != first + columns.end;
+         ++cell) {
+      *cell += before;
+      before = *cell;
+    }
+    std::fill(first + columns.end, next_row, before);
   }
   reference_.resize(bucket_begin_[cells]);
   std::vector<int> next(bucket_begin_.begin(), bucket_begin_.end() - 1);

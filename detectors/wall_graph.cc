@@ -100,7 +100,8 @@ std::map<int, int> WallGraph::Within(int wall, int depth) const {
     std::vector<int> next;
     for (const int i : frontier) {
       for (const auto& link : links_[i]) {
-        if (distance.emplace(link.first, d).second) next.push_back(link.first);
+        if (distance.try_emplace(link.first, d).second)
+          next.push_back(link.first);
       }
     }
     frontier = std::move(next);

@@ -94,7 +94,7 @@ std::vector<FeatureId> RobotLinks::Neighborhood(int depth) const {
         if (constraint.kind != ConstraintClass::kMeasurement) continue;
         for (FeatureId other : constraint.features) {
           if (other == id_) continue;
-          if (distance.emplace(other, d).second) next.push_back(other);
+          if (distance.try_emplace(other, d).second) next.push_back(other);
         }
       }
     }

@@ -241,6 +241,7 @@ class HypothesisDrawer {
         last_count = current.inliers.size();
       }
       if (!Extend(&current)) break;
+      SortOut(&current);
       current.significance = CurveSignificance(points_, current, nullptr);
       if (current.significance >= -points_.options().max_log_false_alarms &&
           current.significance > best->significance) {
@@ -251,7 +252,8 @@ class HypothesisDrawer {
   }
 
   // Replaces the inliers by the largest connected set of free points within the
-  // tolerance that has one of them. False when it is too small.
+  // tolerance that has one of them, and the bystanders by all points beside it.
+  // False when it is too small.
   bool Extend(CurveHypothesis* hypothesis) {
     const PlanarCurve& curve = hypothesis->curve;
     const double tolerance = hypothesis->tolerance;
@@ -314,15 +316,12 @@ class HypothesisDrawer {
     }
     if (curve.kind == CurveKind::kLine) {
       points_.CutAtGaps(curve, &hypothesis->inliers);
-    };
-    if (hypothesis->inliers.size() < points_.MinPoints(curve.kind))
-      return false;
-    SortOut(hypothesis);
-    return true;
+    }
+    return hypothesis->inliers.size() >= points_.MinPoints(curve.kind);
   }
 
-  // Tells bystanders from strangers. Points beyond the ends of a line say
-  // nothing about it.
+  // Tells bystanders from strangers, which only the significance asks for.
+  // Points beyond the ends of a line say nothing about it.
   void SortOut(CurveHypothesis* hypothesis) {
     const PlanarCurve& curve = hypothesis->curve;
     const CurveRuler ruler(curve);

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -379,10 +380,12 @@ class Completion {
                  const std::vector<Pose2>& poses,
                  const std::vector<std::size_t>& half_way) {
     for (std::size_t k = 0; k + 2 < half_way.size(); ++k) {
-      Look(scans, poses, half_way[k], half_way[k + 2], {1.0});
+      Look(scans, poses, half_way[k], half_way[k + 2], options_.near_range,
+           {1.0});
     }
     // Then all together, also what scans from poses less exact have smeared.
-    Look(scans, poses, 0, half_way.back(), {1.0, 2.0});
+    Look(scans, poses, 0, half_way.back(),
+         std::numeric_limits<double>::infinity(), {1.0, 2.0});
   }
 
   // Share of the returns in reach that walls explain.
@@ -392,8 +395,9 @@ class Completion {
     double explained = 0.0;
     double all = 0.0;
     for (std::size_t i = 0; i + 1 < first_word_.size() && !IsStopped(); ++i) {
-      FindUnexplained(scans[i], poses[i], is_done_.data() + first_word_[i],
-                      &unexplained);
+      FindUnexplained(scans[i], poses[i],
+                      std::numeric_limits<double>::infinity(),
+                      is_done_.data() + first_word_[i], &unexplained);
       const auto in_reach = static_cast<double>(std::count_if(
           scans[i].ranges.begin(), scans[i].ranges.end(), [this](float range) {
             return range >= options_.points.minimum_range &&
@@ -405,10 +409,11 @@ class Completion {
     return all > 0.0 ? explained / all : 1.0;
   }
 
+  // At returns up to `reach`, m.
   void Look(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
-            std::size_t begin, std::size_t end,
+            std::size_t begin, std::size_t end, double reach,
             std::initializer_list<double> smears) {
-    Gather(scans, poses, begin, end);
+    Gather(scans, poses, begin, end, reach);
     returns_.Finish(stray_share_);
     const std::vector<ReturnCells::Cell>& cells = returns_.cells();
     // The straightest surroundings first; ties by the order of scans.
@@ -482,13 +487,13 @@ class Completion {
 
   // Sorts the returns that no wall explains into cells.
   void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
-              std::size_t begin, std::size_t end) {
+              std::size_t begin, std::size_t end, double reach) {
     returns_.Clear();
     std::vector<std::vector<Return>> unexplained(kScansAtOnce);
     for (std::size_t i = begin; i < end && !IsStopped(); i += kScansAtOnce) {
       const std::size_t count = std::min(kScansAtOnce, end - i);
       ParallelFor(count, options_.num_threads, [&](std::size_t k) {
-        FindUnexplained(scans[i + k], poses[i + k],
+        FindUnexplained(scans[i + k], poses[i + k], reach,
                         is_done_.data() + first_word_[i + k], &unexplained[k]);
       });
       for (std::size_t k = 0; k < count; ++k) {
@@ -505,9 +510,9 @@ class Completion {
     Eigen::Vector2d ray;
   };
 
-  // Those of a scan, at this pose. Explained once is explained for good, as
-  // walls only come.
-  void FindUnexplained(const Scan& scan, const Pose2& pose,
+  // Those of a scan up to `reach`, at this pose. Explained once is explained
+  // for good, as walls only come.
+  void FindUnexplained(const Scan& scan, const Pose2& pose, double reach,
                        std::uint64_t* is_done,
                        std::vector<Return>* unexplained) const {
     unexplained->clear();
@@ -523,6 +528,7 @@ class Completion {
         word |= bit;
         continue;
       }
+      if (range > reach) continue;
       const double angle =
           scan.bearings.empty()
               ? laser[2] + scan.start_angle + beam * scan.angle_step

@@ -613,9 +613,12 @@ void MeasureLines(const SpaceGrid& space, const DoorOptions& options,
     crossings[i] = WallCrossings(*drawn, shut, i);
   }
   for (std::size_t i = 0; i < drawn->size(); ++i) {
-    DropSpecks(crossings[i].all, &(*drawn)[i].profile);
-    Weigh(options, (*drawn)[i].line.is_wall, crossings[i],
-          &(*drawn)[i].profile);
+    WallProfile& profile = (*drawn)[i].profile;
+    DropSpecks(crossings[i].all, &profile);
+    for (const Mark mark : profile.marks) {
+      profile.is_seen_open.push_back(mark == Mark::kOpen);
+    }
+    Weigh(options, (*drawn)[i].line.is_wall, crossings[i], &profile);
   }
 }
 

@@ -26,6 +26,8 @@ struct WallProfile {
   std::vector<double> holds;
   /// Samples that lie in a row of occupied cells along the line.
   std::vector<bool> in_row;
+  /// Samples that were seen to be open; of a door the leaf may hide others.
+  std::vector<bool> is_seen_open;
 
   /// Number of samples.
   int size() const { return static_cast<int>(marks.size()); }

@@ -3,6 +3,7 @@
 #include <plumbline/plan/sides.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <utility>
@@ -20,16 +21,46 @@ constexpr double kLongestBetween = 2.0;
 constexpr double kLeastBetween = 0.3;
 // A way out is as wide as this, m, or the robot drove through it: beside a
 // cupboard may be a crack.
-constexpr double kLeastWayOut = 0.7;
+constexpr double kLeastWayOut = 0.8;
 // What is smaller is no room that a way could lead to, m^2.
 constexpr double kLeastRoom = 2.0;
+
+// Of two lines in one row by its cosine, and m across.
+constexpr double kSameRowCosine = 0.996;
+constexpr double kSameRow = 0.3;
+
+// An opening between two regions.
+struct Gap {
+  Vector2d begin, end;
+};
 
 // What leads from one region to another.
 struct Ways {
   double widest = 0.0;
-  // Two gaps lie near to each other on one line.
+  // Two gaps lie near to each other in one row.
   bool has_row = false;
+  std::vector<Gap> gaps;
 };
+
+// Whether two gaps lie in one row, with a piece of furniture between them. What
+// stands in a row may lie on two lines beside each other.
+bool AreInRow(const Gap& a, const Gap& b) {
+  const Vector2d along = (a.end - a.begin).normalized();
+  const Vector2d other = (b.end - b.begin).normalized();
+  const Vector2d across(-along[1], along[0]);
+  if (std::abs(along.dot(other)) < kSameRowCosine ||
+      std::abs(across.dot(0.5 * (b.begin + b.end - a.begin - a.end))) >
+          kSameRow) {
+    return false;
+  }
+  const auto ends = [&](const Gap& gap) {
+    return std::minmax({along.dot(gap.begin), along.dot(gap.end)});
+  };
+  const auto [a_from, a_to] = ends(a);
+  const auto [b_from, b_to] = ends(b);
+  const double between = std::max(b_from - a_to, a_from - b_to);
+  return between >= kLeastBetween && between <= kLongestBetween;
+}
 
 // By line, which of its samples the robot drove across.
 std::vector<std::vector<bool>> DrivenAcross(const std::vector<DrawnLine>& drawn,
@@ -72,29 +103,32 @@ std::map<int, std::map<int, Ways>> WaysBetween(
     const auto is_open = [&](int i) {
       return profile.At(i) == Mark::kOpen || profile.At(i) == Mark::kDoor;
     };
-    int end_of_last = -1;
-    std::pair<int, int> last;
     for (int i = 0; i < profile.size();) {
       const std::pair<int, int> pair = pair_at(i);
-      if (pair != last) end_of_last = -1;
-      last = pair;
       int j = i;
+      int seen = 0;
       bool is_driven = false;
       for (; j < profile.size() && is_open(j) && pair_at(j) == pair; ++j) {
+        seen += profile.is_seen_open[static_cast<std::size_t>(j)];
         is_driven = is_driven || driven[line][static_cast<std::size_t>(j)];
       }
       const double width = (j - i) * WallProfile::kStep;
       if (pair.first >= 0 && width >= kLeastGap) {
-        const double between = (i - end_of_last) * WallProfile::kStep;
-        const bool is_row = end_of_last >= 0 && between >= kLeastBetween &&
-                            between <= kLongestBetween;
+        const WallLine& on = drawn[line].line;
+        const Gap gap{on.At(profile.begin + i * WallProfile::kStep),
+                      on.At(profile.begin + j * WallProfile::kStep)};
         for (const auto& [from, to] :
              {pair, std::make_pair(pair.second, pair.first)}) {
           Ways& way = ways[from][to];
-          way.widest = std::max(way.widest, is_driven ? kLeastWayOut : width);
-          way.has_row = way.has_row || is_row;
+          way.widest = std::max(
+              way.widest, is_driven ? kLeastWayOut : seen * WallProfile::kStep);
+          way.has_row =
+              way.has_row || std::any_of(way.gaps.begin(), way.gaps.end(),
+                                         [&](const Gap& other) {
+                                           return AreInRow(other, gap);
+                                         });
+          way.gaps.push_back(gap);
         }
-        end_of_last = j;
       }
       i = std::max(j, i + 1);
     }

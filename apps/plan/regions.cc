@@ -16,7 +16,7 @@ namespace {
 using Eigen::Vector2d;
 
 // Space that was not seen is filled up to this, m^2.
-constexpr double kMaxPocket = 4.0;
+constexpr double kMaxPocket = 5.0;
 // Share of a pocket's border that a room must have, and that may lie open to
 // what is no room.
 constexpr double kLeastPocketBorder = 0.2;

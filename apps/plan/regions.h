@@ -29,7 +29,7 @@ struct RegionOptions {
   double min_area = 2.0;
   double min_width = 0.8;
   /// The same goes for unseen spaces behind furniture narrower than this, m.
-  double pocket_width = 0.9;
+  double pocket_width = 1.2;
 };
 
 /// The region of each face of an arrangement: the number of one of its faces;

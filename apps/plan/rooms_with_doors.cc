@@ -46,8 +46,11 @@ std::vector<int> LinesBetweenRoomsWithDoors(const Arrangement& arrangement,
           const std::set<int>& a = behind_doors[entry.first.first];
           const std::set<int>& b = behind_doors[entry.first.second];
           return entry.second >= kLeastBetween &&
-                 std::any_of(a.begin(), a.end(),
-                             [&](int third) { return b.count(third) > 0; });
+                 std::any_of(a.begin(), a.end(), [&](int third) {
+                   return b.count(third) > 0 &&
+                          behind_doors[third].size() >=
+                              std::max(a.size(), b.size());
+                 });
         });
     if (is_between) lines.push_back(line);
   }

@@ -47,6 +47,9 @@ Arrangement Stack(const std::vector<double>& heights) {
 
 TEST(RegionsTest, NarrowSpaceBehindFurnitureBelongsToItsRoom) {
   EXPECT_EQ(FindRegions(Stack({3.0, 0.7})), (std::vector<int>{0, 0}));
+  // A desk with its cupboard, from wall to wall.
+  EXPECT_EQ(FindRegions(Stack({3.0, 1.1})), (std::vector<int>{0, 0}));
+  EXPECT_EQ(FindRegions(Stack({3.0, 1.3})), (std::vector<int>{0, -1}));
 }
 
 // Nothing is known between the two upper faces: they are one space, and that is

@@ -21,6 +21,8 @@ constexpr double kMaxPocket = 5.0;
 // what is no room.
 constexpr double kLeastPocketBorder = 0.2;
 constexpr double kMaxExposed = 0.2;
+// So much wall of a room on a line goes on behind furniture, m.
+constexpr double kGoesOn = 0.5;
 // What was seen of a space, m^2, and the share of doors on its border from
 // which on it lies behind a door.
 constexpr double kSeenThroughDoor = 1.0;
@@ -524,6 +526,13 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
   }
 }
 
+// What lies between a pocket and what is no room without a wall, m.
+struct Exposure {
+  double all = 0.0;
+  // What was not seen of it, by line.
+  std::map<int, double> unseen;
+};
+
 // What is too small for a room goes to the neighbor from which least keeps it
 // apart: space in front of and behind furniture, seen or not.
 void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
@@ -559,27 +568,44 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
     // Borders of pockets with rooms.
     std::map<std::pair<int, int>, BorderLengths> borders;
     std::map<int, double> around;
-    std::map<int, double> exposed;
+    std::map<int, Exposure> exposed;
+    // Wall around each room, by line.
+    std::map<std::pair<int, int>, double> walls;
+    const auto pocket_of = [&](int face) {
+      return face < 0 ? -1 : pocket[static_cast<std::size_t>(face)];
+    };
+    const auto region_of = [&](int face) {
+      return face < 0 ? -1 : (*region)[static_cast<std::size_t>(face)];
+    };
     for (const ArrangementEdge& edge : arrangement.edges) {
       for (const auto& [a, b] : {std::make_pair(edge.left, edge.right),
                                  std::make_pair(edge.right, edge.left)}) {
-        if (a < 0) continue;
-        const int from = pocket[static_cast<std::size_t>(a)];
-        if (from < 0) continue;
-        if (b >= 0 && pocket[static_cast<std::size_t>(b)] == from) continue;
-        around[from] += edge.length();
-        if (b < 0 || (pocket[static_cast<std::size_t>(b)] < 0 &&
-                      (*region)[static_cast<std::size_t>(b)] < 0)) {
-          exposed[from] +=
-              std::max(0.0, edge.length() - std::max(0.0, edge.lengths.holds));
-        }
-        if (b < 0 || pocket[static_cast<std::size_t>(b)] >= 0 ||
-            (*region)[static_cast<std::size_t>(b)] < 0) {
+        const int from = pocket_of(a);
+        const int other = pocket_of(b);
+        const int room = region_of(b);
+        if (from < 0) {
+          if (region_of(a) >= 0 && region_of(a) != room) {
+            walls[{region_of(a), edge.line}] += edge.lengths.Of(Mark::kWall);
+          }
           continue;
         }
-        borders[{from, (*region)[static_cast<std::size_t>(b)]}].Add(
-            edge.lengths);
+        if (other == from) continue;
+        around[from] += edge.length();
+        if (other < 0 && room < 0) {
+          const double open =
+              std::max(0.0, edge.length() - std::max(0.0, edge.lengths.holds));
+          exposed[from].all += open;
+          exposed[from].unseen[edge.line] +=
+              std::min(open, edge.lengths.Of(Mark::kUnknown));
+        }
+        if (other < 0 && room >= 0) borders[{from, room}].Add(edge.lengths);
       }
+    }
+    // Rooms that a pocket has a door to: of two it is the way from one to the
+    // other.
+    std::map<int, int> doors;
+    for (const auto& [pair, border] : borders) {
+      doors[pair.first] += border.Of(Mark::kDoor) >= kLeastOpening;
     }
     double best = 0.0;
     std::pair<int, int> which(-1, -1);
@@ -588,12 +614,20 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
       const double length = border.length();
       if (length < kLeastPocketBorder * around[pair.first]) continue;
       // A room of which little was seen through its door is no niche.
-      if (seen[pair.first] >= kSeenThroughDoor &&
+      if (seen[pair.first] >= kSeenThroughDoor && doors[pair.first] < 2 &&
           border.Of(Mark::kDoor) > kDoorBorder * length) {
         continue;
       }
-      // Space beyond a wall is no part of what lies before it.
-      if (exposed[pair.first] > kMaxExposed * around[pair.first]) continue;
+      // Space beyond a wall is no part of what lies before it. Behind furniture
+      // the walls of the room go on.
+      double open = exposed[pair.first].all;
+      for (const auto& [line, unseen] : exposed[pair.first].unseen) {
+        const auto wall = walls.find({pair.second, line});
+        if (line >= 0 && wall != walls.end() && wall->second >= kGoesOn) {
+          open -= unseen;
+        }
+      }
+      if (open > kMaxExposed * around[pair.first]) continue;
       const double score = (2.0 * length - border.holds) / around[pair.first];
       if (score > best) {
         best = score;

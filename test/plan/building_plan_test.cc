@@ -131,8 +131,6 @@ TEST(BuildingPlanTest, WallsCloseTheRooms) {
   EXPECT_NEAR(length, 2 * (12.2 + 7.2) + 5.0 + 12.2 - 1.8, 2.5);
 }
 
-// A cupboard hides half of a wall: nothing was seen between its front and the
-// wall, but the room is closed there.
 TEST(BuildingPlanTest, WallsOnEachOtherAreDrawnOnce) {
   const auto wall = [](double x1, double y1, double x2, double y2) {
     PlanWall made;
@@ -158,16 +156,18 @@ TEST(BuildingPlanTest, WallsOnEachOtherAreDrawnOnce) {
   EXPECT_EQ(walls[4].begin, Vector2d(2.0, -1.0));
 }
 
+// Something wide hides most of a wall: nothing was seen between its front and
+// the wall, but the room is closed there.
 TEST(BuildingPlanTest, JogsOfWallsAreClosed) {
   Drawing drawing(11.0, 9.0);
   drawing.Room(1.0, 1.0, 9.0, 6.0);
-  drawing.Fill(5.0, 0.95, 9.05, 1.5, Space::kUnknown);
-  drawing.Fill(5.0, 1.5, 9.05, 1.55, Space::kOccupied);
+  drawing.Fill(3.0, 0.95, 9.05, 1.85, Space::kUnknown);
+  drawing.Fill(3.0, 1.85, 9.05, 1.9, Space::kOccupied);
   const BuildingPlan plan = PlanOf(drawing);
   ASSERT_EQ(plan.rooms.size(), 1u);
   EXPECT_TRUE(std::any_of(
       plan.walls.begin(), plan.walls.end(), [](const PlanWall& wall) {
-        return (0.5 * (wall.begin + wall.end) - Vector2d(5.0, 1.25)).norm() <
+        return (0.5 * (wall.begin + wall.end) - Vector2d(3.0, 1.4)).norm() <
                0.2;
       }));
 }

@@ -269,5 +269,67 @@ TEST(RegionsTest, CupboardsBetweenTwoRoomsKeepThemApart) {
   EXPECT_FALSE(are_apart(2.2, 0.6));
 }
 
+// A strip of 0.6 m between two rooms, with a door to each, is a part of one of
+// them; with one door it may be a room of which little was seen.
+TEST(RegionsTest, AStripBetweenTwoDoorsBelongsToARoom) {
+  const auto strip_is_alone = [](bool has_second_room) {
+    Arrangement arrangement;
+    AddFace({{0.0, 0.0}, {2.0, 0.0}, {2.0, 3.0}, {0.0, 3.0}}, &arrangement);
+    AddFace({{0.0, 3.0}, {2.0, 3.0}, {2.0, 3.6}, {0.0, 3.6}}, &arrangement);
+    AddEdge({0.0, 3.0}, {2.0, 3.0}, 1, 0, 0.9, 1.1, &arrangement);
+    AddEdge({2.0, 3.6}, {0.0, 3.6}, 1, has_second_room ? 2 : -1, 0.9,
+            has_second_room ? 1.1 : 0.0, &arrangement);
+    AddEdge({2.0, 3.0}, {2.0, 3.6}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 3.6}, {0.0, 3.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 0.0}, {2.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({2.0, 0.0}, {2.0, 3.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 3.0}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    if (has_second_room) {
+      AddFace({{0.0, 3.6}, {2.0, 3.6}, {2.0, 7.0}, {0.0, 7.0}}, &arrangement);
+      AddEdge({2.0, 3.6}, {2.0, 7.0}, 2, -1, 1.0, 0.0, &arrangement);
+      AddEdge({2.0, 7.0}, {0.0, 7.0}, 2, -1, 1.0, 0.0, &arrangement);
+      AddEdge({0.0, 7.0}, {0.0, 3.6}, 2, -1, 1.0, 0.0, &arrangement);
+    }
+    const std::vector<int> region = FindRegions(arrangement);
+    return region[1] != region[0] &&
+           (!has_second_room || region[1] != region[2]);
+  };
+  EXPECT_FALSE(strip_is_alone(true));
+  EXPECT_TRUE(strip_is_alone(false));
+}
+
+// Furniture hides 3 of 4 m of a room's wall: what is seen of the wall on that
+// line (7) says that it goes on behind.
+TEST(RegionsTest, WallsGoOnBehindFurniture) {
+  const auto is_filled = [](int line_of_wall) {
+    Arrangement arrangement;
+    AddFace({{0.0, 0.0},
+             {4.0, 0.0},
+             {4.0, 3.0},
+             {4.8, 3.0},
+             {4.8, 4.0},
+             {0.0, 4.0}},
+            &arrangement);
+    AddFace({{4.0, 0.0}, {4.8, 0.0}, {4.8, 3.0}, {4.0, 3.0}}, &arrangement);
+    arrangement.unknown[1] = arrangement.free[1];
+    arrangement.free[1] = 0.0;
+    AddEdge({4.0, 0.0}, {4.0, 3.0}, 0, 1, 1.0, 0.0, &arrangement);
+    AddEdge({4.0, 3.0}, {4.8, 3.0}, 0, 1, 1.0, 0.0, &arrangement);
+    AddEdge({4.8, 3.0}, {4.8, 4.0}, 0, -1, 1.0, 0.0, &arrangement);
+    arrangement.edges.back().line = line_of_wall;
+    AddEdge({4.8, 0.0}, {4.8, 3.0}, 1, -1, 0.2, 0.0, &arrangement);
+    arrangement.edges.back().line = 7;
+    arrangement.edges.back().lengths.metres = {3.0, 0.0, 0.0, 0.0};
+    AddEdge({4.0, 0.0}, {4.8, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 0.0}, {4.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({4.8, 4.0}, {0.0, 4.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 4.0}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    const std::vector<int> region = FindRegions(arrangement);
+    return region[1] == region[0];
+  };
+  EXPECT_TRUE(is_filled(7));
+  EXPECT_FALSE(is_filled(8));
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -21,8 +21,11 @@ constexpr double kMaxPocket = 5.0;
 // what is no room.
 constexpr double kLeastPocketBorder = 0.2;
 constexpr double kMaxExposed = 0.2;
-// So much wall of a room on a line goes on behind furniture, m.
-constexpr double kGoesOn = 0.5;
+// So much wall on a line goes on behind furniture, m.
+constexpr double kGoesOn = 0.3;
+// What was seen from the room behind its furniture, as a share: walls that
+// were seen there are the room's.
+constexpr double kGlimpse = 0.1;
 // What was seen of a space, m^2, and the share of doors on its border from
 // which on it lies behind a door.
 constexpr double kSeenThroughDoor = 1.0;
@@ -556,20 +559,23 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
   // Pockets have numbers of their own: the region's, or that of the face.
   std::vector<int> pocket(size, -1);
   std::map<int, double> seen;
+  std::map<int, double> areas;
   for (std::size_t i = 0; i < size; ++i) {
     if ((*region)[i] >= 0) {
       if (rooms.count((*region)[i]) == 0) pocket[i] = (*region)[i];
     } else if (hidden[i] >= 0) {
       pocket[i] = static_cast<int>(i);
     }
-    if (pocket[i] >= 0) seen[pocket[i]] += arrangement.free[i];
+    if (pocket[i] < 0) continue;
+    seen[pocket[i]] += arrangement.free[i];
+    areas[pocket[i]] += arrangement.faces[i].Area();
   }
   for (;;) {
     // Borders of pockets with rooms.
     std::map<std::pair<int, int>, BorderLengths> borders;
     std::map<int, double> around;
     std::map<int, Exposure> exposed;
-    // Wall around each room, by line.
+    // Wall around each room and pocket, by line.
     std::map<std::pair<int, int>, double> walls;
     const auto pocket_of = [&](int face) {
       return face < 0 ? -1 : pocket[static_cast<std::size_t>(face)];
@@ -597,6 +603,9 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
           exposed[from].all += open;
           exposed[from].unseen[edge.line] +=
               std::min(open, edge.lengths.Of(Mark::kUnknown));
+          if (seen[from] >= kGlimpse * areas[from]) {
+            walls[{from, edge.line}] += edge.lengths.Of(Mark::kWall);
+          }
         }
         if (other < 0 && room >= 0) borders[{from, room}].Add(edge.lengths);
       }
@@ -607,6 +616,10 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
     for (const auto& [pair, border] : borders) {
       doors[pair.first] += border.Of(Mark::kDoor) >= kLeastOpening;
     }
+    const auto wall_on = [&](int line, int id) {
+      const auto found = walls.find({id, line});
+      return found == walls.end() ? 0.0 : found->second;
+    };
     double best = 0.0;
     std::pair<int, int> which(-1, -1);
     for (const auto& [pair, border] : borders) {
@@ -622,8 +635,8 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
       // the walls of the room go on.
       double open = exposed[pair.first].all;
       for (const auto& [line, unseen] : exposed[pair.first].unseen) {
-        const auto wall = walls.find({pair.second, line});
-        if (line >= 0 && wall != walls.end() && wall->second >= kGoesOn) {
+        if (line >= 0 &&
+            wall_on(line, pair.first) + wall_on(line, pair.second) >= kGoesOn) {
           open -= unseen;
         }
       }

@@ -299,9 +299,11 @@ TEST(RegionsTest, AStripBetweenTwoDoorsBelongsToARoom) {
 }
 
 // Furniture hides 3 of 4 m of a room's wall: what is seen of the wall on that
-// line (7) says that it goes on behind.
+// line (7) says that it goes on behind. So does `wall` m of it that was seen
+// behind the furniture, with a share `seen` of the floor there.
 TEST(RegionsTest, WallsGoOnBehindFurniture) {
-  const auto is_filled = [](int line_of_wall) {
+  const auto is_filled = [](int line_of_wall, double wall = 0.0,
+                            double seen = 0.0) {
     Arrangement arrangement;
     AddFace({{0.0, 0.0},
              {4.0, 0.0},
@@ -311,15 +313,15 @@ TEST(RegionsTest, WallsGoOnBehindFurniture) {
              {0.0, 4.0}},
             &arrangement);
     AddFace({{4.0, 0.0}, {4.8, 0.0}, {4.8, 3.0}, {4.0, 3.0}}, &arrangement);
-    arrangement.unknown[1] = arrangement.free[1];
-    arrangement.free[1] = 0.0;
+    arrangement.unknown[1] = (1.0 - seen) * arrangement.free[1];
+    arrangement.free[1] *= seen;
     AddEdge({4.0, 0.0}, {4.0, 3.0}, 0, 1, 1.0, 0.0, &arrangement);
     AddEdge({4.0, 3.0}, {4.8, 3.0}, 0, 1, 1.0, 0.0, &arrangement);
     AddEdge({4.8, 3.0}, {4.8, 4.0}, 0, -1, 1.0, 0.0, &arrangement);
     arrangement.edges.back().line = line_of_wall;
     AddEdge({4.8, 0.0}, {4.8, 3.0}, 1, -1, 0.2, 0.0, &arrangement);
     arrangement.edges.back().line = 7;
-    arrangement.edges.back().lengths.metres = {3.0, 0.0, 0.0, 0.0};
+    arrangement.edges.back().lengths.metres = {3.0 - wall, 0.0, wall, 0.0};
     AddEdge({4.0, 0.0}, {4.8, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
     AddEdge({0.0, 0.0}, {4.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
     AddEdge({4.8, 4.0}, {0.0, 4.0}, 0, -1, 1.0, 0.0, &arrangement);
@@ -329,6 +331,8 @@ TEST(RegionsTest, WallsGoOnBehindFurniture) {
   };
   EXPECT_TRUE(is_filled(7));
   EXPECT_FALSE(is_filled(8));
+  EXPECT_TRUE(is_filled(8, 0.4, 0.2));
+  EXPECT_FALSE(is_filled(8, 0.4, 0.0));
 }
 
 }  // namespace

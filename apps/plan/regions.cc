@@ -21,8 +21,11 @@ constexpr double kMaxPocket = 5.0;
 // what is no room.
 constexpr double kLeastPocketBorder = 0.2;
 constexpr double kMaxExposed = 0.2;
-// So much wall on a line goes on behind furniture, m.
+// Furniture stands in a row for so much at most, m; and so much wall on a line
+// goes on behind it, m, and as a share of what it hides.
+constexpr double kLongestFurniture = 2.5;
 constexpr double kGoesOn = 0.3;
+constexpr double kSeenOfIt = 0.25;
 // What was seen from the room behind its furniture, as a share: walls that
 // were seen there are the room's.
 constexpr double kGlimpse = 0.1;
@@ -572,11 +575,12 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
   }
   for (;;) {
     // Borders of pockets with rooms.
-    std::map<std::pair<int, int>, BorderLengths> borders;
+    std::map<std::pair<int, int>, Border> borders;
     std::map<int, double> around;
     std::map<int, Exposure> exposed;
-    // Wall around each room and pocket, by line.
+    // Wall around each room and pocket, by line; and what was not seen of it.
     std::map<std::pair<int, int>, double> walls;
+    std::map<std::pair<int, int>, double> hidden_walls;
     const auto pocket_of = [&](int face) {
       return face < 0 ? -1 : pocket[static_cast<std::size_t>(face)];
     };
@@ -592,6 +596,8 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
         if (from < 0) {
           if (region_of(a) >= 0 && region_of(a) != room) {
             walls[{region_of(a), edge.line}] += edge.lengths.Of(Mark::kWall);
+            hidden_walls[{region_of(a), edge.line}] +=
+                edge.lengths.Of(Mark::kUnknown);
           }
           continue;
         }
@@ -607,41 +613,53 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
             walls[{from, edge.line}] += edge.lengths.Of(Mark::kWall);
           }
         }
-        if (other < 0 && room >= 0) borders[{from, room}].Add(edge.lengths);
+        if (other < 0 && room >= 0) {
+          borders[{from, room}].Add(edge.line, edge.lengths);
+        }
       }
     }
     // Rooms that a pocket has a door to: of two it is the way from one to the
     // other.
     std::map<int, int> doors;
     for (const auto& [pair, border] : borders) {
-      doors[pair.first] += border.Of(Mark::kDoor) >= kLeastOpening;
+      doors[pair.first] += border.all.Of(Mark::kDoor) >= kLeastOpening;
     }
-    const auto wall_on = [&](int line, int id) {
-      const auto found = walls.find({id, line});
-      return found == walls.end() ? 0.0 : found->second;
+    const auto length_on = [](const std::map<std::pair<int, int>, double>& of,
+                              int line, int id) {
+      const auto found = of.find({id, line});
+      return found == of.end() ? 0.0 : found->second;
     };
     double best = 0.0;
     std::pair<int, int> which(-1, -1);
     for (const auto& [pair, border] : borders) {
       // Long and open borders before short and closed ones.
-      const double length = border.length();
+      const double length = border.all.length();
       if (length < kLeastPocketBorder * around[pair.first]) continue;
       // A room of which little was seen through its door is no niche.
       if (seen[pair.first] >= kSeenThroughDoor && doors[pair.first] < 2 &&
-          border.Of(Mark::kDoor) > kDoorBorder * length) {
+          border.all.Of(Mark::kDoor) > kDoorBorder * length) {
         continue;
       }
       // Space beyond a wall is no part of what lies before it. Behind furniture
       // the walls of the room go on.
       double open = exposed[pair.first].all;
+      const bool is_furniture = std::none_of(
+          border.of_line.begin(), border.of_line.end(), [](const auto& entry) {
+            return entry.second.Of(Mark::kWall) > kLongestFurniture;
+          });
       for (const auto& [line, unseen] : exposed[pair.first].unseen) {
-        if (line >= 0 &&
-            wall_on(line, pair.first) + wall_on(line, pair.second) >= kGoesOn) {
+        const double wall = length_on(walls, line, pair.first) +
+                            length_on(walls, line, pair.second);
+        const double hidden =
+            unseen + length_on(hidden_walls, line, pair.second);
+        if (is_furniture && line >= 0 &&
+            wall >= std::max(kGoesOn, kSeenOfIt * hidden)) {
           open -= unseen;
         }
       }
       if (open > kMaxExposed * around[pair.first]) continue;
-      const double score = (2.0 * length - border.holds) / around[pair.first];
+      const double score =
+          (2.0 * length - border.all.holds) / around[pair.first];
       if (score > best) {
         best = score;
         which = pair;

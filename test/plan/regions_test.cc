@@ -298,41 +298,63 @@ TEST(RegionsTest, AStripBetweenTwoDoorsBelongsToARoom) {
   EXPECT_TRUE(strip_is_alone(false));
 }
 
-// Furniture hides 3 of 4 m of a room's wall: what is seen of the wall on that
-// line (7) says that it goes on behind. So does `wall` m of it that was seen
-// behind the furniture, with a share `seen` of the floor there.
+// What stands before a wall and hides it.
+struct Hidden {
+  double front = 2.0;   // m along the wall (line 7)
+  double beside = 1.0;  // m of wall beside it, ...
+  int line = 7;         // ... and the line that it lies on
+  double wall = 0.0;    // m of wall seen behind it, ...
+  double seen = 0.0;    // ... and share of the floor there
+};
+
+// Walls go on behind furniture: what is seen of a wall beside it says so, or
+// what is seen of the floor and the wall behind it; not where too little of the
+// wall is seen, nor when what stands there is as long as a wall.
 TEST(RegionsTest, WallsGoOnBehindFurniture) {
-  const auto is_filled = [](int line_of_wall, double wall = 0.0,
-                            double seen = 0.0) {
+  const auto is_filled = [](const Hidden& hidden) {
+    const double front = hidden.front;
+    const double height = front + hidden.beside;
     Arrangement arrangement;
     AddFace({{0.0, 0.0},
              {4.0, 0.0},
-             {4.0, 3.0},
-             {4.8, 3.0},
-             {4.8, 4.0},
-             {0.0, 4.0}},
+             {4.0, front},
+             {4.8, front},
+             {4.8, height},
+             {0.0, height}},
             &arrangement);
-    AddFace({{4.0, 0.0}, {4.8, 0.0}, {4.8, 3.0}, {4.0, 3.0}}, &arrangement);
-    arrangement.unknown[1] = (1.0 - seen) * arrangement.free[1];
-    arrangement.free[1] *= seen;
-    AddEdge({4.0, 0.0}, {4.0, 3.0}, 0, 1, 1.0, 0.0, &arrangement);
-    AddEdge({4.0, 3.0}, {4.8, 3.0}, 0, 1, 1.0, 0.0, &arrangement);
-    AddEdge({4.8, 3.0}, {4.8, 4.0}, 0, -1, 1.0, 0.0, &arrangement);
-    arrangement.edges.back().line = line_of_wall;
-    AddEdge({4.8, 0.0}, {4.8, 3.0}, 1, -1, 0.2, 0.0, &arrangement);
+    AddFace({{4.0, 0.0}, {4.8, 0.0}, {4.8, front}, {4.0, front}}, &arrangement);
+    arrangement.unknown[1] = (1.0 - hidden.seen) * arrangement.free[1];
+    arrangement.free[1] *= hidden.seen;
+    AddEdge({4.0, 0.0}, {4.0, front}, 0, 1, 1.0, 0.0, &arrangement);
+    arrangement.edges.back().line = 3;
+    AddEdge({4.0, front}, {4.8, front}, 0, 1, 1.0, 0.0, &arrangement);
+    AddEdge({4.8, front}, {4.8, height}, 0, -1, 1.0, 0.0, &arrangement);
+    arrangement.edges.back().line = hidden.line;
+    AddEdge({4.8, 0.0}, {4.8, front}, 1, -1, 0.2, 0.0, &arrangement);
     arrangement.edges.back().line = 7;
-    arrangement.edges.back().lengths.metres = {3.0 - wall, 0.0, wall, 0.0};
+    arrangement.edges.back().lengths.metres = {front - hidden.wall, 0.0,
+                                               hidden.wall, 0.0};
     AddEdge({4.0, 0.0}, {4.8, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
     AddEdge({0.0, 0.0}, {4.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
-    AddEdge({4.8, 4.0}, {0.0, 4.0}, 0, -1, 1.0, 0.0, &arrangement);
-    AddEdge({0.0, 4.0}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({4.8, height}, {0.0, height}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, height}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
     const std::vector<int> region = FindRegions(arrangement);
     return region[1] == region[0];
   };
-  EXPECT_TRUE(is_filled(7));
-  EXPECT_FALSE(is_filled(8));
-  EXPECT_TRUE(is_filled(8, 0.4, 0.2));
-  EXPECT_FALSE(is_filled(8, 0.4, 0.0));
+  Hidden hidden;
+  EXPECT_TRUE(is_filled(hidden));
+  hidden.line = 8;
+  EXPECT_FALSE(is_filled(hidden));
+  hidden.wall = 0.4;
+  EXPECT_FALSE(is_filled(hidden));
+  hidden.seen = 0.2;
+  EXPECT_TRUE(is_filled(hidden));
+  hidden = {};
+  hidden.beside = 0.4;
+  EXPECT_FALSE(is_filled(hidden));
+  hidden = {};
+  hidden.front = 3.0;
+  EXPECT_FALSE(is_filled(hidden));
 }
 
 }  // namespace

@@ -21,9 +21,11 @@ constexpr double kMaxPocket = 5.0;
 // what is no room.
 constexpr double kLeastPocketBorder = 0.2;
 constexpr double kMaxExposed = 0.2;
-// Furniture stands in a row for so much at most, m; and so much wall on a line
-// goes on behind it, m, and as a share of what it hides.
+// Furniture stands in a row for so much at most, m, and is so deep at least, m:
+// else a wall juts out. So much wall on a line goes on behind it, m, and as a
+// share of what it hides.
 constexpr double kLongestFurniture = 2.5;
+constexpr double kLeastDepth = 0.3;
 constexpr double kGoesOn = 0.3;
 constexpr double kSeenOfIt = 0.25;
 // What was seen from the room behind its furniture, as a share: walls that
@@ -644,8 +646,10 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
       // the walls of the room go on.
       double open = exposed[pair.first].all;
       const bool is_furniture = std::none_of(
-          border.of_line.begin(), border.of_line.end(), [](const auto& entry) {
-            return entry.second.Of(Mark::kWall) > kLongestFurniture;
+          border.of_line.begin(), border.of_line.end(), [&](const auto& entry) {
+            const double front = entry.second.Of(Mark::kWall);
+            return front > kLongestFurniture ||
+                   areas[pair.first] < kLeastDepth * front;
           });
       for (const auto& [line, unseen] : exposed[pair.first].unseen) {
         const double wall = length_on(walls, line, pair.first) +

@@ -300,7 +300,8 @@ TEST(RegionsTest, AStripBetweenTwoDoorsBelongsToARoom) {
 
 // What stands before a wall and hides it.
 struct Hidden {
-  double front = 2.0;   // m along the wall (line 7)
+  double front = 2.0;   // m along the wall (line 7), ...
+  double depth = 0.8;   // ... and across
   double beside = 1.0;  // m of wall beside it, ...
   int line = 7;         // ... and the line that it lies on
   double wall = 0.0;    // m of wall seen behind it, ...
@@ -309,34 +310,37 @@ struct Hidden {
 
 // Walls go on behind furniture: what is seen of a wall beside it says so, or
 // what is seen of the floor and the wall behind it; not where too little of the
-// wall is seen, nor when what stands there is as long as a wall.
+// wall is seen, nor when what stands there is as long as a wall or flat: there
+// the wall itself juts out.
 TEST(RegionsTest, WallsGoOnBehindFurniture) {
   const auto is_filled = [](const Hidden& hidden) {
     const double front = hidden.front;
     const double height = front + hidden.beside;
+    const double right = 4.0 + hidden.depth;
     Arrangement arrangement;
     AddFace({{0.0, 0.0},
              {4.0, 0.0},
              {4.0, front},
-             {4.8, front},
-             {4.8, height},
+             {right, front},
+             {right, height},
              {0.0, height}},
             &arrangement);
-    AddFace({{4.0, 0.0}, {4.8, 0.0}, {4.8, front}, {4.0, front}}, &arrangement);
+    AddFace({{4.0, 0.0}, {right, 0.0}, {right, front}, {4.0, front}},
+            &arrangement);
     arrangement.unknown[1] = (1.0 - hidden.seen) * arrangement.free[1];
     arrangement.free[1] *= hidden.seen;
     AddEdge({4.0, 0.0}, {4.0, front}, 0, 1, 1.0, 0.0, &arrangement);
     arrangement.edges.back().line = 3;
-    AddEdge({4.0, front}, {4.8, front}, 0, 1, 1.0, 0.0, &arrangement);
-    AddEdge({4.8, front}, {4.8, height}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({4.0, front}, {right, front}, 0, 1, 1.0, 0.0, &arrangement);
+    AddEdge({right, front}, {right, height}, 0, -1, 1.0, 0.0, &arrangement);
     arrangement.edges.back().line = hidden.line;
-    AddEdge({4.8, 0.0}, {4.8, front}, 1, -1, 0.2, 0.0, &arrangement);
+    AddEdge({right, 0.0}, {right, front}, 1, -1, 0.2, 0.0, &arrangement);
     arrangement.edges.back().line = 7;
     arrangement.edges.back().lengths.metres = {front - hidden.wall, 0.0,
                                                hidden.wall, 0.0};
-    AddEdge({4.0, 0.0}, {4.8, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({4.0, 0.0}, {right, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
     AddEdge({0.0, 0.0}, {4.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
-    AddEdge({4.8, height}, {0.0, height}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({right, height}, {0.0, height}, 0, -1, 1.0, 0.0, &arrangement);
     AddEdge({0.0, height}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
     const std::vector<int> region = FindRegions(arrangement);
     return region[1] == region[0];
@@ -354,6 +358,9 @@ TEST(RegionsTest, WallsGoOnBehindFurniture) {
   EXPECT_FALSE(is_filled(hidden));
   hidden = {};
   hidden.front = 3.0;
+  EXPECT_FALSE(is_filled(hidden));
+  hidden = {};
+  hidden.depth = 0.2;
   EXPECT_FALSE(is_filled(hidden));
 }
 

@@ -534,6 +534,69 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
   }
 }
 
+// A corridor that was cut off from a wide space goes on through openings as
+// wide as it is: while it was a part of that space they were too narrow for it.
+// `before`: the regions before corridors were cut off.
+void JoinCutCorridors(const Arrangement& arrangement,
+                      const RegionOptions& options,
+                      const std::vector<int>& before,
+                      std::vector<int>* region) {
+  for (;;) {
+    std::map<int, std::vector<Polygon>> faces;
+    std::map<int, std::set<int>> was;
+    std::map<int, std::set<int>> parts;
+    for (std::size_t i = 0; i < region->size(); ++i) {
+      const int id = (*region)[i];
+      if (id < 0) continue;
+      faces[id].push_back(arrangement.faces[i]);
+      was[id].insert(before[i]);
+      parts[before[i]].insert(id);
+    }
+    const auto is_cut = [&](int id) {
+      return std::any_of(was[id].begin(), was[id].end(),
+                         [&](int old) { return parts[old].size() > 1; });
+    };
+    const auto were_one = [&](int a, int b) {
+      return std::any_of(was[a].begin(), was[a].end(),
+                         [&](int old) { return was[b].count(old) > 0; });
+    };
+    std::map<std::pair<int, int>, Border> borders;
+    for (const ArrangementEdge& edge : arrangement.edges) {
+      if (edge.left < 0 || edge.right < 0) continue;
+      const auto [a, b] =
+          std::minmax({(*region)[static_cast<std::size_t>(edge.left)],
+                       (*region)[static_cast<std::size_t>(edge.right)]});
+      if (a >= 0 && a != b) borders[{a, b}].Add(edge.line, edge.lengths);
+    }
+    std::map<int, double> widths;
+    const auto width_of = [&](int id) {
+      const auto known = widths.find(id);
+      if (known != widths.end()) return known->second;
+      const Polygon outline = UnionOf(faces[id]).front();
+      Extent extent;
+      extent.area = outline.Area();
+      extent.perimeter = outline.Perimeter();
+      return widths[id] = extent.Width();
+    };
+    double best = 0.0;
+    std::pair<int, int> which(-1, -1);
+    for (const auto& [pair, border] : borders) {
+      const auto [a, b] = pair;
+      if ((!is_cut(a) && !is_cut(b)) || were_one(a, b)) continue;
+      const double width = std::max(width_of(a), width_of(b));
+      double through = Through(border.all, width, options);
+      for (const auto& [line, lengths] : border.of_line) {
+        through = std::max(through, Through(lengths, width, options));
+      }
+      if (through <= best) continue;
+      best = through;
+      which = pair;
+    }
+    if (which.first < 0) return;
+    std::replace(region->begin(), region->end(), which.second, which.first);
+  }
+}
+
 // What lies between a pocket and what is no room without a wall, m.
 struct Exposure {
   double all = 0.0;
@@ -687,7 +750,9 @@ std::vector<int> FindRegions(const Arrangement& arrangement,
   regions.JoinThrough(options);
   std::vector<int> region = regions.region();
   FillPockets(arrangement, options, &region);
+  const std::vector<int> whole = region;
   CutCorridors(arrangement, options, &region);
+  JoinCutCorridors(arrangement, options, whole, &region);
   return region;
 }
 

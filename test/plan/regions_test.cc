@@ -269,6 +269,43 @@ TEST(RegionsTest, CupboardsBetweenTwoRoomsKeepThemApart) {
   EXPECT_FALSE(are_apart(2.2, 0.6));
 }
 
+// A corridor of 2 m runs into a hall, and a line of walls crosses it before, at
+// an opening that could be a wide door: the corridor ends at the hall, but goes
+// on through the opening.
+TEST(RegionsTest, ACorridorThatEndsInAHallGoesOnThroughOpenings) {
+  const auto is_one = [](double opening) {
+    Arrangement arrangement;
+    AddFace({{0.0, 0.0}, {10.0, 0.0}, {10.0, 2.0}, {0.0, 2.0}}, &arrangement);
+    AddFace({{10.0, 0.0}, {16.0, 0.0}, {16.0, 2.0}, {10.0, 2.0}}, &arrangement);
+    AddFace({{16.0, -3.0},
+             {24.0, -3.0},
+             {24.0, 5.0},
+             {16.0, 5.0},
+             {16.0, 2.0},
+             {16.0, 0.0}},
+            &arrangement);
+    AddEdge({10.0, 0.0}, {10.0, 2.0}, 0, 1, 0.35, opening, &arrangement);
+    arrangement.edges.back().lengths.metres = {0.0, 0.0, 2.0 - opening,
+                                               opening};
+    AddEdge({16.0, 0.0}, {16.0, 2.0}, 1, 2, -1.0, 0.0, &arrangement);
+    AddEdge({0.0, 0.0}, {10.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 2.0}, {0.0, 2.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 2.0}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({10.0, 0.0}, {16.0, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({16.0, 2.0}, {10.0, 2.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({16.0, 0.0}, {16.0, -3.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({16.0, -3.0}, {24.0, -3.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({24.0, -3.0}, {24.0, 5.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({24.0, 5.0}, {16.0, 5.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({16.0, 5.0}, {16.0, 2.0}, 2, -1, 1.0, 0.0, &arrangement);
+    const std::vector<int> region = FindRegions(arrangement);
+    EXPECT_NE(region[1], region[2]);
+    return region[0] == region[1];
+  };
+  EXPECT_TRUE(is_one(1.9));
+  EXPECT_FALSE(is_one(0.9));
+}
+
 // A strip of 0.6 m between two rooms, with a door to each, is a part of one of
 // them; with one door it may be a room of which little was seen.
 TEST(RegionsTest, AStripBetweenTwoDoorsBelongsToARoom) {

@@ -141,9 +141,11 @@ std::vector<int> HiddenSpaces(const Arrangement& arrangement,
                 static_cast<std::size_t>(edge.right));
   }
   std::map<std::size_t, std::vector<Polygon>> faces;
+  std::map<std::size_t, double> free;
   for (std::size_t i = 0; i < size; ++i) {
     if (region[i] >= 0) continue;
     faces[spaces.Find(i)].push_back(arrangement.faces[i]);
+    free[spaces.Find(i)] += arrangement.free[i];
   }
   std::vector<int> hidden(size, -1);
   for (std::size_t i = 0; i < size; ++i) {
@@ -152,11 +154,13 @@ std::vector<int> HiddenSpaces(const Arrangement& arrangement,
     double area = 0.0;
     for (const Polygon& part : parts) area += part.Area();
     if (area > kMaxPocket) continue;
+    const double width = free[spaces.Find(i)] >= kGlimpse * area
+                             ? options.glimpsed_width
+                             : options.pocket_width;
     const std::vector<Polygon> outlines = UnionOf(parts);
-    if (std::all_of(outlines.begin(), outlines.end(),
-                    [&](const Polygon& whole) {
-                      return IsNarrow(whole, options.pocket_width);
-                    })) {
+    if (std::all_of(
+            outlines.begin(), outlines.end(),
+            [&](const Polygon& whole) { return IsNarrow(whole, width); })) {
       hidden[i] = static_cast<int>(spaces.Find(i));
     }
   }

@@ -29,7 +29,9 @@ struct RegionOptions {
   double min_area = 2.0;
   double min_width = 0.8;
   /// The same goes for unseen spaces behind furniture narrower than this, m.
-  double pocket_width = 1.2;
+  double pocket_width = 0.9;
+  /// ... or than this, m, when a tenth of them was seen beside it.
+  double glimpsed_width = 1.5;
 };
 
 /// The region of each face of an arrangement: the number of one of its faces;

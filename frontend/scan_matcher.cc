@@ -41,6 +41,10 @@ constexpr double kFreeShare = 0.03;
 // Peaks: what a point costs where the reference has looked through.
 constexpr std::int16_t kThrough = -128;
 
+// Cosine of the largest angle between the normals of reference points that are
+// one.
+constexpr double kOneSurface = 0.9;
+
 // Cosine of the largest angle between the normals of partners.
 constexpr double kSameSide = 0.7;
 // The reference points around a point are kept when it moved by less than this
@@ -76,6 +80,79 @@ struct Nearest {
     return distance < squared_distance ||
            (distance == squared_distance && index >= 0 && i < index);
   }
+};
+
+// Makes one of those points of a bucket that lie nearer than `distance`, m, to
+// each other and look the same way: their mean. What was seen often is a band
+// as wide as its noise, in which whatever lies there has a partner to hand: it
+// creeps to its place, past many that say the same. `begins`: the first point
+// of each bucket, and the end.
+template <typename Surface>
+void MergeNear(double distance, std::vector<int>* begins,
+               std::vector<Surface>* points) {
+  std::size_t count = 0;
+  std::vector<int> shares;
+  for (std::size_t b = 0; b + 1 < begins->size(); ++b) {
+    const auto first = static_cast<std::size_t>((*begins)[b]);
+    const auto last = static_cast<std::size_t>((*begins)[b + 1]);
+    const std::size_t begin = count;
+    (*begins)[b] = static_cast<int>(begin);
+    shares.clear();
+    for (std::size_t i = first; i < last; ++i) {
+      const Surface point = (*points)[i];
+      std::size_t k = begin;
+      while (k < count &&
+             ((point.position - (*points)[k].position).squaredNorm() >=
+                  distance * distance ||
+              point.normal.dot((*points)[k].normal) < kOneSurface)) {
+        ++k;
+      }
+      if (k == count) {
+        (*points)[count++] = point;
+        shares.push_back(1);
+        continue;
+      }
+      Surface& mean = (*points)[k];
+      const int share = ++shares[k - begin];
+      mean.position += (point.position - mean.position) / share;
+      mean.normal =
+          (mean.normal + (point.normal - mean.normal) / share).normalized();
+    }
+  }
+  begins->back() = static_cast<int>(count);
+  points->resize(count);
+}
+
+// Poses that an iteration went through.
+class PosesBefore {
+ public:
+  // Whether it has come back to where it was, within a step that ends it: it
+  // goes round as points change partners to and fro. Then sets the mean of the
+  // poses on the way round.
+  bool ClosesCircle(double least_step, Pose2* pose) {
+    poses_.push_back(*pose);
+    for (std::size_t k = poses_.size() - 1; k-- > 0;) {
+      if (!IsNear(*pose, poses_[k], least_step)) continue;
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      for (std::size_t i = k + 1; i < poses_.size(); ++i) {
+        Eigen::Vector3d difference = poses_[i] - *pose;
+        difference[2] = NormalizeAngle(difference[2]);
+        sum += difference;
+      }
+      *pose += sum / static_cast<double>(poses_.size() - k - 1);
+      (*pose)[2] = NormalizeAngle((*pose)[2]);
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  static bool IsNear(const Pose2& a, const Pose2& b, double least_step) {
+    return (a - b).head<2>().norm() < least_step &&
+           std::abs(NormalizeAngle(a[2] - b[2])) < least_step;
+  }
+
+  std::vector<Pose2> poses_;
 };
 
 // Share of the points with a normal that are returns, which alone inform.
@@ -194,6 +271,7 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
     if (cell_of[i] < 0) continue;
     reference_[next[cell_of[i]]++] = {points[i].position, points[i].normal};
   }
+  MergeNear(options_.point_sigma, &bucket_begin_, &reference_);
   // The last block may be read beyond the end.
   reference_x_.assign(reference_.size() + kBlock, 0.0f);
   reference_y_.assign(reference_.size() + kBlock, 0.0f);
@@ -466,6 +544,7 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
       1, points_.size() /
              static_cast<std::size_t>(std::max(1, options_.coarse_points)));
   double progress = 0.0;
+  PosesBefore before;
   Eigen::Vector3d step = Eigen::Vector3d::Constant(kReferenceReach);
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     const bool is_coarse = progress < 1.0;
@@ -499,6 +578,9 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
     const double turn = std::abs(step[2]);
     if (!is_coarse && shift < options_.convergence &&
         turn < options_.convergence) {
+      break;
+    }
+    if (!is_coarse && before.ClosesCircle(options_.convergence, &result.pose)) {
       break;
     }
     if (shift < kCalmShift && turn < kCalmTurn) progress = 1.0;

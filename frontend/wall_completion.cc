@@ -25,8 +25,13 @@ constexpr std::size_t kFewestCells = 6;
 // Scans and seeds that are looked at by all threads together, before what was
 // found is taken in.
 constexpr std::size_t kScansAtOnce = 256;
-constexpr std::size_t kSeedsAtOnce = 64;
-constexpr std::size_t kMostSeedsAtOnce = 1024;
+constexpr std::size_t kSeedsAtOnce = 16;
+constexpr std::size_t kMostSeedsAtOnce = 128;
+// A cell is no seed any more once it lay on so many lines that came to nothing:
+// so close to them, in scatters, and turned against them by no more than this.
+constexpr std::uint8_t kSpentBy = 2;
+constexpr double kSpentScatters = 2.0;
+constexpr double kSpentTurn = DegToRad(5.0);
 constexpr std::size_t kWordBits = 64;
 // Standard deviations of a range at which a return is no longer one of a wall.
 constexpr double kExplainedSigmas = 5.0;
@@ -150,8 +155,16 @@ struct GrownWall {
   double begin = 0.0, end = 0.0;
   // Towards the lasers that saw it.
   Eigen::Vector2d view = Eigen::Vector2d::Zero();
+};
+
+// What came of a seed.
+struct Trial {
   // The seed's place among all.
   std::size_t position = 0;
+  bool is_made = false;
+  std::optional<GrownWall> wall;
+  // Cells that lay on the line which did not become a wall.
+  std::vector<int> spent;
 };
 
 // Grows walls from cells of returns.
@@ -161,6 +174,8 @@ class WallGrower {
   struct Scratch {
     ReturnCells::Marks marks;
     std::vector<int> members;
+    // What was grown last, wall or not.
+    GrownLine line;
   };
 
   // Of walls whose cells scatter by at most `scatter`, m.
@@ -184,6 +199,7 @@ class WallGrower {
     line.direction = Of(seed).direction;
     CollectInLine(seed, &line, scratch);
     wall.cells = FitFinally(scratch->members, &line);
+    scratch->line = line;
     const std::vector<int>& on = wall.cells;
     if (on.empty() || line.across > scatter_ * scatter_) return std::nullopt;
     std::vector<double> places;
@@ -204,6 +220,21 @@ class WallGrower {
     wall.begin = places.front();
     wall.end = places.back();
     return wall;
+  }
+
+  // After Grow came to nothing: the cells from which it would most likely come
+  // to the same line once more.
+  std::vector<int> CellsOf(const Scratch& failed) const {
+    const double cos_turn = std::cos(kSpentTurn);
+    std::vector<int> cells;
+    for (const int index : failed.members) {
+      const ReturnCells::Cell& cell = Of(index);
+      if (std::abs(cell.direction.dot(failed.line.direction)) >= cos_turn &&
+          failed.line.Distance(cell.mean) <= kSpentScatters * scatter_) {
+        cells.push_back(index);
+      }
+    }
+    return cells;
   }
 
  private:
@@ -433,43 +464,56 @@ class Completion {
     }
   }
 
-  // Grows a wall from each of these cells in turn that is not used by then.
-  // Most seeds come to nothing and change nothing, so that many are tried at a
-  // time; those after the first that makes a wall are tried once more.
+  // Grows a wall from each of these cells in turn that is not used or spent by
+  // then. Most seeds come to nothing, so that several threads try many at a
+  // time; what the first ones would have spared is not looked at, and those
+  // after the first that makes a wall are tried once more.
   void GrowAll(const WallGrower& grower, const std::vector<int>& seeds) {
     const auto threads =
         static_cast<std::size_t>(std::max(1, options_.num_threads));
-    std::size_t at_once = kSeedsAtOnce;
-    std::vector<int> tried;
-    std::vector<std::optional<GrownWall>> grown;
+    const std::size_t fewest = threads > 1 ? kSeedsAtOnce * threads : 1;
+    const std::size_t most = threads > 1 ? kMostSeedsAtOnce * threads : 1;
+    std::size_t at_once = fewest;
+    std::vector<std::uint8_t> spent(returns_.cells().size(), 0);
+    std::vector<Trial> trials;
     scratch_.resize(threads);
     for (std::size_t k = 0; k < seeds.size() && !IsStopped();) {
-      tried.clear();
+      trials.clear();
       std::size_t end = k;
-      while (end < seeds.size() && tried.size() < at_once) {
-        if (!returns_.cells()[seeds[end]].used)
-          tried.push_back(static_cast<int>(end));
-        ++end;
+      for (; end < seeds.size() && trials.size() < at_once; ++end) {
+        if (returns_.cells()[seeds[end]].used || spent[seeds[end]] >= kSpentBy)
+          continue;
+        trials.emplace_back();
+        trials.back().position = end;
       }
-      const std::size_t share = (tried.size() + threads - 1) / threads;
-      grown.assign(threads, std::nullopt);
+      const std::size_t share = (trials.size() + threads - 1) / threads;
       ParallelFor(threads, options_.num_threads, [&](std::size_t t) {
-        const std::size_t last = std::min(tried.size(), (t + 1) * share);
-        for (std::size_t i = t * share; i < last && !grown[t]; ++i) {
-          grown[t] = grower.Grow(seeds[tried[i]], &scratch_[t]);
-          if (grown[t]) grown[t]->position = tried[i];
+        const std::size_t last = std::min(trials.size(), (t + 1) * share);
+        for (std::size_t i = t * share; i < last; ++i) {
+          Trial& trial = trials[i];
+          trial.is_made = true;
+          trial.wall = grower.Grow(seeds[trial.position], &scratch_[t]);
+          if (trial.wall) break;
+          trial.spent = grower.CellsOf(scratch_[t]);
         }
       });
-      const auto first =
-          std::find_if(grown.begin(), grown.end(),
-                       [](const auto& wall) { return wall.has_value(); });
-      if (first == grown.end()) {
-        k = end;
-        at_once = std::min(2 * at_once, kMostSeedsAtOnce);
-      } else {
-        k = (*first)->position + 1;
-        Keep(**first);
-        at_once = kSeedsAtOnce;
+      at_once = std::min(2 * at_once, most);
+      k = end;
+      for (const Trial& trial : trials) {
+        if (!trial.is_made) {
+          k = trial.position;
+          break;
+        }
+        if (spent[seeds[trial.position]] >= kSpentBy) continue;
+        if (trial.wall) {
+          k = trial.position + 1;
+          Keep(*trial.wall);
+          at_once = fewest;
+          break;
+        }
+        for (const int cell : trial.spent) {
+          spent[cell] = std::min<std::uint8_t>(kSpentBy, spent[cell] + 1);
+        }
       }
     }
   }

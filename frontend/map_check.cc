@@ -23,7 +23,9 @@ namespace {
 constexpr double kLongestStep = 2.0;
 
 // Between two times that `stop` is asked.
-constexpr std::size_t kScansAtOnce = 64;
+constexpr std::size_t kScansAtOnce = 128;
+// Looked at by one thread.
+constexpr std::size_t kScansInARow = 16;
 
 // In which parts of a track are compared.
 constexpr std::size_t kRounds = 4;
@@ -196,7 +198,7 @@ JudgedScans JudgeScans(const std::vector<Scan>& scans,
   const PlaceGrid grid(poses, options.radius);
   const MapComparison comparison(scans, keys, poses, options);
   std::vector<Verdict> verdicts(looked_at.size(), Verdict::kUnknown);
-  const auto judge = [&](std::size_t i) {
+  const auto judge = [&](std::size_t i, ScanReturns* returns) {
     const std::size_t k = looked_at[i];
     std::vector<std::pair<double, std::size_t>> others;
     grid.Around(poses[k].head<2>(), [&](std::size_t j) {
@@ -207,15 +209,23 @@ JudgedScans JudgeScans(const std::vector<Scan>& scans,
       }
     });
     if (static_cast<int>(others.size()) < options.min_others) return;
-    ScanReturns returns(scans, options.points);
-    verdicts[i] = Judge(
-        comparison.Compare(keys[k], poses[k], std::move(others), &returns),
-        options);
+    verdicts[i] =
+        Judge(comparison.Compare(keys[k], poses[k], std::move(others), returns),
+              options);
   };
   for (std::size_t begin = 0; begin < looked_at.size(); begin += kScansAtOnce) {
     if (stop && stop()) return {};
-    ParallelFor(std::min(kScansAtOnce, looked_at.size() - begin),
-                options.num_threads, [&](std::size_t i) { judge(begin + i); });
+    // Those that follow each other are compared with many of the same scans.
+    const std::size_t end = std::min(begin + kScansAtOnce, looked_at.size());
+    ParallelFor((end - begin + kScansInARow - 1) / kScansInARow,
+                options.num_threads, [&](std::size_t row) {
+                  ScanReturns returns(scans, options.points);
+                  const std::size_t first = begin + row * kScansInARow;
+                  for (std::size_t i = first;
+                       i < std::min(first + kScansInARow, end); ++i) {
+                    judge(i, &returns);
+                  }
+                });
   }
   return {std::move(looked_at), std::move(verdicts)};
 }

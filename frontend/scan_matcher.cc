@@ -82,44 +82,36 @@ struct Nearest {
   }
 };
 
-// Makes one of those points of a bucket that lie nearer than `distance`, m, to
-// each other and look the same way: their mean. What was seen often is a band
-// as wide as its noise, in which whatever lies there has a partner to hand: it
-// creeps to its place, past many that say the same. `begins`: the first point
-// of each bucket, and the end.
+// Makes one of those of the points from the `first` on that lie nearer than
+// `distance`, m, to each other and look the same way: their mean. What was seen
+// often is a band as wide as its noise, in which whatever lies there has a
+// partner to hand: it creeps to its place, past many that say the same.
 template <typename Surface>
-void MergeNear(double distance, std::vector<int>* begins,
+void MergeNear(double distance, std::size_t first,
                std::vector<Surface>* points) {
-  std::size_t count = 0;
-  std::vector<int> shares;
-  for (std::size_t b = 0; b + 1 < begins->size(); ++b) {
-    const auto first = static_cast<std::size_t>((*begins)[b]);
-    const auto last = static_cast<std::size_t>((*begins)[b + 1]);
-    const std::size_t begin = count;
-    (*begins)[b] = static_cast<int>(begin);
-    shares.clear();
-    for (std::size_t i = first; i < last; ++i) {
-      const Surface point = (*points)[i];
-      std::size_t k = begin;
-      while (k < count &&
-             ((point.position - (*points)[k].position).squaredNorm() >=
-                  distance * distance ||
-              point.normal.dot((*points)[k].normal) < kOneSurface)) {
-        ++k;
-      }
-      if (k == count) {
-        (*points)[count++] = point;
-        shares.push_back(1);
-        continue;
-      }
-      Surface& mean = (*points)[k];
-      const int share = ++shares[k - begin];
-      mean.position += (point.position - mean.position) / share;
-      mean.normal =
-          (mean.normal + (point.normal - mean.normal) / share).normalized();
+  std::size_t count = first;
+  thread_local std::vector<int> shares;
+  shares.clear();
+  for (std::size_t i = first; i < points->size(); ++i) {
+    const Surface point = (*points)[i];
+    std::size_t k = first;
+    while (k < count &&
+           ((point.position - (*points)[k].position).squaredNorm() >=
+                distance * distance ||
+            point.normal.dot((*points)[k].normal) < kOneSurface)) {
+      ++k;
     }
+    if (k == count) {
+      (*points)[count++] = point;
+      shares.push_back(1);
+      continue;
+    }
+    Surface& mean = (*points)[k];
+    const int share = ++shares[k - first];
+    mean.position += (point.position - mean.position) / share;
+    mean.normal =
+        (mean.normal + (point.normal - mean.normal) / share).normalized();
   }
-  begins->back() = static_cast<int>(count);
   points->resize(count);
 }
 
@@ -223,55 +215,48 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
   const Eigen::Vector2d size = (maximum - minimum).array() + 2.0 * margin;
   bucket_columns_ = static_cast<int>(std::ceil(size.x() / bucket_size_)) + 1;
   bucket_rows_ = static_cast<int>(std::ceil(size.y() / bucket_size_)) + 1;
-  const std::size_t cells =
-      static_cast<std::size_t>(bucket_columns_) * bucket_rows_;
-  bucket_begin_.assign(cells + 1, 0);
-  std::vector<int> cell_of(points.size(), -1);
-  // Of each row the columns with points: from the first to before the end.
-  struct Columns {
-    int begin = std::numeric_limits<int>::max();
-    int end = 0;
+  // Of each row its points, by columns.
+  struct InRow {
+    int column;
+    std::size_t point;
   };
-  std::vector<Columns> columns_of(static_cast<std::size_t>(bucket_rows_));
+  std::vector<std::vector<InRow>> rows(static_cast<std::size_t>(bucket_rows_));
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2d local = (points[i].position - origin_) / bucket_size_;
     if (!(local.x() >= 0.0 && local.y() >= 0.0 && local.x() < bucket_columns_ &&
           local.y() < bucket_rows_)) {
       continue;
     }
-    const int column = static_cast<int>(local.x());
-    const int row = static_cast<int>(local.y());
-    cell_of[i] = row * bucket_columns_ + column;
-    ++bucket_begin_[cell_of[i] + 1];
-    Columns& columns = columns_of[static_cast<std::size_t>(row)];
-    columns.begin = std::min(columns.begin, column);
-    columns.end = std::max(columns.end, column + 1);
+    rows[static_cast<std::size_t>(local.y())].push_back(
+        {static_cast<int>(local.x()), i});
   }
-  // Most cells are empty, and filled faster than they are added up.
-  int before = 0;
-  auto next_row = bucket_begin_.begin() + 1;
-  for (const Columns& columns : columns_of) {
-    const auto first = next_row;
-    next_row += bucket_columns_;
-    if (columns.end == 0) {
-      std::fill(first, next_row, before);
-      continue;
+  // Most buckets are empty: each is written once.
+  bucket_begin_.resize(
+      static_cast<std::size_t>(bucket_columns_) * bucket_rows_ + 1);
+  reference_.reserve(points.size());
+  auto bucket = bucket_begin_.begin();
+  for (std::vector<InRow>& row : rows) {
+    std::stable_sort(
+        row.begin(), row.end(),
+        [](const InRow& a, const InRow& b) { return a.column < b.column; });
+    const auto row_end = bucket + bucket_columns_;
+    int column = 0;
+    for (auto next = row.begin(); next != row.end();) {
+      const auto begins = bucket + (next->column - column) + 1;
+      std::fill(bucket, begins, static_cast<int>(reference_.size()));
+      bucket = begins;
+      column = next->column + 1;
+      const std::size_t first = reference_.size();
+      for (; next != row.end() && next->column < column; ++next) {
+        const ScanPoint& point = points[next->point];
+        reference_.push_back({point.position, point.normal});
+      }
+      MergeNear(options_.point_sigma, first, &reference_);
     }
-    std::fill(first, first + columns.begin, before);
-    for (auto cell = first + columns.begin; cell != first + columns.end;
-         ++cell) {
-      *cell += before;
-      before = *cell;
-    }
-    std::fill(first + columns.end, next_row, before);
+    std::fill(bucket, row_end, static_cast<int>(reference_.size()));
+    bucket = row_end;
   }
-  reference_.resize(bucket_begin_[cells]);
-  std::vector<int> next(bucket_begin_.begin(), bucket_begin_.end() - 1);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (cell_of[i] < 0) continue;
-    reference_[next[cell_of[i]]++] = {points[i].position, points[i].normal};
-  }
-  MergeNear(options_.point_sigma, &bucket_begin_, &reference_);
+  *bucket = static_cast<int>(reference_.size());
   // The last block may be read beyond the end.
   reference_x_.assign(reference_.size() + kBlock, 0.0f);
   reference_y_.assign(reference_.size() + kBlock, 0.0f);

@@ -4,7 +4,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -71,58 +70,28 @@ void FillBetween(const Eigen::Vector2d& laser, int parts,
   *goes_on = std::move(filled_goes_on);
 }
 
-// Neighbours of a point on its surface.
-struct Neighbours {
-  int point = 0;
-  int begin = 0;
-  int end = 0;
-
-  int count() const { return end - begin; }
-};
-
-// Scatter of neighbours about their mean.
-struct Scatter {
+// Sums over the first points of a scan, from a place among them on: those over
+// the points of a stretch are differences of two, whatever its length.
+struct Sums {
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();
   double xx = 0.0;
   double xy = 0.0;
   double yy = 0.0;
+
+  Sums Plus(const Eigen::Vector2d& d) const {
+    return {position + d, xx + d.x() * d.x(), xy + d.x() * d.y(),
+            yy + d.y() * d.y()};
+  }
 };
 
-// Of so many points at a time: each sum alone waits for the addition before.
-constexpr int kAtOnce = 4;
-
-std::array<Scatter, kAtOnce> ScattersOf(
-    const std::vector<Eigen::Vector2d>& positions,
-    const std::array<Neighbours, kAtOnce>& groups) {
-  int common = groups[0].count();
-  for (const Neighbours& group : groups) {
-    common = std::min(common, group.count());
-  }
-  // Calls `add(w, position)` with each neighbour of each group `w`, in order.
-  const auto add_all = [&](const auto& add) {
-    std::array<const Eigen::Vector2d*, kAtOnce> first;
-    for (int w = 0; w < kAtOnce; ++w) {
-      first[w] = positions.data() + groups[w].begin;
-    }
-    for (int k = 0; k < common; ++k) {
-      for (int w = 0; w < kAtOnce; ++w) add(w, first[w][k]);
-    }
-    for (int w = 0; w < kAtOnce; ++w) {
-      for (int k = common; k < groups[w].count(); ++k) add(w, first[w][k]);
-    }
-  };
-  std::array<Eigen::Vector2d, kAtOnce> means;
-  for (Eigen::Vector2d& mean : means) mean.setZero();
-  add_all(
-      [&](int w, const Eigen::Vector2d& position) { means[w] += position; });
-  for (int w = 0; w < kAtOnce; ++w) means[w] /= groups[w].count();
-  std::array<Scatter, kAtOnce> scatters;
-  add_all([&](int w, const Eigen::Vector2d& position) {
-    const Eigen::Vector2d d = position - means[w];
-    scatters[w].xx += d.x() * d.x();
-    scatters[w].xy += d.x() * d.y();
-    scatters[w].yy += d.y() * d.y();
-  });
-  return scatters;
+// Principal axis of so many points that lie between two sums, with scatters
+// about their mean in place of variances.
+PrincipalAxis AxisBetween(const Sums& before, const Sums& after, int count) {
+  const Eigen::Vector2d sum = after.position - before.position;
+  const Eigen::Vector2d mean = sum / count;
+  return PrincipalAxisOf(after.xx - before.xx - sum.x() * mean.x(),
+                         after.xy - before.xy - sum.x() * mean.y(),
+                         after.yy - before.yy - sum.y() * mean.y());
 }
 
 // Parts into which the angle between neighbouring beams is cut.
@@ -168,48 +137,43 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
   if (parts > 1) FillBetween(laser, parts, points, &goes_on);
   const double angle_step = std::abs(scan.angle_step) / parts;
   const int n = static_cast<int>(points->size());
-  std::vector<Eigen::Vector2d> positions;
-  positions.reserve(points->size());
+  thread_local std::vector<Eigen::Vector2d> positions;
+  positions.clear();
   for (const ScanPoint& point : *points) positions.push_back(point.position);
-  std::vector<Neighbours> groups;
-  groups.reserve(points->size() + kAtOnce);
-  int surface_begin = 0;
-  for (int i = 0; i < n; ++i) {
-    if (!goes_on[i]) surface_begin = i;
-    const ScanPoint& point = (*points)[i];
-    // Far away neighbours are far apart: widen the fit to hold two on each
-    // side where the surface allows.
-    const double radius = std::max(
-        options.normal_radius, 2.5 * std::sqrt(2.0) * point.range * angle_step);
-    int begin = i;
-    while (begin > surface_begin &&
-           (positions[begin - 1] - positions[i]).squaredNorm() <=
-               radius * radius) {
-      --begin;
-    }
-    int end = i + 1;
-    while (end < n && goes_on[end] &&
-           (positions[end] - positions[i]).squaredNorm() <= radius * radius) {
-      ++end;
-    }
-    if (end - begin >= 3) groups.push_back({i, begin, end});
-  }
-  const std::size_t fitted = groups.size();
-  // The last ones are fitted once more where they do not fill what is done at a
-  // time.
-  while (groups.size() % kAtOnce != 0) groups.push_back(groups.back());
-  for (std::size_t g = 0; g < groups.size(); g += kAtOnce) {
-    std::array<Neighbours, kAtOnce> together;
-    std::copy_n(groups.begin() + static_cast<std::ptrdiff_t>(g), kAtOnce,
-                together.begin());
-    const std::array<Scatter, kAtOnce> scatters =
-        ScattersOf(positions, together);
-    for (std::size_t w = 0; w < kAtOnce && g + w < fitted; ++w) {
-      ScanPoint& point = (*points)[static_cast<std::size_t>(together[w].point)];
-      const int count = together[w].count();
-      const Scatter& scatter = scatters[w];
+  // Before each point of the surface that is looked at; from its first one on,
+  // so that they are as exact far away.
+  thread_local std::vector<Sums> sums;
+  for (int surface = 0; surface < n;) {
+    sums.assign(1, Sums());
+    int surface_end = surface;
+    do {
+      sums.push_back(
+          sums.back().Plus(positions[surface_end] - positions[surface]));
+      ++surface_end;
+    } while (surface_end < n && goes_on[surface_end]);
+    for (int i = surface; i < surface_end; ++i) {
+      ScanPoint& point = (*points)[i];
+      // Far away neighbours are far apart: widen the fit to hold two on each
+      // side where the surface allows.
+      const double radius =
+          std::max(options.normal_radius,
+                   2.5 * std::sqrt(2.0) * point.range * angle_step);
+      const double squared_radius = radius * radius;
+      int begin = i;
+      while (begin > surface &&
+             (positions[begin - 1] - positions[i]).squaredNorm() <=
+                 squared_radius) {
+        --begin;
+      }
+      int end = i + 1;
+      while (end < surface_end &&
+             (positions[end] - positions[i]).squaredNorm() <= squared_radius) {
+        ++end;
+      }
+      const int count = end - begin;
+      if (count < 3) continue;
       const PrincipalAxis axis =
-          PrincipalAxisOf(scatter.xx, scatter.xy, scatter.yy);
+          AxisBetween(sums[begin - surface], sums[end - surface], count);
       const double across = axis.across / count;
       const double along = axis.along / count;
       if (across > options.normal_tolerance * options.normal_tolerance ||
@@ -220,6 +184,7 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
       if (normal.dot(laser - point.position) < 0.0) normal = -normal;
       point.normal = normal;
     }
+    surface = surface_end;
   }
 }
 

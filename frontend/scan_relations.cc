@@ -81,6 +81,31 @@ std::vector<ScanPoint> Reference(const Submap& submap,
   return reference;
 }
 
+// About so many points of a scan are matched until poses are trusted: what they
+// say is said anew then.
+constexpr std::size_t kFewPoints = 90;
+
+// One in so many of the points of a scan with a normal, evenly.
+std::vector<ScanPoint> OneIn(std::size_t stride,
+                             const std::vector<ScanPoint>& scan) {
+  std::vector<ScanPoint> points;
+  std::size_t left = stride / 2;
+  for (const ScanPoint& point : scan) {
+    if (point.normal.squaredNorm() == 0.0) continue;
+    if (left-- > 0) continue;
+    points.push_back(point);
+    left = stride - 1;
+  }
+  return points;
+}
+
+std::size_t StrideToFew(const std::vector<ScanPoint>& scan) {
+  const auto count = static_cast<std::size_t>(std::count_if(
+      scan.begin(), scan.end(),
+      [](const ScanPoint& point) { return point.normal.squaredNorm() > 0.0; }));
+  return std::max<std::size_t>(1, count / kFewPoints);
+}
+
 // At most `most` of the submaps near a place, given nearest first: the nearest
 // half, and others in even steps of time, so that every visit has its share.
 // Those that it was matched with before come first: where many are near, the
@@ -240,13 +265,18 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
       ++tried[i];
       Attempt attempt;
       attempt.pose = here.pose;
-      if (!matcher.empty() && matcher.OverlapsBy(options_.min_overlap,
-                                                 places_[k].scan, here.pose)) {
-        const MatchResult match =
-            matcher.Refine(places_[k].scan, here.pose, here);
+      const std::size_t stride =
+          trusts_poses_ ? 1 : StrideToFew(places_[k].scan);
+      std::vector<ScanPoint> few;
+      if (stride > 1) few = OneIn(stride, places_[k].scan);
+      const std::vector<ScanPoint>& scan = stride > 1 ? few : places_[k].scan;
+      if (!matcher.empty() &&
+          matcher.OverlapsBy(options_.min_overlap, scan, here.pose)) {
+        const MatchResult match = matcher.Refine(scan, here.pose, here);
         if (match.inlier_ratio >= options_.min_inlier_ratio) {
           attempt.is_match = true;
-          attempt.relation = {middle, k, match.pose, match.information};
+          attempt.relation = {middle, k, match.pose,
+                              static_cast<double>(stride) * match.information};
         }
       }
       attempts.emplace(k, attempt);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace plumbline {
@@ -92,15 +93,21 @@ void MergeNear(double distance, std::size_t first,
   std::size_t count = first;
   thread_local std::vector<int> shares;
   shares.clear();
+  std::size_t last = first;
   for (std::size_t i = first; i < points->size(); ++i) {
     const Surface point = (*points)[i];
-    std::size_t k = first;
-    while (k < count &&
-           ((point.position - (*points)[k].position).squaredNorm() >=
-                distance * distance ||
-            point.normal.dot((*points)[k].normal) < kOneSurface)) {
-      ++k;
+    const auto is_one = [&](std::size_t k) {
+      return (point.position - (*points)[k].position).squaredNorm() <
+                 distance * distance &&
+             point.normal.dot((*points)[k].normal) >= kOneSurface;
+    };
+    // Mostly with the one before it.
+    std::size_t k = last;
+    if (k >= count || !is_one(k)) {
+      k = first;
+      while (k < count && !is_one(k)) ++k;
     }
+    last = k;
     if (k == count) {
       (*points)[count++] = point;
       shares.push_back(1);
@@ -215,48 +222,60 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
   const Eigen::Vector2d size = (maximum - minimum).array() + 2.0 * margin;
   bucket_columns_ = static_cast<int>(std::ceil(size.x() / bucket_size_)) + 1;
   bucket_rows_ = static_cast<int>(std::ceil(size.y() / bucket_size_)) + 1;
-  // Of each row its points, by columns.
-  struct InRow {
-    int column;
-    std::size_t point;
-  };
-  std::vector<std::vector<InRow>> rows(static_cast<std::size_t>(bucket_rows_));
+  // Each point's bucket and number, in one that sorts by both; of each row the
+  // first one.
+  std::vector<std::uint64_t> places;
+  places.reserve(points.size());
+  std::vector<std::size_t> row_begin(static_cast<std::size_t>(bucket_rows_) + 1,
+                                     0);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2d local = (points[i].position - origin_) / bucket_size_;
     if (!(local.x() >= 0.0 && local.y() >= 0.0 && local.x() < bucket_columns_ &&
           local.y() < bucket_rows_)) {
       continue;
     }
-    rows[static_cast<std::size_t>(local.y())].push_back(
-        {static_cast<int>(local.x()), i});
+    const int row = static_cast<int>(local.y());
+    const auto bucket = static_cast<std::uint64_t>(row * bucket_columns_ +
+                                                   static_cast<int>(local.x()));
+    places.push_back(bucket << 32 | i);
+    ++row_begin[static_cast<std::size_t>(row) + 1];
+  }
+  std::partial_sum(row_begin.begin(), row_begin.end(), row_begin.begin());
+  std::vector<std::uint64_t> sorted(places.size());
+  std::vector<std::size_t> next_in_row(row_begin.begin(), row_begin.end() - 1);
+  for (const std::uint64_t place : places) {
+    const std::size_t row =
+        static_cast<std::size_t>(place >> 32) / bucket_columns_;
+    sorted[next_in_row[row]++] = place;
   }
   // Most buckets are empty: each is written once.
   bucket_begin_.resize(
       static_cast<std::size_t>(bucket_columns_) * bucket_rows_ + 1);
   reference_.reserve(points.size());
-  auto bucket = bucket_begin_.begin();
-  for (std::vector<InRow>& row : rows) {
-    std::stable_sort(
-        row.begin(), row.end(),
-        [](const InRow& a, const InRow& b) { return a.column < b.column; });
-    const auto row_end = bucket + bucket_columns_;
-    int column = 0;
-    for (auto next = row.begin(); next != row.end();) {
-      const auto begins = bucket + (next->column - column) + 1;
-      std::fill(bucket, begins, static_cast<int>(reference_.size()));
-      bucket = begins;
-      column = next->column + 1;
+  std::size_t filled = 0;
+  const auto fill_up_to = [&](std::size_t end) {
+    std::fill(bucket_begin_.begin() + static_cast<std::ptrdiff_t>(filled),
+              bucket_begin_.begin() + static_cast<std::ptrdiff_t>(end),
+              static_cast<int>(reference_.size()));
+    filled = end;
+  };
+  for (std::size_t row = 0; row + 1 < row_begin.size(); ++row) {
+    const auto end =
+        sorted.begin() + static_cast<std::ptrdiff_t>(row_begin[row + 1]);
+    auto next = sorted.begin() + static_cast<std::ptrdiff_t>(row_begin[row]);
+    std::sort(next, end);
+    while (next != end) {
+      const std::uint64_t bucket = *next >> 32;
+      fill_up_to(static_cast<std::size_t>(bucket) + 1);
       const std::size_t first = reference_.size();
-      for (; next != row.end() && next->column < column; ++next) {
-        const ScanPoint& point = points[next->point];
+      for (; next != end && *next >> 32 == bucket; ++next) {
+        const ScanPoint& point = points[*next & 0xffffffffu];
         reference_.push_back({point.position, point.normal});
       }
       MergeNear(options_.point_sigma, first, &reference_);
     }
-    std::fill(bucket, row_end, static_cast<int>(reference_.size()));
-    bucket = row_end;
   }
-  *bucket = static_cast<int>(reference_.size());
+  fill_up_to(bucket_begin_.size());
   // The last block may be read beyond the end.
   reference_x_.assign(reference_.size() + kBlock, 0.0f);
   reference_y_.assign(reference_.size() + kBlock, 0.0f);

@@ -29,7 +29,7 @@ constexpr std::size_t kSeedsAtOnce = 16;
 constexpr std::size_t kMostSeedsAtOnce = 128;
 // A cell is no seed any more once it lay on so many lines that came to nothing:
 // so close to them, in scatters, and turned against them by no more than this.
-constexpr std::uint8_t kSpentBy = 2;
+constexpr std::uint8_t kSpentBy = 3;
 constexpr double kSpentScatters = 2.0;
 constexpr double kSpentTurn = DegToRad(5.0);
 constexpr std::size_t kWordBits = 64;

@@ -35,8 +35,9 @@ struct WayCheckOptions {
   double piece = 0.1;
   int min_beams = 3;
   /// Width in one piece that is solid and passed from which on it is no door,
-  /// m.
-  double min_width = 1.2;
+  /// m: doors and their frames have up to 1.2, and the pieces at both ends
+  /// count whole.
+  double min_width = 1.4;
   int num_threads = 0;
 
   /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).

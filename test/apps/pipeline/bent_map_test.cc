@@ -87,14 +87,14 @@ TEST(AreBentByWallsTest, WhereWaysTurnAtTheMedian) {
   const auto arc = [](int count, double degrees_a_metre) {
     return Arc(Pose2(1.0, 2.0, 3.0), count, DegToRad(0.5 * degrees_a_metre));
   };
-  // 0.48 degrees over 30 m.
-  EXPECT_TRUE(AreBentByWalls(arc(80, 0.0), arc(80, 0.016)));
-  EXPECT_TRUE(AreBentByWalls(arc(80, 0.016), arc(80, 0.0)));
-  // 0.42 over 30 m, but 0.84 over 60 m.
-  EXPECT_FALSE(AreBentByWalls(arc(80, 0.0), arc(80, 0.014)));
-  EXPECT_TRUE(AreBentByWalls(arc(160, 0.0), arc(160, 0.014)));
-  // 0.27 and 0.54.
-  EXPECT_FALSE(AreBentByWalls(arc(160, 0.0), arc(160, 0.009)));
+  // 0.3 degrees over 30 m.
+  EXPECT_TRUE(AreBentByWalls(arc(80, 0.0), arc(80, 0.01)));
+  EXPECT_TRUE(AreBentByWalls(arc(80, 0.01), arc(80, 0.0)));
+  // 0.24 over 30 m, but 0.48 over 60 m.
+  EXPECT_FALSE(AreBentByWalls(arc(80, 0.0), arc(80, 0.008)));
+  EXPECT_TRUE(AreBentByWalls(arc(160, 0.0), arc(160, 0.008)));
+  // 0.18 and 0.36.
+  EXPECT_FALSE(AreBentByWalls(arc(160, 0.0), arc(160, 0.006)));
   // Where they stand does not count, nor a bend that both have.
   EXPECT_FALSE(AreBentByWalls(Arc(Pose2(-5.0, 7.0, -kPi), 160, DegToRad(2.0)),
                               Arc(Pose2::Zero(), 160, DegToRad(2.0))));

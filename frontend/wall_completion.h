@@ -26,7 +26,7 @@ struct WallCompletionOptions {
   /// Of a stretch only returns up to this range count, m: farther away what a
   /// pose is turned by smears walls more than they turn at small angles. What
   /// nobody saw from nearer is looked for in all returns in the end.
-  double near_range = 10.0;
+  double near_range = 15.0;
   /// Returns are gathered in cells of this size, m.
   double cell_size = 0.05;
   /// Neighbourhood in which a cell's direction is fitted, m.

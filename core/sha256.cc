@@ -7,12 +7,6 @@
 #include <system_error>
 #include <vector>
 
-#if defined(__x86_64__) && defined(__GNUC__)
-#include <cpuid.h>
-#include <immintrin.h>
-#define PLUMBLINE_SHA_INSTRUCTIONS
-#endif
-
 namespace plumbline {
 namespace {
 
@@ -40,72 +34,9 @@ std::uint32_t BigEndianWord(const unsigned char* bytes) {
          static_cast<std::uint32_t>(bytes[3]);
 }
 
-#ifdef PLUMBLINE_SHA_INSTRUCTIONS
-bool HasShaInstructions() {
-  unsigned a = 0, b = 0, c = 0, d = 0;
-  const bool has_sse41 =
-      __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_SSE4_1) != 0;
-  return has_sse41 && __get_cpuid_count(7, 0, &a, &b, &c, &d) != 0 &&
-         (b & bit_SHA) != 0;
-}
-
-// The same with the processor's own instructions: digests of large files are
-// some percent of a run otherwise.
-__attribute__((target("sha,sse4.1"))) void TakeBlockWithInstructions(
-    const unsigned char* block, std::uint32_t* state) {
-  const auto load = [](const void* from) {
-    return _mm_loadu_si128(static_cast<const __m128i*>(from));
-  };
-  // The instructions take the eight words as abef and cdgh, highest first.
-  const __m128i badc = _mm_shuffle_epi32(load(state), 0xB1);
-  const __m128i hgfe = _mm_shuffle_epi32(load(state + 4), 0x1B);
-  __m128i abef = _mm_alignr_epi8(badc, hgfe, 8);
-  __m128i cdgh = _mm_blend_epi16(hgfe, badc, 0xF0);
-  const __m128i abef_before = abef;
-  const __m128i cdgh_before = cdgh;
-  const __m128i big_endian =
-      _mm_set_epi64x(0x0c0d0e0f08090a0b, 0x0405060700010203);
-  // The last sixteen words of the schedule.
-  __m128i words[4];
-  for (int i = 0; i < 4; ++i) {
-    words[i] = _mm_shuffle_epi8(load(block + 16 * i), big_endian);
-  }
-#pragma GCC unroll 16
-  for (int i = 0; i < 16; ++i) {
-    __m128i& first = words[i % 4];
-    __m128i sums = _mm_add_epi32(first, load(kRoundConstants + 4 * i));
-    cdgh = _mm_sha256rnds2_epu32(cdgh, abef, sums);
-    sums = _mm_shuffle_epi32(sums, 0x0E);
-    abef = _mm_sha256rnds2_epu32(abef, cdgh, sums);
-    if (i >= 12) continue;
-    const __m128i& third = words[(i + 2) % 4];
-    const __m128i& fourth = words[(i + 3) % 4];
-    const __m128i next =
-        _mm_add_epi32(_mm_sha256msg1_epu32(first, words[(i + 1) % 4]),
-                      _mm_alignr_epi8(fourth, third, 4));
-    first = _mm_sha256msg2_epu32(next, fourth);
-  }
-  const __m128i feba =
-      _mm_shuffle_epi32(_mm_add_epi32(abef, abef_before), 0x1B);
-  const __m128i ghcd =
-      _mm_shuffle_epi32(_mm_add_epi32(cdgh, cdgh_before), 0xB1);
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(state),
-                   _mm_blend_epi16(feba, ghcd, 0xF0));
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(state + 4),
-                   _mm_alignr_epi8(ghcd, feba, 8));
-}
-#endif
-
 }  // namespace
 
 void Sha256::TakeBlock(const unsigned char* block) {
-#ifdef PLUMBLINE_SHA_INSTRUCTIONS
-  static const bool has_instructions = HasShaInstructions();
-  if (has_instructions) {
-    TakeBlockWithInstructions(block, state_.data());
-    return;
-  }
-#endif
   std::uint32_t schedule[64];
   for (int i = 0; i < 16; ++i) schedule[i] = BigEndianWord(block + 4 * i);
   for (int i = 16; i < 64; ++i) {

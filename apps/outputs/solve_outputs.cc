@@ -21,7 +21,6 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <numeric>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -224,15 +223,6 @@ auto Always(Write write) {
   };
 }
 
-// Whether a writer asks SharedParts for rooms or the grid that they are found
-// on. The report has much else to do before.
-bool NeedsRooms(const OutputWriterType& writer) {
-  static const std::set<std::string> kNames = {
-      "map.json",          "floorplan.dxf", "floorplan.svg",
-      "floorplan.geojson", "rooms.csv",     "occupancy.pgm"};
-  return kNames.count(writer.name) > 0;
-}
-
 // What a writer came to.
 struct WriteResult {
   std::string reason;
@@ -417,23 +407,10 @@ WrittenOutputs WriteSolveOutputs(
     if (output->of_scans && outcome.trajectory.empty()) continue;
     selected.push_back(output);
   }
-  // What takes longest, rooms, is made by whoever needs it first, and the
-  // others that need it wait: one of them begins, and comes before those that
-  // need no rooms.
-  const auto waits = [](const OutputWriterType* writer) {
-    return writer->name == "floorplan.svg" ? 0 : NeedsRooms(*writer) ? 2 : 1;
-  };
-  std::vector<std::size_t> order(selected.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) {
-                     return waits(selected[a]) < waits(selected[b]);
-                   });
   std::vector<WriteResult> results(selected.size());
   std::mutex mutex;
   int done = 0;
-  ParallelFor(selected.size(), threads, [&](std::size_t k) {
-    const std::size_t i = order[k];
+  ParallelFor(selected.size(), threads, [&](std::size_t i) {
     results[i] = RunWriter(*selected[i], outcome, folder);
     const std::lock_guard<std::mutex> lock(mutex);
     ++done;

@@ -338,7 +338,7 @@ class Regions {
     Regions trial = *this;
     trial.JoinSpacesInWalls({a, b});
     trial.JoinThrough(options, {a, b});
-    return trial.HaveDoorsToOne(a, b);
+    return trial.HaveDoorsToOne(a, b, options);
   }
 
   // What lies in a doorway, between two lines of one wall, goes to the space
@@ -365,14 +365,21 @@ class Regions {
     }
   }
 
-  bool HaveDoorsToOne(int a, int b) {
+  // Only a third that is a space of its own speaks for the two: pieces of one
+  // room with gaps all around would vouch for each other.
+  bool HaveDoorsToOne(int a, int b, const RegionOptions& options) {
     const std::map<int, Border>& others = BordersOf(b);
     const auto& around = BordersOf(a);
+    const auto has_door = [&](int room, int third, const Border& border) {
+      return border.all.Of(Mark::kDoor) >= kLeastOpening &&
+             HoldsApart(border.all, room, third, options) >=
+                 options.holds_apart;
+    };
     return std::any_of(around.begin(), around.end(), [&](const auto& entry) {
-      if (entry.second.all.Of(Mark::kDoor) < kLeastOpening) return false;
-      const auto other = others.find(entry.first);
-      return other != others.end() &&
-             other->second.all.Of(Mark::kDoor) >= kLeastOpening;
+      const auto& [third, border] = entry;
+      const auto other = others.find(third);
+      return other != others.end() && has_door(a, third, border) &&
+             has_door(b, third, other->second);
     });
   }
 

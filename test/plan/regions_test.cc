@@ -136,6 +136,29 @@ void AddEdge(const Vector2d& begin, const Vector2d& end, int left, int right,
   arrangement->edges.push_back(edge);
 }
 
+// A room of three pieces, each with a gap in furniture to both others: none of
+// them is a corridor to which the other two have a door each.
+TEST(RegionsTest, PiecesOfARoomDoNotVouchForEachOther) {
+  Arrangement arrangement;
+  AddFace({{0.0, 0.0}, {3.0, 0.0}, {3.0, 3.0}, {0.0, 3.0}}, &arrangement);
+  AddFace({{3.0, 0.0}, {6.0, 0.0}, {6.0, 3.0}, {3.0, 3.0}}, &arrangement);
+  AddFace({{0.0, 3.0}, {3.0, 3.0}, {6.0, 3.0}, {6.0, 6.0}, {0.0, 6.0}},
+          &arrangement);
+  AddEdge({3.0, 0.0}, {3.0, 3.0}, 0, 1, 0.2, 1.0, &arrangement);
+  AddEdge({3.0, 3.0}, {0.0, 3.0}, 0, 2, 0.2, 1.0, &arrangement);
+  AddEdge({6.0, 3.0}, {3.0, 3.0}, 1, 2, 0.2, 1.0, &arrangement);
+  AddEdge({0.0, 0.0}, {3.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+  AddEdge({0.0, 3.0}, {0.0, 0.0}, 0, -1, 1.0, 0.0, &arrangement);
+  AddEdge({3.0, 0.0}, {6.0, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
+  AddEdge({6.0, 0.0}, {6.0, 3.0}, 1, -1, 1.0, 0.0, &arrangement);
+  AddEdge({6.0, 3.0}, {6.0, 6.0}, 2, -1, 1.0, 0.0, &arrangement);
+  AddEdge({6.0, 6.0}, {0.0, 6.0}, 2, -1, 1.0, 0.0, &arrangement);
+  AddEdge({0.0, 6.0}, {0.0, 3.0}, 2, -1, 1.0, 0.0, &arrangement);
+  const std::vector<int> region = FindRegions(arrangement);
+  EXPECT_EQ(region[0], region[1]);
+  EXPECT_EQ(region[0], region[2]);
+}
+
 // Two rooms side by side with a border that holds less than others, and a
 // corridor below both: with a door each they stay two.
 TEST(RegionsTest, RoomsWithADoorEachStayApart) {

@@ -44,6 +44,8 @@ constexpr double kLeastLength = 2.0;
 constexpr double kLeastCorridor = 5.0;
 // Corners nearer to each other are one, m.
 constexpr double kSameCorner = 2e-3;
+// A side of a room has so much wall at least, m: else furniture stands there.
+constexpr double kLeastSide = 2.0;
 // What is narrower lies between two lines of one wall or along furniture, m.
 constexpr double kSliver = 0.5;
 // Regions that touch in no more than a corner are no neighbors, m.
@@ -91,11 +93,13 @@ struct Extent {
   }
 };
 
+// Lengths of borders by the drawn lines that they lie on.
+using LineLengths = std::map<int, BorderLengths>;
+
 // What lies between two regions.
 struct Border {
   BorderLengths all;
-  // By the drawn line that it lies on.
-  std::map<int, BorderLengths> of_line;
+  LineLengths of_line;
 
   void Add(int line, const BorderLengths& lengths) {
     all.Add(lengths);
@@ -108,6 +112,13 @@ struct Border {
     }
   }
 };
+
+void Subtract(const BorderLengths& part, BorderLengths* from) {
+  for (std::size_t i = 0; i < part.metres.size(); ++i) {
+    from->metres[i] -= part.metres[i];
+  }
+  from->holds -= part.holds;
+}
 
 // Over 0: nothing but an opening as wide as the spaces themselves, while a door
 // has a wall beside it.
@@ -175,6 +186,7 @@ class Regions {
       : region_(arrangement.faces.size(), -1),
         borders_(region_.size()),
         of_solids_(region_.size()),
+        sides_(region_.size()),
         extents_(region_.size()) {
     for (std::size_t i = 0; i < region_.size(); ++i) {
       if (is_inside[i]) region_[i] = static_cast<int>(i);
@@ -185,7 +197,12 @@ class Regions {
     }
     const std::vector<int> hidden = HiddenSpaces(arrangement, options, region_);
     for (const ArrangementEdge& edge : arrangement.edges) {
-      if (edge.right < 0 || edge.left == edge.right) continue;
+      if (edge.left == edge.right) continue;
+      for (const int face : {edge.left, edge.right}) {
+        if (face < 0) continue;
+        sides_[static_cast<std::size_t>(face)][edge.line].Add(edge.lengths);
+      }
+      if (edge.right < 0) continue;
       for (const auto& [face, beside] :
            {std::make_pair(edge.left, edge.right),
             std::make_pair(edge.right, edge.left)}) {
@@ -253,15 +270,15 @@ class Regions {
     // Then by number.
     using Pair = std::tuple<double, int, int>;
     std::set<Pair> queue;
-    const auto key = [&](const BorderLengths& border, int a, int b) {
-      const bool is_left = AreApart(border, a, b, options) ||
+    const auto key = [&](const Border& border, int a, int b) {
+      const bool is_left = AreApart(border.all, a, b, options) ||
                            (only_slivers && !IsSliver(a) && !IsSliver(b));
       return Pair(is_left ? 1.0 : HoldsApart(border, a, b, options),
                   std::min(a, b), std::max(a, b));
     };
     for (std::size_t a = 0; a < borders_.size(); ++a) {
       for (const auto& [b, border] : borders_[a]) {
-        queue.insert(key(border.all, static_cast<int>(a), b));
+        queue.insert(key(border, static_cast<int>(a), b));
       }
     }
     while (!queue.empty()) {
@@ -275,12 +292,12 @@ class Regions {
       }
       for (const int end : {a, b}) {
         for (const auto& [c, border] : BordersOf(end)) {
-          queue.erase(key(border.all, end, c));
+          queue.erase(key(border, end, c));
         }
       }
       Join(a, b);
       for (const auto& [c, border] : BordersOf(a)) {
-        queue.insert(key(border.all, a, c));
+        queue.insert(key(border, a, c));
       }
     }
   }
@@ -294,14 +311,19 @@ class Regions {
   // What holds two regions apart, mean along what lies between them: their
   // border, and what stands between them and was seen from both sides, as the
   // row of cupboards beside a passage.
-  double HoldsApart(const BorderLengths& border, int a, int b,
+  double HoldsApart(const Border& border, int a, int b,
                     const RegionOptions& options) const {
     const auto& others = of_solids_[static_cast<std::size_t>(b)];
-    double length = border.length();
-    if (length < kLeastBorder) return 1.0;
-    double holds = border.holds;
+    if (border.all.length() < kLeastBorder) return 1.0;
     if (!CouldBeRoom(a, options) || !CouldBeRoom(b, options)) {
-      return holds / length;
+      return border.all.holds / border.all.length();
+    }
+    double length = 0.0;
+    double holds = 0.0;
+    for (const auto& [line, between] : border.of_line) {
+      const BorderLengths& side = SideWithDoor(line, between, a, b);
+      length += side.length();
+      holds += side.holds;
     }
     for (const auto& [solid, face] : of_solids_[static_cast<std::size_t>(a)]) {
       const auto other = others.find(solid);
@@ -312,6 +334,22 @@ class Regions {
                                 other->second.holds / other->second.length());
     }
     return holds / length;
+  }
+
+  // What two regions have between them on a line. The wall beside a door is
+  // that of the whole side of the room behind it, the smaller of the two,
+  // whatever the space before it is divided into by then. Furniture makes no
+  // side.
+  const BorderLengths& SideWithDoor(int line, const BorderLengths& between,
+                                    int a, int b) const {
+    if (line < 0 || between.Of(Mark::kDoor) < kLeastOpening) return between;
+    const auto key = [&](int region) {
+      return std::make_pair(extents_[static_cast<std::size_t>(region)].area,
+                            region);
+    };
+    const int room = key(a) < key(b) ? a : b;
+    const BorderLengths& side = sides_[static_cast<std::size_t>(room)].at(line);
+    return side.Of(Mark::kWall) >= kLeastSide ? side : between;
   }
 
   std::map<int, Border>& BordersOf(int region) {
@@ -372,8 +410,7 @@ class Regions {
     const auto& around = BordersOf(a);
     const auto has_door = [&](int room, int third, const Border& border) {
       return border.all.Of(Mark::kDoor) >= kLeastOpening &&
-             HoldsApart(border.all, room, third, options) >=
-                 options.holds_apart;
+             HoldsApart(border, room, third, options) >= options.holds_apart;
     };
     return std::any_of(around.begin(), around.end(), [&](const auto& entry) {
       const auto& [third, border] = entry;
@@ -391,6 +428,14 @@ class Regions {
     extent.area += more.area;
     extent.free += more.free;
     extent.perimeter += more.perimeter - 2.0 * BordersOf(a)[b].all.length();
+    LineLengths& sides = sides_[static_cast<std::size_t>(a)];
+    for (const auto& [line, lengths] : sides_[static_cast<std::size_t>(b)]) {
+      sides[line].Add(lengths);
+    }
+    for (const auto& [line, lengths] : BordersOf(a)[b].of_line) {
+      Subtract(lengths, &sides[line]);
+      Subtract(lengths, &sides[line]);
+    }
     BordersOf(a).erase(b);
     BordersOf(b).erase(a);
     for (const auto& [c, border] : BordersOf(b)) {
@@ -411,6 +456,8 @@ class Regions {
   // Borders with unseen spaces that belong to no region (HiddenSpaces), by
   // their numbers.
   std::vector<std::map<int, BorderLengths>> of_solids_;
+  // All around each region, also where it borders on none.
+  std::vector<LineLengths> sides_;
   std::vector<Extent> extents_;
   // Narrow faces that have not joined any others.
   std::vector<bool> is_sliver_;

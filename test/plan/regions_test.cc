@@ -159,6 +159,41 @@ TEST(RegionsTest, PiecesOfARoomDoNotVouchForEachOther) {
   EXPECT_EQ(region[0], region[2]);
 }
 
+// An office (face 0) opens to a hall (1) along 2.9 m of its front (on line 0);
+// the wall beside the opening stands before a corridor (2) with a door to the
+// hall.
+TEST(RegionsTest, TheWallBesideADoorIsThatOfTheWholeSide) {
+  const auto is_apart = [](double wall) {
+    const double end = 3.4 + wall;
+    Arrangement arrangement;
+    AddFace({{0.0, 2.0}, {3.4, 2.0}, {end, 2.0}, {end, 7.0}, {0.0, 7.0}},
+            &arrangement);
+    AddFace({{-6.0, -8.0}, {3.4, -8.0}, {3.4, 2.0}, {-6.0, 2.0}}, &arrangement);
+    AddFace({{3.4, 0.0}, {12.0, 0.0}, {12.0, 2.0}, {end, 2.0}, {3.4, 2.0}},
+            &arrangement);
+    AddEdge({0.0, 2.0}, {3.4, 2.0}, 0, 1, 0.0, 2.9, &arrangement);
+    arrangement.edges.back().line = 0;
+    AddEdge({3.4, 2.0}, {end, 2.0}, 0, 2, 1.0, 0.0, &arrangement);
+    arrangement.edges.back().line = 0;
+    AddEdge({end, 2.0}, {end, 7.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({end, 7.0}, {0.0, 7.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 7.0}, {0.0, 2.0}, 0, -1, 1.0, 0.0, &arrangement);
+    AddEdge({3.4, 0.0}, {3.4, 2.0}, 1, 2, 0.8, 0.9, &arrangement);
+    AddEdge({-6.0, -8.0}, {3.4, -8.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({3.4, -8.0}, {3.4, 0.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({0.0, 2.0}, {-6.0, 2.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({-6.0, 2.0}, {-6.0, -8.0}, 1, -1, 1.0, 0.0, &arrangement);
+    AddEdge({3.4, 0.0}, {12.0, 0.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({12.0, 0.0}, {12.0, 2.0}, 2, -1, 1.0, 0.0, &arrangement);
+    AddEdge({12.0, 2.0}, {end, 2.0}, 2, -1, 1.0, 0.0, &arrangement);
+    const std::vector<int> region = FindRegions(arrangement);
+    return region[0] != region[1];
+  };
+  EXPECT_TRUE(is_apart(2.2));
+  // No more than a cupboard.
+  EXPECT_FALSE(is_apart(1.0));
+}
+
 // Two rooms side by side with a border that holds less than others, and a
 // corridor below both: with a door each they stay two.
 TEST(RegionsTest, RoomsWithADoorEachStayApart) {

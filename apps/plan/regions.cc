@@ -567,6 +567,15 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
     if ((*region)[i] < 0) continue;
     faces[pieces.Find(i)].push_back(arrangement.faces[i]);
   }
+  // A wide piece may lie beside many narrow ones.
+  std::map<std::size_t, std::vector<Polygon>> spaces_of;
+  const auto is_space = [&](std::size_t wide, double least) {
+    std::vector<Polygon>& spaces = spaces_of[wide];
+    if (spaces.empty()) spaces = UnionOf(faces[wide]);
+    return std::any_of(spaces.begin(), spaces.end(), [&](const Polygon& space) {
+      return !Offset(space, -least).empty();
+    });
+  };
   DisjointSets joined(region->size());
   for (const auto& [narrow, wides] : borders) {
     const std::vector<Polygon> outlines = UnionOf(faces[narrow]);
@@ -579,11 +588,7 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
                              width >= options.min_width;
     for (const auto& [wide, border] : wides) {
       const double least = 0.5 * options.widening * WidestChain(border);
-      const std::vector<Polygon> spaces = UnionOf(faces[wide]);
-      const bool is_space = std::any_of(
-          spaces.begin(), spaces.end(),
-          [&](const Polygon& space) { return !Offset(space, -least).empty(); });
-      if (!is_corridor || !is_space) joined.Join(narrow, wide);
+      if (!is_corridor || !is_space(wide, least)) joined.Join(narrow, wide);
     }
   }
   for (std::size_t i = 0; i < region->size(); ++i) {
@@ -599,6 +604,7 @@ void JoinCutCorridors(const Arrangement& arrangement,
                       const RegionOptions& options,
                       const std::vector<int>& before,
                       std::vector<int>* region) {
+  std::map<int, double> widths;
   for (;;) {
     std::map<int, std::vector<Polygon>> faces;
     std::map<int, std::set<int>> was;
@@ -626,7 +632,6 @@ void JoinCutCorridors(const Arrangement& arrangement,
                        (*region)[static_cast<std::size_t>(edge.right)]});
       if (a >= 0 && a != b) borders[{a, b}].Add(edge.line, edge.lengths);
     }
-    std::map<int, double> widths;
     const auto width_of = [&](int id) {
       const auto known = widths.find(id);
       if (known != widths.end()) return known->second;
@@ -652,6 +657,8 @@ void JoinCutCorridors(const Arrangement& arrangement,
     }
     if (which.first < 0) return;
     std::replace(region->begin(), region->end(), which.second, which.first);
+    // The others are what they were.
+    widths.erase(which.first);
   }
 }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <map>
 #include <queue>
 #include <tuple>
@@ -66,12 +65,16 @@ class Returns {
  public:
   Returns(const SpaceGrid& space, const WallLineOptions& options)
       : space_(space), options_(options) {
+    row_begin_.reserve(static_cast<std::size_t>(space.height) + 1);
     for (int row = 0; row < space.height; ++row) {
+      row_begin_.push_back(points_.size());
       for (int column = 0; column < space.width; ++column) {
         if (space.At(column, row) != Space::kOccupied) continue;
         points_.push_back(space.Middle(column, row));
+        columns_.push_back(column);
       }
     }
+    row_begin_.push_back(points_.size());
     is_explained_.assign(points_.size(), false);
   }
 
@@ -103,13 +106,7 @@ class Returns {
   }
 
   void Explain(const std::vector<Face>& faces) {
-    // By strips of the raster: a lookup from cell to index.
-    if (index_.empty()) {
-      index_.assign(space_.cells.size(), -1);
-      for (std::size_t i = 0; i < points_.size(); ++i) {
-        index_[CellOf(points_[i])] = static_cast<std::int32_t>(i);
-      }
-    }
+    // By strips of the raster.
     const double step = 0.5 * space_.resolution;
     const int reach = static_cast<int>(options_.cell_distance / step);
     for (const Face& face : faces) {
@@ -120,7 +117,7 @@ class Returns {
         for (int k = -reach; k <= reach; ++k) {
           const Vector2d p = face.begin + t * along + k * step * normal;
           if (space_.At(p) != Space::kOccupied) continue;
-          is_explained_[static_cast<std::size_t>(index_[CellOf(p)])] = true;
+          is_explained_[IndexAt(p)] = true;
         }
       }
     }
@@ -229,17 +226,26 @@ class Returns {
   }
 
  private:
-  std::size_t CellOf(const Vector2d& p) const {
+  // Of the occupied cell that a point lies in: few are, and the raster is
+  // large.
+  std::size_t IndexAt(const Vector2d& p) const {
     const Vector2d cell = (p - space_.origin) / space_.resolution;
-    return static_cast<std::size_t>(std::floor(cell[1])) * space_.width +
-           static_cast<std::size_t>(std::floor(cell[0]));
+    const auto row = static_cast<std::size_t>(std::floor(cell[1]));
+    const auto begin = columns_.begin();
+    const auto found = std::lower_bound(
+        begin + static_cast<std::ptrdiff_t>(row_begin_[row]),
+        begin + static_cast<std::ptrdiff_t>(row_begin_[row + 1]),
+        static_cast<int>(std::floor(cell[0])));
+    return static_cast<std::size_t>(found - begin);
   }
 
   const SpaceGrid& space_;
   const WallLineOptions& options_;
+  // By rows, and in each by columns.
   std::vector<Vector2d> points_;
+  std::vector<int> columns_;
+  std::vector<std::size_t> row_begin_;
   std::vector<bool> is_explained_;
-  std::vector<std::int32_t> index_;
 };
 
 // Whether free space lies before most of a face on its left (`side` 1) or right

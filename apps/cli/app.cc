@@ -10,6 +10,9 @@
 #include <plumbline/core/utf8.h>
 #include <plumbline/core/version.h>
 #include <unistd.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -55,6 +58,18 @@ extern "C" void EndAtInterrupt(int) {
   [[maybe_unused]] const ssize_t written =
       write(STDERR_FILENO, kWords + begin, sizeof(kWords) - 1 - begin);
   _exit(kExitInterrupted);
+}
+
+// What one solve gives back the next one takes: to get it from the system again
+// costs more than to fill it. Where memory is managed otherwise that is left as
+// it is.
+void KeepMemory() {
+#ifdef __GLIBC__
+  constexpr int kLargestKept = 32 << 20;
+  constexpr int kMostKept = 256 << 20;
+  mallopt(M_MMAP_THRESHOLD, kLargestKept);
+  mallopt(M_TRIM_THRESHOLD, kMostKept);
+#endif
 }
 
 void CatchInterrupts(bool end_at_once) {
@@ -270,6 +285,7 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
 }
 
 int RunMain(const std::function<int()>& run) {
+  KeepMemory();
   int status = kExitInternal;
   try {
     status = run();

@@ -1,6 +1,8 @@
 #include <plumbline/frontend/robot_links.h>
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
@@ -80,29 +82,32 @@ Eigen::Matrix3d RobotLinks::Tightest() const {
 }
 
 std::vector<FeatureId> RobotLinks::Neighborhood(int depth) const {
-  std::map<FeatureId, int> distance;
-  std::vector<FeatureId> frontier;
-  for (const auto& link : links_) {
-    distance.emplace(link.first, 1);
-    frontier.push_back(link.first);
-  }
+  std::vector<FeatureId> ids;
+  std::vector<bool> is_in(static_cast<std::size_t>(graph_->feature_id_end()),
+                          false);
+  const auto add = [&](FeatureId id) {
+    if (is_in[static_cast<std::size_t>(id)]) return;
+    is_in[static_cast<std::size_t>(id)] = true;
+    ids.push_back(id);
+  };
+  for (const auto& link : links_) add(link.first);
+  // Those of the depth before.
+  std::size_t begin = 0;
   for (int d = 2; d <= depth; ++d) {
-    std::vector<FeatureId> next;
-    for (FeatureId id : frontier) {
-      for (ConstraintId cid : graph_->ConstraintsOf(id)) {
+    const std::size_t end = ids.size();
+    for (std::size_t i = begin; i < end; ++i) {
+      for (const ConstraintId cid : graph_->ConstraintsOf(ids[i])) {
         const Constraint& constraint = graph_->GetConstraint(cid);
         if (constraint.kind != ConstraintClass::kMeasurement) continue;
-        for (FeatureId other : constraint.features) {
-          if (other == id_) continue;
-          if (distance.try_emplace(other, d).second) next.push_back(other);
+        for (const FeatureId other : constraint.features) {
+          if (other != id_) add(other);
         }
       }
     }
-    frontier = std::move(next);
+    begin = end;
   }
-  if (id_ != kNoId) distance.emplace(id_, 0);
-  std::vector<FeatureId> ids;
-  for (const auto& entry : distance) ids.push_back(entry.first);
+  if (id_ != kNoId) add(id_);
+  std::sort(ids.begin(), ids.end());
   return ids;
 }
 

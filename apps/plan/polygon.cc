@@ -277,9 +277,13 @@ std::vector<Polygon> UnionOf(const std::vector<Polygon>& polygons) {
   for (const Polygon& polygon : polygons) parts.push_back(geos.From(polygon));
   const Geos::Geometry all =
       geos.Collection(GEOS_MULTIPOLYGON, std::move(parts));
-  const Geos::Geometry whole =
-      geos.Own(GEOSUnaryUnionPrec_r(geos, all.get(), kPrecision));
-  return Ordered(geos, whole.get());
+  // What shares whole edges needs no search for crossings. Where more meets in
+  // a corner than that can take apart, it tells.
+  GEOSGeometry* whole = GEOSCoverageUnion_r(geos, all.get());
+  if (whole == nullptr) {
+    whole = GEOSUnaryUnionPrec_r(geos, all.get(), kPrecision);
+  }
+  return Ordered(geos, geos.Own(whole).get());
 }
 
 std::vector<Polygon> Offset(const Polygon& polygon, double distance) {

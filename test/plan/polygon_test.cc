@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/plan/polygon.h>
 
+#include <random>
 #include <vector>
 
 namespace plumbline {
@@ -39,6 +40,43 @@ TEST(PolygonTest, UnionHasNoStraightCorners) {
   EXPECT_EQ(whole[0].shell.size(), 4u);
   EXPECT_NEAR(whole[0].Area(), 2.0, 1e-9);
   EXPECT_NEAR(whole[0].Perimeter(), 6.0, 1e-9);
+}
+
+TEST(PolygonTest, PartsThatTouchInACornerStayApart) {
+  const std::vector<Polygon> parts =
+      UnionOf({Rectangle(0, 0, 1, 1), Rectangle(1, 1, 2, 2)});
+  ASSERT_EQ(parts.size(), 2u);
+  EXPECT_EQ(parts[0].shell.size(), 4u);
+  EXPECT_EQ(parts[1].shell.size(), 4u);
+}
+
+TEST(PolygonTest, UnionsOfFacesLoseNothing) {
+  // More meets in some of their corners than in those of a plan.
+  for (const unsigned seed : {1u, 7u}) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> place(0.0, 10.0);
+    std::vector<StraightPiece> pieces;
+    for (int i = 0; i < 60; ++i) {
+      const double x1 = place(random), y1 = place(random);
+      const double x2 = place(random), y2 = place(random);
+      pieces.push_back({Vector2d(x1, y1), Vector2d(x2, y2)});
+    }
+    const std::vector<Polygon> faces = FacesOf(pieces);
+    ASSERT_GT(faces.size(), 100u);
+    for (const double share : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+      std::vector<Polygon> some;
+      double area = 0.0;
+      for (const Polygon& face : faces) {
+        if (place(random) > 10.0 * share) continue;
+        some.push_back(face);
+        area += face.Area();
+      }
+      double united = 0.0;
+      for (const Polygon& part : UnionOf(some)) united += part.Area();
+      // Corners in a nearly straight line are left out.
+      EXPECT_NEAR(united, area, 0.01) << seed << ' ' << share;
+    }
+  }
 }
 
 TEST(PolygonTest, HolesAreOutside) {

@@ -67,6 +67,9 @@ constexpr double kCalmTurn = 0.0015;
 // does.
 constexpr double kUnmatchedCost = 4.0;
 
+// So that nothing is quite unknown, 1/m^2 and 1/rad^2.
+constexpr double kLeastInformation = 1e-9;
+
 // Reference points that are compared at a time, and what single precision may
 // be off by within kReferenceReach, m.
 constexpr int kBlock = 4;
@@ -153,6 +156,22 @@ class PosesBefore {
 
   std::vector<Pose2> poses_;
 };
+
+// The part of a symmetric matrix of information (m, m, rad) whose eigenvalues
+// are positive, a turn counted by what it moves at the returns.
+Eigen::Matrix3d WithoutNegative(const Eigen::Matrix3d& information) {
+  const double lever = std::sqrt(std::max(0.0, information(2, 2)) /
+                                 (information(0, 0) + information(1, 1)));
+  if (!std::isfinite(lever) || lever == 0.0) return Eigen::Matrix3d::Zero();
+  const Eigen::Vector3d scale(1.0, 1.0, lever);
+  const Eigen::Vector3d inverse = scale.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
+      inverse.asDiagonal() * information * inverse.asDiagonal());
+  const Eigen::Matrix3d half =
+      scale.asDiagonal() * solver.eigenvectors() *
+      solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return half * half.transpose();
+}
 
 // Share of the points with a normal that are returns, which alone inform.
 double OwnShare(const std::vector<ScanPoint>& scan) {
@@ -480,6 +499,7 @@ ScanMatcher::Sums ScanMatcher::SumUp(const Pose2& pose, double radius,
   const double turn = std::abs(step[2]);
   double xx = 0.0, xy = 0.0, xt = 0.0, yy = 0.0, yt = 0.0, tt = 0.0;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d crossed = Eigen::Matrix3d::Zero();
   int neighbour = -1;
   for (std::size_t i = stride / 2; i < points_.size(); i += stride) {
     const Surface& point = points_[i];
@@ -520,10 +540,15 @@ ScanMatcher::Sums ScanMatcher::SumUp(const Pose2& pose, double radius,
     yy += wy * n.y();
     yt += wy * by_turn;
     tt += wt * by_turn;
-    gradient += error * Eigen::Vector3d(wx, wy, wt);
+    const Eigen::Vector3d weighted(wx, wy, wt);
+    gradient += error * weighted;
+    crossed += weighted * Eigen::RowVector3d(normal.x(), normal.y(),
+                                             normal.y() * rotated.x() -
+                                                 normal.x() * rotated.y());
   }
   sums.information << xx, xy, xt, xy, yy, yt, xt, yt, tt;
   sums.gradient = gradient;
+  sums.crossed = 0.5 * (crossed + crossed.transpose());
   return sums;
 }
 
@@ -549,6 +574,7 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
              static_cast<std::size_t>(std::max(1, options_.coarse_points)));
   double progress = 0.0;
   PosesBefore before;
+  Eigen::Matrix3d by_prior = Eigen::Matrix3d::Zero();
   Eigen::Vector3d step = Eigen::Vector3d::Constant(kReferenceReach);
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     const bool is_coarse = progress < 1.0;
@@ -571,10 +597,11 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
     const double prior_weight = 1.0 / (1.0 + prior_squared / 3.0);
     Eigen::Matrix3d hessian = information + prior_weight * prior.information;
     gradient += prior_weight * (prior.information * difference);
-    hessian.diagonal().array() += 1e-9;
+    hessian.diagonal().array() += kLeastInformation;
     step = hessian.ldlt().solve(-gradient);
-    result.information = information;
-    result.covariance = hessian.inverse();
+    result.information = share * sums.crossed;
+    result.curvature = information;
+    by_prior = prior_weight * prior.information;
     if (!step.allFinite()) break;
     result.pose += step;
     result.pose[2] = NormalizeAngle(result.pose[2]);
@@ -591,6 +618,9 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
     progress = std::max(progress,
                         std::min(1.0, (iteration + 1) / kShrinkingIterations));
   }
+  result.information = WithoutNegative(result.information);
+  by_prior.diagonal().array() += kLeastInformation;
+  result.covariance = (result.information + by_prior).inverse();
   return result;
 }
 

@@ -55,8 +55,14 @@ struct MatchResult {
   /// Covariance from the returns and the prior together: large along a
   /// corridor, where only the prior speaks.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  /// Information of the returns alone; rank deficient along a corridor.
+  /// Information of the returns alone; rank deficient along a corridor. The
+  /// normals of a return and of its partner err independently: products of one
+  /// with the other have no mean along a wall, where the squares of either
+  /// would add up to a place that nothing shows.
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  /// Curvature of the cost at the pose: what holds the scan there, noise of
+  /// normals included.
+  Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();
   /// Share of the returns, of those that look at where the reference has
   /// something, that found a partner.
   double inlier_ratio = 0.0;
@@ -267,6 +273,8 @@ class ScanMatcher {
   // sigmas, of one point in `stride`.
   struct Sums {
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    // The same of the normals of points and of their partners.
+    Eigen::Matrix3d crossed = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     double cost = 0.0;
     int inliers = 0;

@@ -354,7 +354,8 @@ class Search {
       return "its parts fit, but not together: they lie " +
              ShortText(placement->misfit) + " m (RMS) from where it has them";
     }
-    if (InformationShare(*best) < options_.min_information_share) {
+    // Whoever says where it begins knows how far along it is, too.
+    if (!start_ && InformationShare(*best) < options_.min_information_share) {
       return "it could be moved along the walls that it shares with the map";
     }
     const WallContradictions& contradictions = ContradictionsOf(best);

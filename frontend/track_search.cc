@@ -144,7 +144,7 @@ bool TrackSearch::Judge(const View& view, const ScoredPose& peak,
     return false;
   }
   hypothesis->pose = match.pose;
-  hypothesis->information = match.information;
+  hypothesis->information = match.curvature;
   hypothesis->begin = visit.begin;
   hypothesis->end = visit.end;
   ScanAgreement sum;

@@ -112,7 +112,7 @@ WindowJudgement JudgeWindow(const std::vector<KeyView>& map,
       inliers >= options.min_inliers) {
     judgement.verdict = WindowVerdict::kAgrees;
     judgement.pose = match.pose;
-    judgement.information = match.information.topLeftCorner<2, 2>();
+    judgement.information = match.curvature.topLeftCorner<2, 2>();
     judgement.quality = known_share * support * (1.0 - through);
   } else if (1.0 - support > options.max_intruders ||
              (sum.seen >= kLeastReturns &&

@@ -355,6 +355,36 @@ TEST(ScanMatcherTest, CorridorSaysNothingAlong) {
   EXPECT_LT(eigenvalues[0], 1e-3 * eigenvalues[1]);
 }
 
+// Normals of noisy returns point a little along the corridor, all of them.
+TEST(ScanMatcherTest, NoisyNormalsSayNothingAlongACorridor) {
+  Laser laser = FullCircle();
+  laser.sigma = 0.015;
+  Noise noise(5);
+  std::vector<double> sigmas;
+  for (int trial = 0; trial < 9; ++trial) {
+    std::vector<ScanPoint> reference;
+    for (const double x : {-0.6, 0.0, 0.6}) {
+      const Pose2 robot(x, 0.0, 0.0);
+      const std::vector<ScanPoint> seen = Transformed(
+          PointsOf(MakeScan(Corridor(), robot, laser, &noise)), robot);
+      reference.insert(reference.end(), seen.begin(), seen.end());
+    }
+    ScanMatcher matcher(MatcherOptions());
+    matcher.SetReference(reference);
+    const Pose2 truth(0.2, 0.05, 0.02);
+    const MatchResult match =
+        matcher.Refine(PointsOf(MakeScan(Corridor(), truth, laser, &noise)),
+                       truth, MatchPrior());
+    EXPECT_LT(std::abs(match.pose[1] - truth[1]), 0.01);
+    EXPECT_LT(1.0 / std::sqrt(match.information(1, 1)), 0.01);
+    sigmas.push_back(match.information(0, 0) > 0.0
+                         ? 1.0 / std::sqrt(match.information(0, 0))
+                         : 1e9);
+  }
+  std::sort(sigmas.begin(), sigmas.end());
+  EXPECT_GT(sigmas[sigmas.size() / 2], 0.35);
+}
+
 TEST(ScanMatcherTest, PriorPullsOnlyWhereTheReturnsAreSilent) {
   ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));

@@ -15,6 +15,11 @@ namespace {
 // Beams that are next to each other though some between them have no return.
 constexpr int kNeighborBeams = 3;
 
+// Of the tolerance of a normal what holds where beams graze: noise of ranges
+// hardly moves returns across the surface there, and what is off by more is a
+// step, a door set back by some centimetres, which would turn the normal.
+constexpr double kGrazedTolerance = 0.5;
+
 bool SameSurface(const ScanPoint& a, const ScanPoint& b, double angle_step,
                  const ScanPointsOptions& options) {
   const int beams = b.beam - a.beam;
@@ -153,8 +158,7 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
     } while (surface_end < n && goes_on[surface_end]);
     for (int i = surface; i < surface_end; ++i) {
       ScanPoint& point = (*points)[i];
-      // Far away neighbours are far apart: widen the fit to hold two on each
-      // side where the surface allows.
+      // Far away neighbours are far apart.
       const double radius =
           std::max(options.normal_radius,
                    2.5 * std::sqrt(2.0) * point.range * angle_step);
@@ -170,14 +174,20 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
              (positions[end] - positions[i]).squaredNorm() <= squared_radius) {
         ++end;
       }
+      const int within = end - begin;
+      begin = std::min(begin, std::max(surface, i - options.normal_neighbors));
+      end = std::max(end,
+                     std::min(surface_end, i + options.normal_neighbors + 1));
       const int count = end - begin;
       if (count < 3) continue;
       const PrincipalAxis axis =
           AxisBetween(sums[begin - surface], sums[end - surface], count);
       const double across = axis.across / count;
       const double along = axis.along / count;
-      if (across > options.normal_tolerance * options.normal_tolerance ||
-          across > 0.1 * along) {
+      const double tolerance = count > within
+                                   ? kGrazedTolerance * options.normal_tolerance
+                                   : options.normal_tolerance;
+      if (across > tolerance * tolerance || across > 0.1 * along) {
         continue;
       }
       Eigen::Vector2d normal(-axis.direction.y(), axis.direction.x());

@@ -17,15 +17,20 @@ struct ScanPointsOptions {
   double minimum_range = 0.1;
   /// Two neighbouring returns farther apart than this, or than
   /// `gap_factor` times the distance that beams spread at their range on a
-  /// wall seen at 45 degrees, do not lie on one surface, m.
+  /// wall seen at 45 degrees, do not lie on one surface, m. With a factor of 5
+  /// surfaces count that beams graze at 8 degrees or more: in a corridor it is
+  /// the farthest of them that hold headings.
   double gap = 0.15;
-  double gap_factor = 3.0;
+  double gap_factor = 5.0;
   /// Neighbouring beams that lie farther apart than this, rad, have points put
   /// between their returns where these lie on one surface: what is matched with
   /// a laser of few beams would find gaps wider than its gates.
   double max_beam_step = DegToRad(1.1);
-  /// Half the length along the surface over which a normal is fitted, m.
+  /// Half the length along the surface over which a normal is fitted, m, and
+  /// how many returns it takes in on each side all the same, as far as the
+  /// surface goes: where beams graze they lie farther apart.
   double normal_radius = 0.25;
+  int normal_neighbors = 2;
   /// Standard deviation of a fitted surface's points, m, above which the
   /// point has no normal.
   double normal_tolerance = 0.04;

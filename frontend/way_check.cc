@@ -17,6 +17,11 @@ namespace {
 // Between two times that `stop` is asked.
 constexpr std::size_t kCrossingsAtOnce = 64;
 
+// Where a piece has less than this share of the returns that a piece of the
+// wall has in the middle, they are from what stood in an opening: the leaf of a
+// door, people.
+constexpr double kSolidShare = 0.1;
+
 // Crossings lie at least this far from the ends of a wall, m.
 constexpr double kMargin = 0.2;
 
@@ -202,12 +207,27 @@ class WayCheck {
     }
   }
 
+  // Returns from which on a piece is solid.
+  int LeastSolid(std::vector<int> solid) const {
+    solid.erase(
+        std::remove_if(solid.begin(), solid.end(),
+                       [this](int hits) { return hits < options_.min_beams; }),
+        solid.end());
+    if (solid.empty()) return options_.min_beams;
+    const auto middle =
+        solid.begin() + static_cast<std::ptrdiff_t>(solid.size() / 2);
+    std::nth_element(solid.begin(), middle, solid.end());
+    return std::max(options_.min_beams,
+                    static_cast<int>(std::ceil(kSolidShare * *middle)));
+  }
+
   // Begin and end of the pieces in a row, gaps of one allowed, that were solid
   // and passed, around the place of a crossing; the same twice for none.
   std::pair<std::size_t, std::size_t> LongestRun(const Pieces& pieces,
                                                  double along) const {
+    const int least = LeastSolid(pieces.solid);
     const auto contradicts = [&](std::size_t i) {
-      return pieces.solid[i] >= options_.min_beams &&
+      return pieces.solid[i] >= least &&
              pieces.passed[i] >= options_.min_beams &&
              pieces.passed[i] > 3 * pieces.kept[i];
     };

@@ -30,8 +30,9 @@ struct WayCheckOptions {
   double thickness = 0.08;
   double passed = 0.3;
   /// A piece of wall of this length, m, is solid where this many returns of
-  /// other visits lie on it, and passed where this many beams of the visit went
-  /// through, and more than three for each return that the visit has on it.
+  /// other visits lie on it, and a tenth of what lies on a piece in the middle
+  /// of the wall's, and passed where this many beams of the visit went through,
+  /// and more than three for each return that the visit has on it.
   double piece = 0.1;
   int min_beams = 3;
   /// Width in one piece that is solid and passed from which on it is no door,

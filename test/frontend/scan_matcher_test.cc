@@ -385,6 +385,30 @@ TEST(ScanMatcherTest, NoisyNormalsSayNothingAlongACorridor) {
   EXPECT_GT(sigmas[sigmas.size() / 2], 0.35);
 }
 
+// The returns that tell the heading are those that are farthest along the
+// walls, where beams graze.
+TEST(ScanMatcherTest, GrazedWallsHoldTheHeadingInACorridor) {
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(7);
+  constexpr int kTrials = 60;
+  double squares = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    ScanMatcher matcher(MatcherOptions());
+    matcher.SetReference(
+        PointsOf(MakeScan(Corridor(), Pose2::Zero(), laser, &noise)));
+    const Pose2 truth(1.0, 0.0, 0.0);
+    MatchPrior prior;
+    prior.pose = truth;
+    prior.information = Eigen::Vector3d(1e4, 1.0, 1.0).asDiagonal();
+    const MatchResult match =
+        matcher.Refine(PointsOf(MakeScan(Corridor(), truth, laser, &noise)),
+                       Pose2(1.0, 0.02, 0.01), prior);
+    squares += match.pose[2] * match.pose[2];
+  }
+  EXPECT_LT(RadToDeg(std::sqrt(squares / kTrials)), 0.055);
+}
+
 TEST(ScanMatcherTest, PriorPullsOnlyWhereTheReturnsAreSilent) {
   ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));

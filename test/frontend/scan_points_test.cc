@@ -106,6 +106,21 @@ TEST(ScanPointsTest, EmptyScanEmptiesTheVector) {
   EXPECT_TRUE(points.empty());
 }
 
+// A wall 1.1 m to the left, which beams meet at every angle down to none.
+TEST(ScanPointsTest, GrazedWallHasNormals) {
+  const std::vector<testing::WallEnds> wall = {{{-1.0, 1.1}, {60.0, 1.1}}};
+  int far = 0;
+  for (const ScanPoint& point :
+       PointsOf(MakeScan(wall, Pose2::Zero(), Laser()))) {
+    const double incidence = std::asin(1.1 / point.range);
+    if (incidence < DegToRad(8.2)) continue;
+    EXPECT_NEAR((point.normal - Eigen::Vector2d(0.0, -1.0)).norm(), 0.0, 1e-4)
+        << RadToDeg(incidence);
+    if (point.position.x() > 5.0) ++far;
+  }
+  EXPECT_GE(far, 4);
+}
+
 TEST(ScanPointsTest, NoNormalAtACorner) {
   const std::vector<ScanPoint> points = PointsOf(
       MakeScan(Room(4.0, 4.0), Pose2::Zero(), FullCircle()), PointOptions());

@@ -22,15 +22,15 @@ struct WayDrive {
   std::vector<Pose2> poses;
 };
 
-void Go(const std::vector<testing::WallEnds>& across, double from, double to,
-        WayDrive* drive) {
-  std::vector<testing::WallEnds> walls = {{{0.0, -1.0}, {30.0, -1.0}},
-                                          {{30.0, -1.0}, {30.0, 1.0}},
-                                          {{30.0, 1.0}, {0.0, 1.0}},
-                                          {{0.0, 1.0}, {0.0, -1.0}}};
+void GoBetween(double half_width, const Laser& laser,
+               const std::vector<testing::WallEnds>& across, double from,
+               double to, WayDrive* drive) {
+  std::vector<testing::WallEnds> walls = {
+      {{0.0, -half_width}, {30.0, -half_width}},
+      {{30.0, -half_width}, {30.0, half_width}},
+      {{30.0, half_width}, {0.0, half_width}},
+      {{0.0, half_width}, {0.0, -half_width}}};
   walls.insert(walls.end(), across.begin(), across.end());
-  Laser laser;
-  laser.sigma = 0.01;
   Noise noise(5 + drive->scans.size());
   const double step = from < to ? 0.3 : -0.3;
   for (double x = from; (to - x) * step > 0.0; x += step) {
@@ -39,6 +39,23 @@ void Go(const std::vector<testing::WallEnds>& across, double from, double to,
     drive->scans.push_back(MakeScan(walls, pose, laser, &noise));
     drive->poses.push_back(pose);
   }
+}
+
+void Go(const std::vector<testing::WallEnds>& across, double from, double to,
+        WayDrive* drive) {
+  Laser laser;
+  laser.sigma = 0.01;
+  GoBetween(1.0, laser, across, from, to, drive);
+}
+
+// In a hall of 8 m in place of the corridor, with a finer laser.
+void Hall(const std::vector<testing::WallEnds>& across, double from, double to,
+          WayDrive* drive) {
+  Laser laser;
+  laser.angle_step = DegToRad(0.25);
+  laser.beams = 721;
+  laser.sigma = 0.01;
+  GoBetween(4.0, laser, across, from, to, drive);
 }
 
 // Up to what stands there, back, and through where it was.
@@ -94,6 +111,30 @@ TEST(FindBlockedWaysTest, ADoorThatWasClosed) {
   EXPECT_TRUE(
       FindBlockedWays(drive.scans, drive.keys, drive.poses, WallAcross(), {})
           .empty());
+}
+
+// An opening of 1.8 m in the wall of a hall, in which something stood for a
+// moment.
+TEST(FindBlockedWaysTest, WhatStoodInAnOpeningForAMoment) {
+  const std::vector<testing::WallEnds> wall = {{{15.0, -4.0}, {15.0, -0.6}},
+                                               {{15.0, 1.2}, {15.0, 4.0}}};
+  WayDrive drive;
+  Hall(wall, 5.0, 12.0, &drive);
+  Hall(wall, 12.0, 5.0, &drive);
+  std::vector<testing::WallEnds> leaves = wall;
+  leaves.push_back({{15.0, -0.6}, {15.0, 1.2}});
+
+  const auto first = static_cast<std::ptrdiff_t>(drive.scans.size());
+  Hall(leaves, 11.7, 11.9, &drive);
+  ASSERT_EQ(static_cast<std::ptrdiff_t>(drive.scans.size()) - first, 1);
+  for (int visit = 0; visit < 2; ++visit) {
+    Hall(wall, 12.0, 5.0, &drive);
+    Hall(wall, 5.0, 12.0, &drive);
+  }
+  Hall(wall, 12.0, 25.0, &drive);
+  const std::vector<Wall> map = {MakeWall({15.0, 0.0}, 0.5 * kPi, -4.0, 4.0)};
+  EXPECT_TRUE(
+      FindBlockedWays(drive.scans, drive.keys, drive.poses, map, {}).empty());
 }
 
 TEST(FindBlockedWaysTest, AWallThatIsDrawnAcrossADoorway) {

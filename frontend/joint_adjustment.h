@@ -40,7 +40,7 @@ struct JointAdjustmentOptions {
   /// Smallest factor of the variances of votes that covariances are reported
   /// with (ReportVoteVariances). In simulated buildings residuals show less
   /// than a hundredth, as looks at one wall share what no residual shows.
-  double min_reported_factor = 0.04;
+  double min_reported_factor = 0.03;
   /// Rounds of taking votes and weights anew, each followed by a solve.
   int rounds = 3;
   /// Then places that have come near each other are matched, and all of it is

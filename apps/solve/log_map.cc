@@ -71,10 +71,9 @@ void TellOfTrack(const std::string& name, const std::vector<Scan>& scans,
   }
   if (result.loose_walls) {
     summary->notes.push_back(
-        "long straight walls turned the map by more than a quarter of a degree "
-        "over 30 "
-        "m against what the scans say: the building may bend by a little "
-        "everywhere, and walls hold the poses loosely");
+        "long straight walls turned the map by more than a fifth of a degree "
+        "over 30 to 60 m against what the scans say: the building may bend by "
+        "a little everywhere, and walls hold the poses loosely");
     Remark("%s: %s", name.c_str(), summary->notes.back().c_str());
   }
 }

@@ -90,11 +90,11 @@ TEST(AreBentByWallsTest, WhereWaysTurnAtTheMedian) {
   // 0.3 degrees over 30 m.
   EXPECT_TRUE(AreBentByWalls(arc(80, 0.0), arc(80, 0.01)));
   EXPECT_TRUE(AreBentByWalls(arc(80, 0.01), arc(80, 0.0)));
-  // 0.24 over 30 m, but 0.48 over 60 m.
-  EXPECT_FALSE(AreBentByWalls(arc(80, 0.0), arc(80, 0.008)));
-  EXPECT_TRUE(AreBentByWalls(arc(160, 0.0), arc(160, 0.008)));
-  // 0.15 and 0.3.
-  EXPECT_FALSE(AreBentByWalls(arc(160, 0.0), arc(160, 0.005)));
+  // 0.18 over 30 m, but 0.36 over 60 m.
+  EXPECT_FALSE(AreBentByWalls(arc(80, 0.0), arc(80, 0.006)));
+  EXPECT_TRUE(AreBentByWalls(arc(160, 0.0), arc(160, 0.006)));
+  // 0.1 and 0.2.
+  EXPECT_FALSE(AreBentByWalls(arc(160, 0.0), arc(160, 0.0033)));
   // Where they stand does not count, nor a bend that both have.
   EXPECT_FALSE(AreBentByWalls(Arc(Pose2(-5.0, 7.0, -kPi), 160, DegToRad(2.0)),
                               Arc(Pose2::Zero(), 160, DegToRad(2.0))));

@@ -15,9 +15,10 @@ namespace {
 // Beams that are next to each other though some between them have no return.
 constexpr int kNeighborBeams = 3;
 
-// Of the tolerance of a normal what holds where beams graze: noise of ranges
-// hardly moves returns across the surface there, and what is off by more is a
-// step, a door set back by some centimetres, which would turn the normal.
+// Of the tolerance of a normal what holds where neighbours lie beyond its
+// radius, as beams graze the surface: noise of ranges hardly moves returns
+// across the surface there, and what is off by more is a step, a door set back
+// by some centimetres, which would turn the normal.
 constexpr double kGrazedTolerance = 0.5;
 
 bool SameSurface(const ScanPoint& a, const ScanPoint& b, double angle_step,

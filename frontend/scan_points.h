@@ -32,7 +32,7 @@ struct ScanPointsOptions {
   double normal_radius = 0.25;
   int normal_neighbors = 2;
   /// Standard deviation of a fitted surface's points, m, above which the
-  /// point has no normal.
+  /// point has no normal; half of it where the fit goes beyond normal_radius.
   double normal_tolerance = 0.04;
 
   /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).

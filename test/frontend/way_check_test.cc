@@ -123,7 +123,6 @@ TEST(FindBlockedWaysTest, WhatStoodInAnOpeningForAMoment) {
   Hall(wall, 12.0, 5.0, &drive);
   std::vector<testing::WallEnds> leaves = wall;
   leaves.push_back({{15.0, -0.6}, {15.0, 1.2}});
-
   const auto first = static_cast<std::ptrdiff_t>(drive.scans.size());
   Hall(leaves, 11.7, 11.9, &drive);
   ASSERT_EQ(static_cast<std::ptrdiff_t>(drive.scans.size()) - first, 1);

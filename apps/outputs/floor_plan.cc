@@ -409,16 +409,12 @@ void AddRooms(const OccupancyGrid& grid, const std::vector<Pose2>& path,
   space.origin = grid.origin();
   space.width = grid.width();
   space.height = grid.height();
-  space.cells.reserve(static_cast<std::size_t>(space.width) * space.height);
-  for (int row = 0; row < space.height; ++row) {
-    for (int column = 0; column < space.width; ++column) {
-      const std::uint8_t pixel = grid.Pixel(column, row);
-      space.cells.push_back(pixel == OccupancyGrid::kFree ? Space::kFree
-                            : pixel == OccupancyGrid::kOccupied
-                                ? Space::kOccupied
-                                : Space::kUnknown);
-    }
-  }
+  space.cells.resize(static_cast<std::size_t>(space.width) * space.height,
+                     Space::kUnknown);
+  grid.VisitKnown([&](int column, int row, std::uint8_t pixel) {
+    space.cells[static_cast<std::size_t>(row) * space.width + column] =
+        pixel == OccupancyGrid::kFree ? Space::kFree : Space::kOccupied;
+  });
   std::vector<KnownWall> walls;
   for (const FloorPlanWall& wall : plan->walls) {
     walls.push_back({wall.begin, wall.end});

@@ -28,8 +28,9 @@ constexpr double kBehindFree = 0.3;
 constexpr double kLeastGap = 0.2;
 constexpr double kSlanted = 1.5;
 constexpr double kMostSpacing = 1e6;
-// Cells of the grids that are filled side by side, all together.
-constexpr double kMostCellsAtOnce = 3e7;
+// Cells of the grids that are filled side by side, all together. Memory is
+// taken for those only that are seen.
+constexpr double kMostCellsAtOnce = 1.5e8;
 
 std::string Number(double value) {
   std::string text;
@@ -122,6 +123,7 @@ inline void OccupancyGrid::Count(std::uint16_t Cell::*counter, Cell* cell) {
 }
 
 // Bresenham's line from one cell to another: all octants by one error term.
+// What is known of a tile is looked up where the line enters it.
 void OccupancyGrid::Clear(int column0, int row0, int column1, int row1,
                           bool with_last) {
   const int dx = std::abs(column1 - column0);
@@ -131,39 +133,47 @@ void OccupancyGrid::Clear(int column0, int row0, int column1, int row1,
   int error = dx + dy;
   int x = column0;
   int y = row0;
-  Tile* tile = nullptr;
-  int tile_x = -1;
-  int tile_y = -1;
-  for (;;) {
-    const bool is_last = x == column1 && y == row1;
-    if (is_last && !with_last) return;
-    if ((x >> kTileBits) != tile_x || (y >> kTileBits) != tile_y) {
-      tile_x = x >> kTileBits;
-      tile_y = y >> kTileBits;
-      const bool is_inside = tile_x >= 0 && tile_y >= 0 &&
-                             tile_x < tile_columns_ && tile_y < tile_rows_;
-      tile = is_inside ? TileAt(x, y) : nullptr;
-      if (tile != nullptr) {
-        // Where they leave it, at the latest.
-        tile->spacing = std::min(
-            tile->spacing, angle_step_ * (std::hypot(x - column0, y - row0) +
-                                          1.5 * kTileSize));
+  // Cells to go; the last one only if it is to be cleared.
+  int left = std::max(dx, -dy) + (with_last ? 1 : 0);
+  while (left > 0) {
+    const int tile_x = x >> kTileBits;
+    const int tile_y = y >> kTileBits;
+    const bool is_inside = tile_x >= 0 && tile_y >= 0 &&
+                           tile_x < tile_columns_ && tile_y < tile_rows_;
+    // Places within the tile.
+    int own_x = x & (kTileSize - 1);
+    int own_y = y & (kTileSize - 1);
+    Cell* cells = nullptr;
+    if (is_inside) {
+      Tile* const tile = TileAt(x, y);
+      const std::int64_t wide = x - column0;
+      const std::int64_t high = y - row0;
+      // Where they leave it, at the latest.
+      tile->spacing = std::min(
+          tile->spacing,
+          angle_step_ *
+              (std::sqrt(static_cast<double>(wide * wide + high * high)) +
+               1.5 * kTileSize));
+      cells = tile->cells.data();
+    }
+    for (;;) {
+      if (is_inside) {
+        Count(&Cell::misses, &cells[(own_y << kTileBits) + own_x]);
       }
+      if (--left == 0) return;
+      const int doubled = 2 * error;
+      if (doubled >= dy) {
+        error += dy;
+        own_x += step_x;
+      }
+      if (doubled <= dx) {
+        error += dx;
+        own_y += step_y;
+      }
+      if (((own_x | own_y) & ~(kTileSize - 1)) != 0) break;
     }
-    if (tile != nullptr) {
-      Count(&Cell::misses, &tile->cells[((y & (kTileSize - 1)) << kTileBits) +
-                                        (x & (kTileSize - 1))]);
-    }
-    if (is_last) return;
-    const int doubled = 2 * error;
-    if (doubled >= dy) {
-      error += dy;
-      x += step_x;
-    }
-    if (doubled <= dx) {
-      error += dx;
-      y += step_y;
-    }
+    x = (tile_x << kTileBits) + own_x;
+    y = (tile_y << kTileBits) + own_y;
   }
 }
 
@@ -239,16 +249,6 @@ void OccupancyGrid::Merge(OccupancyGrid other) {
   }
 }
 
-inline std::uint8_t OccupancyGrid::Shade(const Cell& cell) const {
-  const int seen = cell.hits + cell.misses;
-  if (seen == 0) return kUnknown;
-  if (cell.hits >= options_.occupied_share * seen) {
-    // Once is no evidence, neither that something is there nor that not.
-    return cell.hits >= options_.min_hits ? kOccupied : kUnknown;
-  }
-  return kFree;
-}
-
 std::uint8_t OccupancyGrid::Pixel(int column, int row) const {
   const std::unique_ptr<Tile>& tile =
       tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
@@ -282,18 +282,10 @@ void OccupancyGrid::ForgetUnreachable() {
   seen.height = height_;
   seen.cells.resize(static_cast<std::size_t>(width_) * height_,
                     SeenCells::kUnknown);
-  std::string line;
-  for (int row = 0; row < height_; ++row) {
-    Row(row, &line);
-    std::uint8_t* const cells =
-        &seen.cells[static_cast<std::size_t>(row) * width_];
-    for (int column = 0; column < width_; ++column) {
-      const auto value = static_cast<std::uint8_t>(line[column]);
-      cells[column] = value == kFree       ? SeenCells::kFree
-                      : value == kOccupied ? SeenCells::kOccupied
-                                           : SeenCells::kUnknown;
-    }
-  }
+  VisitKnown([&](int column, int row, std::uint8_t pixel) {
+    seen.cells[static_cast<std::size_t>(row) * width_ + column] =
+        pixel == kFree ? SeenCells::kFree : SeenCells::kOccupied;
+  });
   const auto cells = [this](double metres) {
     return static_cast<int>(metres / options_.resolution + 1e-9);
   };
@@ -309,14 +301,13 @@ void OccupancyGrid::ForgetUnreachable() {
                ? std::max(least_gap, static_cast<int>(kSlanted * spacing))
                : least_gap;
   };
-  const std::vector<std::uint8_t> before = seen.cells;
   KeepReachable(starts_, options, &seen);
-  for (int row = 0; row < height_; ++row) {
-    for (int column = 0; column < width_; ++column) {
-      const std::size_t i = static_cast<std::size_t>(row) * width_ + column;
-      if (seen.cells[i] != before[i]) *CellAt(column, row) = Cell();
+  VisitKnown([&](int column, int row, std::uint8_t) {
+    if (seen.cells[static_cast<std::size_t>(row) * width_ + column] ==
+        SeenCells::kUnknown) {
+      *CellAt(column, row) = Cell();
     }
-  }
+  });
 }
 
 namespace {
@@ -390,18 +381,19 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
           : (poses.size() + options.max_scans - 1) / options.max_scans;
   const std::size_t count = (poses.size() + step - 1) / step;
   const double cells = 1.0 * grid.width() * grid.height();
-  if (threads == 1 || count >= OccupancyGrid::kMostScansCounted ||
-      cells * static_cast<double>(threads) > kMostCellsAtOnce) {
+  const std::size_t parts =
+      std::min(threads, static_cast<std::size_t>(kMostCellsAtOnce / cells) + 1);
+  if (parts == 1 || count >= OccupancyGrid::kMostScansCounted) {
     for (std::size_t i = 0; i < poses.size(); i += step) {
       grid.AddScan(scans[i], poses[i]);
     }
   } else {
     std::vector<OccupancyGrid> grids;
-    for (std::size_t part = 0; part < threads; ++part) {
+    for (std::size_t part = 0; part < parts; ++part) {
       grids.emplace_back(corners[0].low, corners[0].high, options);
     }
-    ParallelFor(threads, options.num_threads, [&](std::size_t part) {
-      for (std::size_t i = begin_of(count, part); i < begin_of(count, part + 1);
+    ParallelFor(parts, options.num_threads, [&](std::size_t part) {
+      for (std::size_t i = count * part / parts; i < count * (part + 1) / parts;
            ++i) {
         grids[part].AddScan(scans[i * step], poses[i * step]);
       }

@@ -6,6 +6,7 @@
 #include <plumbline/frontend/scan.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -90,6 +91,27 @@ class OccupancyGrid {
   /// Pixels of a whole row from the left, one byte per cell.
   void Row(int row, std::string* pixels) const;
 
+  /// Calls visit(column, row, pixel) for every cell that is not unknown, row by
+  /// row: most cells of a large grid are.
+  template <typename Visit>
+  void VisitKnown(const Visit& visit) const {
+    for (int row = 0; row < height_; ++row) {
+      for (int begin = 0; begin < width_; begin += kTileSize) {
+        const std::unique_ptr<Tile>& tile =
+            tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
+                   (begin >> kTileBits)];
+        if (tile == nullptr) continue;
+        const Cell* const cells =
+            tile->cells.data() + ((row & (kTileSize - 1)) << kTileBits);
+        const int end = std::min(width_ - begin, kTileSize);
+        for (int i = 0; i < end; ++i) {
+          const std::uint8_t pixel = Shade(cells[i]);
+          if (pixel != kUnknown) visit(begin + i, row, pixel);
+        }
+      }
+    }
+  }
+
   /// Columns, rows, and the side of a cell, m.
   int width() const { return width_; }
   int height() const { return height_; }
@@ -115,7 +137,15 @@ class OccupancyGrid {
 
   Tile* TileAt(int column, int row);
   Cell* CellAt(int column, int row);
-  std::uint8_t Shade(const Cell& cell) const;
+  std::uint8_t Shade(const Cell& cell) const {
+    const int seen = cell.hits + cell.misses;
+    if (seen == 0) return kUnknown;
+    if (cell.hits >= options_.occupied_share * seen) {
+      // Once is no evidence, neither that something is there nor that not.
+      return cell.hits >= options_.min_hits ? kOccupied : kUnknown;
+    }
+    return kFree;
+  }
   void Count(std::uint16_t Cell::*counter, Cell* cell);
   void Clear(int column0, int row0, int column1, int row1, bool with_last);
 

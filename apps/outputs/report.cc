@@ -374,23 +374,19 @@ Json GridToJson(const OccupancyGrid* grid, double most_pixels) {
   picture.pixels.assign(static_cast<std::size_t>(picture.width) *
                             static_cast<std::size_t>(picture.height),
                         0);
-  for (int row = 0; row < grid->height(); ++row) {
-    for (int column = 0; column < grid->width(); ++column) {
-      const std::uint8_t value = grid->Pixel(column, row);
-      if (value == OccupancyGrid::kUnknown) continue;
-      // The first row of a picture is the upper one.
-      std::uint32_t& pixel =
-          picture.pixels[static_cast<std::size_t>(picture.height - 1 -
-                                                  row / cells) *
-                             static_cast<std::size_t>(picture.width) +
-                         static_cast<std::size_t>(column / cells)];
-      if (value == OccupancyGrid::kOccupied) {
-        pixel = kOccupiedPixel;
-      } else if (pixel == 0) {
-        pixel = kFreePixel;
-      }
+  grid->VisitKnown([&](int column, int row, std::uint8_t value) {
+    // The first row of a picture is the upper one.
+    std::uint32_t& pixel =
+        picture
+            .pixels[static_cast<std::size_t>(picture.height - 1 - row / cells) *
+                        static_cast<std::size_t>(picture.width) +
+                    static_cast<std::size_t>(column / cells)];
+    if (value == OccupancyGrid::kOccupied) {
+      pixel = kOccupiedPixel;
+    } else if (pixel == 0) {
+      pixel = kFreePixel;
     }
-  }
+  });
   return {{"x", Rounded(grid->origin().x())},
           {"y", Rounded(grid->origin().y())},
           {"resolution", Rounded(grid->resolution() * cells, 1e9)},

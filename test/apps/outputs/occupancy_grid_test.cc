@@ -11,8 +11,11 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <random>
+#include <set>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -208,6 +211,71 @@ TEST(OccupancyGridTest, SlantedRaysLeaveNoHoles) {
             "  ..      \n"
             " .        \n"
             ".         \n");
+}
+
+// Cells that a ray passes on its way by Bresenham's rule, one after the other.
+std::set<std::pair<int, int>> CellsOnTheWay(int x, int y, int to_x, int to_y) {
+  std::set<std::pair<int, int>> cells;
+  const int dx = std::abs(to_x - x);
+  const int dy = -std::abs(to_y - y);
+  int error = dx + dy;
+  while (x != to_x || y != to_y) {
+    cells.insert({x, y});
+    const int doubled = 2 * error;
+    if (doubled >= dy) {
+      error += dy;
+      x += to_x > x ? 1 : -1;
+    }
+    if (doubled <= dx) {
+      error += dx;
+      y += to_y > y ? 1 : -1;
+    }
+  }
+  return cells;
+}
+
+// Memory is taken in squares of 64 cells; rays come from inside and outside.
+TEST(OccupancyGridTest, RaysPassFromSquareToSquare) {
+  std::mt19937 engine(5);
+  std::uniform_int_distribution<int> column(-90, 290);
+  std::uniform_int_distribution<int> row(-90, 240);
+  int seen = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    OccupancyOptions options = Coarse();
+    options.usable_range = 1000.0;
+    OccupancyGrid grid(Vector2d(0, 0), Vector2d(199.5, 149.5), options);
+    const int x = column(engine);
+    const int y = row(engine);
+    const int to_x = column(engine);
+    const int to_y = row(engine);
+    if (x == to_x && y == to_y) continue;
+    const double range = std::hypot(to_x - x, to_y - y);
+    const double angle = RadToDeg(std::atan2(to_y - y, to_x - x));
+    grid.AddScan(MakeScan(angle, 1.0, {static_cast<float>(range)}),
+                 Pose2(x + 0.5, y + 0.5, 0.0));
+    const auto way = CellsOnTheWay(x, y, to_x, to_y);
+    for (int v = 0; v < grid.height(); ++v) {
+      for (int u = 0; u < grid.width(); ++u) {
+        const int expected = u == to_x && v == to_y  ? OccupancyGrid::kOccupied
+                             : way.count({u, v}) > 0 ? OccupancyGrid::kFree
+                                                     : OccupancyGrid::kUnknown;
+        ASSERT_EQ(grid.Pixel(u, v), expected)
+            << x << ' ' << y << " to " << to_x << ' ' << to_y << " at " << u
+            << ' ' << v;
+        seen += expected != OccupancyGrid::kUnknown;
+      }
+    }
+    int known = 0;
+    std::pair<int, int> last(-1, -1);
+    grid.VisitKnown([&](int u, int v, std::uint8_t pixel) {
+      EXPECT_EQ(pixel, grid.Pixel(u, v));
+      EXPECT_LT(last, std::make_pair(v, u));
+      last = {v, u};
+      ++known;
+    });
+    seen -= known;
+  }
+  EXPECT_EQ(seen, 0);
 }
 
 TEST(OccupancyGridTest, NoReturnsAndFarReturns) {

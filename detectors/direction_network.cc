@@ -10,6 +10,7 @@ std::size_t DirectionNetwork::AddNode(double angle) {
   initial_.push_back(angle);
   estimate_.push_back(angle);
   degree_.push_back(0);
+  is_analyzed_ = false;
   return initial_.size() - 1;
 }
 
@@ -18,6 +19,7 @@ void DirectionNetwork::AddLink(std::size_t from, std::size_t to, double angle,
   links_.push_back({from, to, angle, 1.0 / variance, axial, group});
   ++degree_[from];
   ++degree_[to];
+  is_analyzed_ = false;
 }
 
 template <typename Predicate>
@@ -29,6 +31,7 @@ void DirectionNetwork::RemoveLinks(Predicate goes) {
   }
   links_.erase(std::remove_if(links_.begin(), links_.end(), goes),
                links_.end());
+  is_analyzed_ = false;
 }
 
 void DirectionNetwork::RemoveLinksOf(std::size_t node) {
@@ -61,6 +64,12 @@ double DirectionNetwork::Residual(const Link& link) const {
 
 void DirectionNetwork::Solve() {
   if (size() == 0) return;
+  SolveAngles();
+  ComputeVariances();
+}
+
+void DirectionNetwork::SolveAngles() {
+  if (size() == 0) return;
   const auto n = static_cast<Eigen::Index>(size());
   std::vector<Eigen::Triplet<double>> triplets;
   triplets.reserve(3 * links_.size() + size());
@@ -80,14 +89,18 @@ void DirectionNetwork::Solve() {
   }
   Eigen::SparseMatrix<double> normal(n, n);
   normal.setFromTriplets(triplets.begin(), triplets.end());
-  ldlt_ = std::make_unique<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>>(
-      normal);
+  if (!is_analyzed_) {
+    ldlt_ =
+        std::make_unique<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>>();
+    ldlt_->analyzePattern(normal);
+    is_analyzed_ = true;
+  }
+  ldlt_->factorize(normal);
   const Eigen::VectorXd step = ldlt_->solve(gradient);
   for (Eigen::Index i = 0; i < n; ++i) {
     estimate_[static_cast<std::size_t>(i)] =
         initial_[static_cast<std::size_t>(i)] - step[i];
   }
-  ComputeVariances();
 }
 
 // The entries of the inverse where the factor has entries, from the last column

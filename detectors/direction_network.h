@@ -49,8 +49,11 @@ class DirectionNetwork {
   std::size_t num_links() const { return links_.size(); }
 
   /// Estimates all nodes and the variances of single nodes. Has to be called
-  /// after the last change and before what follows.
+  /// after the last change and before what follows. What depends on which nodes
+  /// links are between, and not on their values, is kept from one to the next.
   void Solve();
+  /// The same without the variances: Variance must not be asked for.
+  void SolveAngles();
 
   /// rad, unwrapped.
   double Angle(std::size_t node) const { return estimate_[node]; }
@@ -88,6 +91,8 @@ class DirectionNetwork {
   std::vector<double> variance_;
   // By pointer: a factorization cannot be moved.
   std::unique_ptr<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>> ldlt_;
+  // Whether the analysis in it is of the present nodes and links.
+  bool is_analyzed_ = false;
 };
 
 }  // namespace plumbline

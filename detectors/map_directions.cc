@@ -193,7 +193,7 @@ MapDirections CollectDirections(const Graph& graph,
   // made of common observations, so that they agree better than they are right.
   double factors[2] = {1.0, 1.0};
   for (int pass = 0; pass < kPasses; ++pass) {
-    result.network.Solve();
+    result.network.SolveAngles();
     for (const int group : {kRelative, kSighted}) {
       double factor = result.network.VarianceFactor(group);
       if (group == kRelative) factor = std::max(factor, 1.0 / factors[group]);

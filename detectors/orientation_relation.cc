@@ -101,22 +101,18 @@ std::set<FeatureId> RelatedTo(const Graph& graph, FeatureId orientation) {
 
 // Judges relations by their innovation, where the poses that saw the walls are
 // in the graph: a small difference that is known well is one all the same.
+// Mostly all orientations are related already, and none is judged.
 class RelationJudge {
  public:
   RelationJudge(const Graph& graph, const DetectionScope& scope,
                 const OrientationRelationOptions& options)
-      : gate_(options.innovation_gate) {
-    if (scope.features != nullptr) return;
-    map_ = CollectDirections(graph, nullptr, options.links);
-    if (!map_.has_sightings) return;
-    AddOrientations(graph, options.own_direction_noise, &map_);
-    map_.network.Solve();
-  }
+      : graph_(graph), options_(options), knows_(scope.features != nullptr) {}
 
   // Whether the measurements are against two orientations being at this angle
   // to this tolerance (rad).
   bool Contradicts(const Feature& first, const Feature& second, double angle,
                    double sigma) {
+    Learn();
     if (!map_.has_sightings) return false;
     const auto a = map_.nodes.find(first.id);
     const auto b = map_.nodes.find(second.id);
@@ -128,11 +124,23 @@ class RelationJudge {
     const double variance =
         map_.network.Variance(a->second) + map_.network.Variance(b->second) -
         2.0 * column[static_cast<Eigen::Index>(a->second)] + sigma * sigma;
-    return difference * difference > gate_ * variance;
+    return difference * difference > options_.innovation_gate * variance;
   }
 
  private:
-  double gate_;
+  void Learn() {
+    if (knows_) return;
+    knows_ = true;
+    map_ = CollectDirections(graph_, nullptr, options_.links);
+    if (!map_.has_sightings) return;
+    AddOrientations(graph_, options_.own_direction_noise, &map_);
+    map_.network.Solve();
+  }
+
+  const Graph& graph_;
+  const OrientationRelationOptions& options_;
+  // Whether the map is there; of parts of a map there is none.
+  bool knows_;
   MapDirections map_;
   // Of the covariance, as far as they were asked for.
   std::map<std::size_t, Eigen::VectorXd> columns_;

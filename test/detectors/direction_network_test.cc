@@ -101,5 +101,59 @@ TEST(DirectionNetworkTest, VarianceFactorSaysWhatResidualsShow) {
   EXPECT_EQ(network.VarianceFactor(7), 1.0);
 }
 
+// What is kept from one solve to the next is given up when links change.
+TEST(DirectionNetworkTest, SolvedAgainAsIfItWereNew) {
+  const auto fill = [](int links, DirectionNetwork* network) {
+    std::mt19937_64 engine(4);
+    std::normal_distribution<double> noise(0.0, 0.1);
+    for (int i = 0; i < 12; ++i) network->AddNode(noise(engine));
+    for (int k = 0; k < links; ++k) {
+      network->AddLink(k % 12, (k + 1 + k / 12) % 12, noise(engine),
+                       0.01 + 0.001 * k, false, k % 2);
+    }
+  };
+  const auto expect_same = [](const DirectionNetwork& a,
+                              const DirectionNetwork& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(a.Angle(i), b.Angle(i)) << i;
+      EXPECT_EQ(a.CovarianceColumn(i), b.CovarianceColumn(i)) << i;
+    }
+  };
+  DirectionNetwork network;
+  fill(20, &network);
+  network.SolveAngles();
+  network.ScaleVariances(1, 2.5, 0.0);
+  network.SolveAngles();
+  DirectionNetwork scaled;
+  fill(20, &scaled);
+  scaled.ScaleVariances(1, 2.5, 0.0);
+  scaled.Solve();
+  expect_same(network, scaled);
+  network.Solve();
+  for (std::size_t i = 0; i < network.size(); ++i) {
+    EXPECT_EQ(network.Variance(i), scaled.Variance(i)) << i;
+  }
+
+  network.RemoveLinksOf(3);
+  network.AddLink(3, 9, 0.2, 0.5, true);
+  network.Solve();
+  DirectionNetwork fresh;
+  fill(20, &fresh);
+  fresh.ScaleVariances(1, 2.5, 0.0);
+  fresh.RemoveLinksOf(3);
+  fresh.AddLink(3, 9, 0.2, 0.5, true);
+  fresh.Solve();
+  expect_same(network, fresh);
+
+  network.AddNode(0.4);
+  fresh.AddNode(0.4);
+  network.AddLink(12, 0, 0.1, 0.01, false);
+  fresh.AddLink(12, 0, 0.1, 0.01, false);
+  network.Solve();
+  fresh.SolveAngles();
+  expect_same(network, fresh);
+}
+
 }  // namespace
 }  // namespace plumbline

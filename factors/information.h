@@ -113,6 +113,9 @@ template <typename Derived>
 bool IsValidInformation(const Eigen::MatrixBase<Derived>& expression) {
   const auto& matrix = expression.eval();
   if (!internal::IsSymmetricInformation(matrix)) return false;
+  // Most are positive definite, which costs least to show.
+  const Eigen::LLT<internal::SquareMatrix<Derived>> llt(matrix);
+  if (llt.info() == Eigen::Success) return true;
   const auto solver =
       internal::ScaledEigenSolver(matrix, internal::InformationScale(matrix));
   return solver.info() == Eigen::Success &&

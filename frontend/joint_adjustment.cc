@@ -31,12 +31,25 @@ Pose2 PoseOf(const Feature& feature) {
                feature.parameters[2]);
 }
 
-void AddReturns(const std::vector<ScanPoint>& points, const Pose2& pose,
-                std::vector<ScanPoint>* returns) {
+// The points that have a normal, in the frame that `pose` is given in.
+void AddReference(const std::vector<ScanPoint>& points, const Pose2& pose,
+                  std::vector<ScanPoint>* reference) {
   const PoseTransform transform(pose);
+  reference->reserve(reference->size() + points.size());
   for (const ScanPoint& point : points) {
     if (point.normal.squaredNorm() == 0.0) continue;
-    returns->push_back(Moved(point, transform));
+    reference->push_back(Moved(point, transform));
+  }
+}
+
+// The same of returns alone: votes are counted.
+void AddReturns(const std::vector<ScanPoint>& points, const Pose2& pose,
+                std::vector<SurfaceReturn>* returns) {
+  const PoseTransform transform(pose);
+  for (const ScanPoint& point : points) {
+    if (point.is_between || point.normal.squaredNorm() == 0.0) continue;
+    returns->push_back(
+        {transform.Point(point.position), transform.Direction(point.normal)});
   }
 }
 
@@ -83,13 +96,7 @@ std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
         if (place.num_scans == 0) place.scan = points;
         const Pose2 pose =
             i == begin ? key : Compose(key, refined[i].since_key.mean);
-        if (i == begin) AddReturns(points, pose, &place.reference);
-        // Votes are counted.
-        points.erase(std::remove_if(points.begin(), points.end(),
-                                    [](const ScanPoint& point) {
-                                      return point.is_between;
-                                    }),
-                     points.end());
+        if (i == begin) AddReference(points, pose, &place.reference);
         AddReturns(points, pose, &place.returns);
         ++place.num_scans;
       }

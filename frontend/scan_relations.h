@@ -42,6 +42,14 @@ struct ScanRelationOptions {
   int num_threads = 1;
 };
 
+/// A return on a straight surface: what is kept of the returns of all scans.
+struct SurfaceReturn {
+  /// m.
+  Eigen::Vector2d position;
+  /// Unit normal of the surface, towards the laser.
+  Eigen::Vector2d normal;
+};
+
 /// A place of the robot, with what it saw from there.
 struct Place {
   /// Returns of the place's own scan, in its frame.
@@ -51,7 +59,7 @@ struct Place {
   std::vector<ScanPoint> reference;
   /// Those of all scans up to the next place that lie on straight surfaces, in
   /// the frame of the place, and how many scans they are from.
-  std::vector<ScanPoint> returns;
+  std::vector<SurfaceReturn> returns;
   int num_scans = 1;
   /// Whether the robot came here from the place before, tracked all the way.
   bool follows_previous = true;

@@ -108,7 +108,7 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
     // Neighbouring returns mostly fall into one cell.
     std::int64_t cell = WallGrid::Key(poses[k].head<2>());
     const std::vector<int>* near = grid.In(cell);
-    for (const ScanPoint& point : places[k].returns) {
+    for (const SurfaceReturn& point : places[k].returns) {
       if (point.normal.squaredNorm() == 0.0) continue;
       const Eigen::Vector2d position = transform.Point(point.position);
       const std::int64_t own = WallGrid::Key(position);

@@ -34,14 +34,9 @@ class WallVotesTest : public ::testing::Test {
     return graph_.Apply(std::move(transaction)).features[0];
   }
 
-  static ScanPoint Return(double x, double y, double normal_x,
-                          double normal_y) {
-    ScanPoint point;
-    point.position = {x, y};
-    point.normal = {normal_x, normal_y};
-    point.range = 1.0;
-    point.beam = 0;
-    return point;
+  static SurfaceReturn Return(double x, double y, double normal_x,
+                              double normal_y) {
+    return {{x, y}, {normal_x, normal_y}};
   }
 
   std::vector<std::vector<WallVote>> Collect(const Place& place,
@@ -77,7 +72,7 @@ TEST_F(WallVotesTest, InformationByHand) {
   EXPECT_LT((half[0][0].information - 0.5 * expected).norm(), 1e-9);
   Place moved = place;
   moved.num_scans = 1;
-  for (ScanPoint& point : moved.returns) {
+  for (SurfaceReturn& point : moved.returns) {
     point.position = {point.position.y() - 3.0, -point.position.x()};
     point.normal = {point.normal.y(), -point.normal.x()};
   }
@@ -104,7 +99,7 @@ TEST_F(WallVotesTest, WeightsAreRobust) {
 TEST_F(WallVotesTest, OnlyWhatLiesOnTheWallAndIsSeenFromItsSide) {
   AddWall(-1.0);
   options_.min_points = 1;
-  const auto number = [&](const ScanPoint& point) {
+  const auto number = [&](const SurfaceReturn& point) {
     Place place;
     place.returns = {point};
     return Collect(place, Pose2::Zero())[0].size();

@@ -13,6 +13,9 @@ Relations stay true; those whose scans are gone are left out. Kinds, with what V
   spikes      a share VALUE (0.05) of the returns lies anywhere before where it was
   holes       a share VALUE (0.2) of the returns is missing
   near        what lies VALUE m (6) away or farther returns nothing
+  beams       one beam in VALUE (2), from the first one on
+  view        beams of the middle VALUE degrees (120) of a laser of 180; told by --laser_start_angle=-VALUE/2
+              --laser_step=STEP with the step of the log
   long        ranges times VALUE (1.01)
   offset      all ranges are VALUE m (0.05) too long
   askew       odometry says that the robot drives VALUE degrees (1.5) to the right of where it does
@@ -29,7 +32,7 @@ import math
 import random
 import sys
 
-DEFAULTS = {"mirror": 0, "reverse": 0, "every": 3, "noise": 0.03, "steps": 0.05, "spikes": 0.05, "holes": 0.2, "near": 6.0,
+DEFAULTS = {"mirror": 0, "reverse": 0, "every": 3, "noise": 0.03, "steps": 0.05, "spikes": 0.05, "holes": 0.2, "near": 6.0, "beams": 2, "view": 120.0,
             "long": 1.01, "offset": 0.05, "askew": 1.5, "drift": 1.0, "slip": 5.0, "wheels": 0.2, "still": 0, "late": 2}
 NO_RETURN = 81.83
 
@@ -120,6 +123,13 @@ def main():
         on_ranges(scans, lambda r: NO_RETURN if rnd.random() < value else r)
     elif kind == "near":
         on_ranges(scans, lambda r: NO_RETURN if r >= value else r)
+    elif kind == "beams":
+        for scan in scans:
+            scan.ranges = scan.ranges[::int(value)]
+    elif kind == "view":
+        for scan in scans:
+            cut = round(len(scan.ranges) * (180.0 - value) / 360.0)
+            scan.ranges = scan.ranges[cut:len(scan.ranges) - cut]
     elif kind == "long":
         on_ranges(scans, lambda r: value * r)
     elif kind == "offset":

@@ -260,19 +260,9 @@ std::uint8_t OccupancyGrid::Pixel(int column, int row) const {
 
 void OccupancyGrid::Row(int row, std::string* pixels) const {
   pixels->assign(static_cast<std::size_t>(width_), static_cast<char>(kUnknown));
-  for (int begin = 0; begin < width_; begin += kTileSize) {
-    const std::unique_ptr<Tile>& tile =
-        tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
-               (begin >> kTileBits)];
-    if (tile == nullptr) continue;
-    const Cell* const cells =
-        tile->cells.data() + ((row & (kTileSize - 1)) << kTileBits);
-    const int end = std::min(width_ - begin, kTileSize);
-    for (int i = 0; i < end; ++i) {
-      (*pixels)[static_cast<std::size_t>(begin + i)] =
-          static_cast<char>(Shade(cells[i]));
-    }
-  }
+  VisitKnownOfRow(row, [&](int column, std::uint8_t pixel) {
+    (*pixels)[static_cast<std::size_t>(column)] = static_cast<char>(pixel);
+  });
 }
 
 void OccupancyGrid::ForgetUnreachable() {
@@ -365,13 +355,13 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
   }
   const auto threads =
       static_cast<std::size_t>(std::max(1, options.num_threads));
-  const auto begin_of = [threads](std::size_t count, std::size_t part) {
-    return count * part / threads;
-  };
+  const auto begin_of = [](std::size_t count, std::size_t part,
+                           std::size_t parts) { return count * part / parts; };
   std::vector<Corners> corners(threads);
   ParallelFor(threads, options.num_threads, [&](std::size_t part) {
-    corners[part] = CornersOf(scans, poses, begin_of(poses.size(), part),
-                              begin_of(poses.size(), part + 1), options);
+    corners[part] =
+        CornersOf(scans, poses, begin_of(poses.size(), part, threads),
+                  begin_of(poses.size(), part + 1, threads), options);
   });
   for (const Corners& other : corners) corners[0].Add(other);
   OccupancyGrid grid(corners[0].low, corners[0].high, options);
@@ -393,8 +383,8 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
       grids.emplace_back(corners[0].low, corners[0].high, options);
     }
     ParallelFor(parts, options.num_threads, [&](std::size_t part) {
-      for (std::size_t i = count * part / parts; i < count * (part + 1) / parts;
-           ++i) {
+      for (std::size_t i = begin_of(count, part, parts);
+           i < begin_of(count, part + 1, parts); ++i) {
         grids[part].AddScan(scans[i * step], poses[i * step]);
       }
     });

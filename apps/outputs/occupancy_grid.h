@@ -96,19 +96,9 @@ class OccupancyGrid {
   template <typename Visit>
   void VisitKnown(const Visit& visit) const {
     for (int row = 0; row < height_; ++row) {
-      for (int begin = 0; begin < width_; begin += kTileSize) {
-        const std::unique_ptr<Tile>& tile =
-            tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
-                   (begin >> kTileBits)];
-        if (tile == nullptr) continue;
-        const Cell* const cells =
-            tile->cells.data() + ((row & (kTileSize - 1)) << kTileBits);
-        const int end = std::min(width_ - begin, kTileSize);
-        for (int i = 0; i < end; ++i) {
-          const std::uint8_t pixel = Shade(cells[i]);
-          if (pixel != kUnknown) visit(begin + i, row, pixel);
-        }
-      }
+      VisitKnownOfRow(row, [&](int column, std::uint8_t pixel) {
+        visit(column, row, pixel);
+      });
     }
   }
 
@@ -135,6 +125,22 @@ class OccupancyGrid {
     double spacing = std::numeric_limits<double>::infinity();
   };
 
+  template <typename Visit>
+  void VisitKnownOfRow(int row, const Visit& visit) const {
+    for (int begin = 0; begin < width_; begin += kTileSize) {
+      const std::unique_ptr<Tile>& tile =
+          tiles_[static_cast<std::size_t>(row >> kTileBits) * tile_columns_ +
+                 (begin >> kTileBits)];
+      if (tile == nullptr) continue;
+      const Cell* const cells =
+          tile->cells.data() + ((row & (kTileSize - 1)) << kTileBits);
+      const int end = std::min(width_ - begin, kTileSize);
+      for (int i = 0; i < end; ++i) {
+        const std::uint8_t pixel = Shade(cells[i]);
+        if (pixel != kUnknown) visit(begin + i, pixel);
+      }
+    }
+  }
   Tile* TileAt(int column, int row);
   Cell* CellAt(int column, int row);
   std::uint8_t Shade(const Cell& cell) const {

@@ -241,32 +241,37 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
   const Eigen::Vector2d size = (maximum - minimum).array() + 2.0 * margin;
   bucket_columns_ = static_cast<int>(std::ceil(size.x() / bucket_size_)) + 1;
   bucket_rows_ = static_cast<int>(std::ceil(size.y() / bucket_size_)) + 1;
-  // Each point's bucket and number, in one that sorts by both; of each row the
-  // first one.
-  std::vector<std::uint64_t> places;
-  places.reserve(points.size());
-  std::vector<std::size_t> row_begin(static_cast<std::size_t>(bucket_rows_) + 1,
-                                     0);
+  // By bucket and in each as they were given: by columns first, then by rows.
+  struct Entry {
+    int row;
+    int column;
+    int point;
+  };
+  std::vector<Entry> entries;
+  entries.reserve(points.size());
+  std::vector<int> column_begin(static_cast<std::size_t>(bucket_columns_) + 1,
+                                0);
+  std::vector<int> row_begin(static_cast<std::size_t>(bucket_rows_) + 1, 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2d local = (points[i].position - origin_) / bucket_size_;
     if (!(local.x() >= 0.0 && local.y() >= 0.0 && local.x() < bucket_columns_ &&
           local.y() < bucket_rows_)) {
       continue;
     }
-    const int row = static_cast<int>(local.y());
-    const auto bucket = static_cast<std::uint64_t>(row * bucket_columns_ +
-                                                   static_cast<int>(local.x()));
-    places.push_back(bucket << 32 | i);
-    ++row_begin[static_cast<std::size_t>(row) + 1];
+    const Entry entry = {static_cast<int>(local.y()),
+                         static_cast<int>(local.x()), static_cast<int>(i)};
+    entries.push_back(entry);
+    ++column_begin[static_cast<std::size_t>(entry.column) + 1];
+    ++row_begin[static_cast<std::size_t>(entry.row) + 1];
   }
+  std::partial_sum(column_begin.begin(), column_begin.end(),
+                   column_begin.begin());
   std::partial_sum(row_begin.begin(), row_begin.end(), row_begin.begin());
-  std::vector<std::uint64_t> sorted(places.size());
-  std::vector<std::size_t> next_in_row(row_begin.begin(), row_begin.end() - 1);
-  for (const std::uint64_t place : places) {
-    const std::size_t row =
-        static_cast<std::size_t>(place >> 32) / bucket_columns_;
-    sorted[next_in_row[row]++] = place;
+  std::vector<Entry> by_column(entries.size());
+  for (const Entry& entry : entries) {
+    by_column[column_begin[entry.column]++] = entry;
   }
+  for (const Entry& entry : by_column) entries[row_begin[entry.row]++] = entry;
   // Most buckets are empty: each is written once.
   bucket_begin_.resize(
       static_cast<std::size_t>(bucket_columns_) * bucket_rows_ + 1);
@@ -278,21 +283,17 @@ void ScanMatcher::SetReference(std::vector<ScanPoint> points,
               static_cast<int>(reference_.size()));
     filled = end;
   };
-  for (std::size_t row = 0; row + 1 < row_begin.size(); ++row) {
-    const auto end =
-        sorted.begin() + static_cast<std::ptrdiff_t>(row_begin[row + 1]);
-    auto next = sorted.begin() + static_cast<std::ptrdiff_t>(row_begin[row]);
-    std::sort(next, end);
-    while (next != end) {
-      const std::uint64_t bucket = *next >> 32;
-      fill_up_to(static_cast<std::size_t>(bucket) + 1);
-      const std::size_t first = reference_.size();
-      for (; next != end && *next >> 32 == bucket; ++next) {
-        const ScanPoint& point = points[*next & 0xffffffffu];
-        reference_.push_back({point.position, point.normal});
-      }
-      MergeNear(options_.point_sigma, first, &reference_);
+  for (auto next = entries.begin(); next != entries.end();) {
+    const int row = next->row;
+    const int column = next->column;
+    fill_up_to(static_cast<std::size_t>(row) * bucket_columns_ + column + 1);
+    const std::size_t first = reference_.size();
+    for (; next != entries.end() && next->row == row && next->column == column;
+         ++next) {
+      const ScanPoint& point = points[static_cast<std::size_t>(next->point)];
+      reference_.push_back({point.position, point.normal});
     }
+    MergeNear(options_.point_sigma, first, &reference_);
   }
   fill_up_to(bucket_begin_.size());
   // The last block may be read beyond the end.

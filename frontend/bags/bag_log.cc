@@ -77,8 +77,8 @@ class ScanPlacer {
     }
   }
 
-  LaserMount MountAt(std::size_t frame, std::int64_t time) const {
-    LaserMount mount;
+  LaserPlacement MountAt(std::size_t frame, std::int64_t time) const {
+    LaserPlacement mount;
     Pose3 pose;
     if (sources_.base.empty() || frames_[frame].empty() ||
         !tree_.LookupAnyWay(sources_.base, frames_[frame], time, &pose)) {
@@ -127,7 +127,7 @@ class ScanPlacer {
   void FindMounts() {
     bool any_known = false;
     for (std::size_t f = 0; f < frames_.size(); ++f) {
-      LaserMount mount = MountAt(f, scans_.front().stamp);
+      LaserPlacement mount = MountAt(f, scans_.front().stamp);
       for (const std::string& name : tree_.ChainOf(frames_[f])) {
         if (name == sources_.base) break;
         mount.is_moving |= tree_.IsMoving(name);
@@ -245,8 +245,8 @@ class ScanPlacer {
     return motion;
   }
 
-  LaserMount MountOf(const BagScan& scan) const {
-    const LaserMount& mount = mounts_[scan.frame];
+  LaserPlacement MountOf(const BagScan& scan) const {
+    const LaserPlacement& mount = mounts_[scan.frame];
     return mount.is_moving ? MountAt(scan.frame, scan.stamp - scan.set_back)
                            : mount;
   }
@@ -283,7 +283,7 @@ class ScanPlacer {
     undone_ = maker.undone();
   }
 
-  void NoteMount(const LaserMount& mount, const std::string& frame) {
+  void NoteMount(const LaserPlacement& mount, const std::string& frame) {
     if (!mount.is_known) {
       log_->notes.push_back(
           "tf does not say where the laser's frame '" + frame + "' is" +
@@ -350,7 +350,7 @@ class ScanPlacer {
   std::int64_t undone_ = 0;
   std::int64_t impossible_sweeps_ = 0;
   // By frame.
-  std::vector<LaserMount> mounts_;
+  std::vector<LaserPlacement> mounts_;
 };
 
 void AppendReports(const std::vector<SkipReport>& reports, Log* log) {

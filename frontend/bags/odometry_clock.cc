@@ -90,7 +90,7 @@ class PolarView {
 class ClockSearch {
  public:
   ClockSearch(const LaserOptions& options, const std::vector<BagScan>& scans,
-              const std::function<LaserMount(const BagScan&)>& mount_of,
+              const std::function<LaserPlacement(const BagScan&)>& mount_of,
               const BagMotion& motion)
       : options_(options),
         scans_(scans),
@@ -252,7 +252,7 @@ class ClockSearch {
 
   const LaserOptions& options_;
   const std::vector<BagScan>& scans_;
-  const std::function<LaserMount(const BagScan&)>& mount_of_;
+  const std::function<LaserPlacement(const BagScan&)>& mount_of_;
   const BagMotion& motion_;
   std::vector<Pair> pairs_;
 };
@@ -261,7 +261,7 @@ class ClockSearch {
 
 ClockChoice ChooseClock(
     const LaserOptions& options, const std::vector<BagScan>& scans,
-    const std::function<LaserMount(const BagScan&)>& mount_of,
+    const std::function<LaserPlacement(const BagScan&)>& mount_of,
     const BagMotion& motion, std::int64_t difference) {
   return ClockSearch(options, scans, mount_of, motion).Choose(difference);
 }

@@ -33,7 +33,7 @@ struct ClockChoice {
 /// robot.
 ClockChoice ChooseClock(
     const LaserOptions& options, const std::vector<BagScan>& scans,
-    const std::function<LaserMount(const BagScan&)>& mount_of,
+    const std::function<LaserPlacement(const BagScan&)>& mount_of,
     const BagMotion& motion, std::int64_t difference);
 
 }  // namespace plumbline

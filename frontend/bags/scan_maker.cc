@@ -64,7 +64,7 @@ ScanMaker::ScanMaker(const LaserOptions& options, const BagMotion* motion,
                      const std::vector<BagScan>& scans)
     : options_(options), motion_(motion), period_(TimeBetweenScans(scans)) {}
 
-Scan ScanMaker::Make(const BagScan& raw, const LaserMount& mount,
+Scan ScanMaker::Make(const BagScan& raw, const LaserPlacement& mount,
                      SkipCounter* skips) {
   const LaserScanMessage& message = raw.message;
   Scan scan;
@@ -119,7 +119,7 @@ Scan ScanMaker::Make(const BagScan& raw, const LaserMount& mount,
 // A laser that turns with the robot sees each beam from another place: puts
 // the returns where they are seen from the place of the time stamp, which is
 // that of the first beam.
-void ScanMaker::UndoMotion(const BagScan& raw, const LaserMount& mount,
+void ScanMaker::UndoMotion(const BagScan& raw, const LaserPlacement& mount,
                            std::size_t stride, Scan* scan) {
   const double step = raw.message.time_increment * static_cast<double>(stride);
   const std::size_t n = scan->ranges.size();

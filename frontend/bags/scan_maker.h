@@ -14,7 +14,7 @@
 namespace plumbline {
 
 /// The laser on the robot, by tf.
-struct LaserMount {
+struct LaserPlacement {
   /// In the robot's frame.
   Pose2 pose = Pose2::Zero();
   bool is_upside_down = false;
@@ -34,7 +34,8 @@ class ScanMaker {
             const std::vector<BagScan>& scans);
 
   /// The scan of a message. Counts what of it was not used in `skips`.
-  Scan Make(const BagScan& raw, const LaserMount& mount, SkipCounter* skips);
+  Scan Make(const BagScan& raw, const LaserPlacement& mount,
+            SkipCounter* skips);
 
   /// Scans whose time_increment cannot be.
   std::int64_t impossible_sweeps() const { return impossible_sweeps_; }
@@ -42,7 +43,7 @@ class ScanMaker {
   std::int64_t undone() const { return undone_; }
 
  private:
-  void UndoMotion(const BagScan& raw, const LaserMount& mount,
+  void UndoMotion(const BagScan& raw, const LaserPlacement& mount,
                   std::size_t stride, Scan* scan);
 
   const LaserOptions& options_;

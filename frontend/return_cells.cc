@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/principal_axis.h>
 #include <plumbline/frontend/return_cells.h>
 
@@ -6,6 +7,12 @@
 #include <cstdint>
 
 namespace plumbline {
+namespace {
+
+// Whose directions one thread fits before it takes others.
+constexpr std::size_t kCellsAtOnce = 2000;
+
+}  // namespace
 
 void LineFit::Solve(Eigen::Vector2d* mean, Eigen::Vector2d* direction,
                     double* across, double* along) const {
@@ -44,11 +51,11 @@ void ReturnCells::Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
   }
 }
 
-void ReturnCells::Finish(double least_share) {
+void ReturnCells::Finish(double least_share, int num_threads) {
   SortLooks();
   FillBuckets();
   if (least_share > 0.0) DropStrays(least_share);
-  FitDirections();
+  FitDirections(num_threads);
 }
 
 void ReturnCells::SortLooks() {
@@ -223,25 +230,33 @@ void ReturnCells::DropStrays(double least_share) {
   DropUsed();
 }
 
-void ReturnCells::FitDirections() {
-  for (Cell& cell : cells_) {
-    if (cell.used) continue;
-    LineFit fit;
-    int count = 0;
-    const Eigen::Vector2d origin = cell.mean;
-    VisitBuckets(origin, buckets_[cell.bucket].around, normal_radius_,
-                 [&](int index) {
-                   fit.Add(cells_[index].mean - origin, 1.0);
-                   ++count;
-                 });
-    if (count < 4) continue;
-    Eigen::Vector2d mean, direction;
-    double across, along;
-    fit.Solve(&mean, &direction, &across, &along);
-    if (along <= 0.0 || across > 0.08 * along) continue;
-    cell.direction = direction;
-    cell.straightness = along - 10.0 * across;
-  }
+void ReturnCells::FitDirections(int num_threads) {
+  const std::size_t blocks = (cells_.size() + kCellsAtOnce - 1) / kCellsAtOnce;
+  ParallelFor(blocks, num_threads, [&](std::size_t block) {
+    const std::size_t end = std::min(cells_.size(), (block + 1) * kCellsAtOnce);
+    for (std::size_t k = block * kCellsAtOnce; k < end; ++k) {
+      FitDirection(&cells_[k]);
+    }
+  });
+}
+
+void ReturnCells::FitDirection(Cell* cell) const {
+  if (cell->used) return;
+  LineFit fit;
+  int count = 0;
+  const Eigen::Vector2d origin = cell->mean;
+  VisitBuckets(origin, buckets_[cell->bucket].around, normal_radius_,
+               [&](int index) {
+                 fit.Add(cells_[index].mean - origin, 1.0);
+                 ++count;
+               });
+  if (count < 4) return;
+  Eigen::Vector2d mean, direction;
+  double across, along;
+  fit.Solve(&mean, &direction, &across, &along);
+  if (along <= 0.0 || across > 0.08 * along) return;
+  cell->direction = direction;
+  cell->straightness = along - 10.0 * across;
 }
 
 }  // namespace plumbline

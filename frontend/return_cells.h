@@ -107,8 +107,9 @@ class ReturnCells {
 
   /// Prepares searches, and fits directions. To be called once all returns are
   /// in. No search finds cells with less than `least_share` of the returns that
-  /// one of their surroundings has: strays beside what stands there.
-  void Finish(double least_share = 0.0);
+  /// one of their surroundings has: strays beside what stands there. The result
+  /// is the same with any number of threads.
+  void Finish(double least_share = 0.0, int num_threads = 1);
 
   /// The cells in the order in which they were first seen.
   const std::vector<Cell>& cells() const { return cells_; }
@@ -200,7 +201,8 @@ class ReturnCells {
   void SortLooks();
   void FillBuckets();
   void DropStrays(double least_share);
-  void FitDirections();
+  void FitDirections(int num_threads);
+  void FitDirection(Cell* cell) const;
 
   template <typename Look>
   void VisitBuckets(const Eigen::Vector2d& place,

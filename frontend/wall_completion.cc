@@ -445,7 +445,7 @@ class Completion {
             std::size_t begin, std::size_t end, double reach,
             std::initializer_list<double> smears) {
     Gather(scans, poses, begin, end, reach);
-    returns_.Finish(stray_share_);
+    returns_.Finish(stray_share_, options_.num_threads);
     const std::vector<ReturnCells::Cell>& cells = returns_.cells();
     // The straightest surroundings first; ties by the order of scans.
     std::vector<int> order;

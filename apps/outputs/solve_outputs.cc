@@ -21,6 +21,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <numeric>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -258,6 +259,41 @@ WriteResult RunWriter(const OutputWriterType& writer,
   return result;
 }
 
+// When the turn of a file comes: those with a part of the plan, which takes as
+// long as all the rest, last, and of these first who has other things to do,
+// too. 0 without such a part.
+int TurnOf(const OutputWriterType& output) {
+  static const std::vector<std::string> kOfThePlan = {
+      "report.html",   "map.json",          "occupancy.pgm", "floorplan.svg",
+      "floorplan.dxf", "floorplan.geojson", "rooms.csv"};
+  const auto found =
+      std::find(kOfThePlan.begin(), kOfThePlan.end(), output.name);
+  return found == kOfThePlan.end()
+             ? 0
+             : static_cast<int>(found - kOfThePlan.begin()) + 1;
+}
+
+// Places in the list, in the order in which its files are begun.
+std::vector<std::size_t> OrderOfWriting(
+    const std::vector<const OutputWriterType*>& outputs) {
+  std::vector<std::size_t> order(outputs.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) {
+                     return TurnOf(*outputs[a]) < TurnOf(*outputs[b]);
+                   });
+  return order;
+}
+
+// Makes the plan that others will ask for.
+void BeginPlan(const SolveOutcome& outcome) {
+  try {
+    outcome.parts->Plan(outcome);
+  } catch (const Error&) {
+    // Each of them meets it again, and says so.
+  }
+}
+
 }  // namespace
 
 SolveOutcome::SolveOutcome() : parts(std::make_shared<SharedParts>()) {}
@@ -407,10 +443,19 @@ WrittenOutputs WriteSolveOutputs(
     if (output->of_scans && outcome.trajectory.empty()) continue;
     selected.push_back(output);
   }
+  const std::vector<std::size_t> order = OrderOfWriting(selected);
+  const bool has_plan = std::any_of(
+      selected.begin(), selected.end(),
+      [](const OutputWriterType* output) { return TurnOf(*output) > 0; });
   std::vector<WriteResult> results(selected.size());
   std::mutex mutex;
   int done = 0;
-  ParallelFor(selected.size(), threads, [&](std::size_t i) {
+  ParallelFor(order.size() + 1, threads, [&](std::size_t job) {
+    if (job == 0) {
+      if (has_plan) BeginPlan(outcome);
+      return;
+    }
+    const std::size_t i = order[job - 1];
     results[i] = RunWriter(*selected[i], outcome, folder);
     const std::lock_guard<std::mutex> lock(mutex);
     ++done;

@@ -40,6 +40,18 @@ constexpr double kClearly = 10.0;
 // From here on a robot has moved while odometry stood still, m and rad.
 constexpr double kMovedWay = 0.2;
 constexpr double kMovedTurn = DegToRad(8.0);
+// What wheels that do not slip are off by since the last key scan, one standard
+// deviation: m, and m a metre; so many of them are far, and so many near.
+constexpr double kWheelSigma = 0.02;
+constexpr double kWheelSigmaPerMetre = 0.05;
+constexpr double kFarFromWheels = 3.0;
+constexpr double kNearWheels = 2.0;
+// A return says something of a direction when the cosine of its normal with it
+// is no smaller than this. So deep a thing is, m, that may be all that says
+// something, and so large its least share of it.
+constexpr double kSays = 0.5;
+constexpr double kThing = 1.0;
+constexpr double kOfOneThing = 0.8;
 // The usual time between scans follows with this share.
 constexpr double kUsualShare = 0.05;
 // Share by which the noise of the laser has to change before it is followed.
@@ -241,6 +253,103 @@ void OdometryRefiner::MatchWithoutClutter(const Scan& scan,
     track_.moving = options_.clutter_memory;
     if (trace_) trace_("without clutter");
   }
+}
+
+void OdometryRefiner::NoteWheels(bool leapt) {
+  const bool steady = track_.refused == 0 && still_ == 0 && !is_dead_ &&
+                      !track_.after_gap && !track_.jumped && !leapt &&
+                      steady_.IsMoving() && steady_.Explains(last_motion_);
+  steady_wheels_ = steady ? steady_wheels_ + 1 : 0;
+  ++scans_since_key_;
+}
+
+bool OdometryRefiner::HaveWheelsBeenSteady() const {
+  // The step to the key scan, too: what odometry was late by then comes after.
+  return steady_wheels_ > scans_since_key_;
+}
+
+Pose2 OdometryRefiner::ByWheels(const Scan& scan) const {
+  return Compose(
+      track_.keys.back().pose,
+      odometry_calibration_.Corrected(Between(key_odometry_, scan.odometry)));
+}
+
+// Along a corridor one thing may be all that says how far the robot went. When
+// it moves, a door that is opened or somebody with a trolley, each scan is
+// pulled by less than odometry may be off by from scan to scan, and all of them
+// add up. Wheels that slip do not turn on as the robot moved before.
+void OdometryRefiner::MatchAsWheelsSay(const Scan& scan,
+                                       const MatchPrior& prior,
+                                       MatchResult* match) {
+  const Pose2 by_wheels = ByWheels(scan);
+  const auto apart = [&](const Pose2& pose) {
+    return (pose - by_wheels).head<2>().norm();
+  };
+  const double sigma =
+      kWheelSigma + kWheelSigmaPerMetre *
+                        (by_wheels - track_.keys.back().pose).head<2>().norm();
+  if (apart(match->pose) <= kFarFromWheels * sigma) return;
+  const Pose2 usual = steady_.Step().mean;
+  const auto change = [&](const Pose2& motion) {
+    return (motion - usual).head<2>().norm();
+  };
+  if (change(Between(track_.last_pose, match->pose)) < change(last_motion_)) {
+    return;
+  }
+  const Pose2 guess(by_wheels[0], by_wheels[1], match->pose[2]);
+  const std::vector<ScanPoint> standing =
+      WithoutOneThing(PoseTransform(Inverse(guess))
+                          .Direction((match->pose - by_wheels).head<2>())
+                          .normalized());
+  if (standing.empty()) return;
+  MatchPrior wheels;
+  wheels.pose = guess;
+  wheels.pose[2] = prior.pose[2];
+  wheels.information.diagonal() << 1.0 / (sigma * sigma), 1.0 / (sigma * sigma),
+      prior.information(2, 2);
+  const MatchResult other = track_.matcher.Refine(standing, guess, wheels);
+  if (apart(other.pose) > kNearWheels * sigma ||
+      other.inlier_ratio < options_.good_inlier_ratio ||
+      other.inliers < options_.minimum_points ||
+      Contradicts(track_.matcher.Compare(standing, other.pose,
+                                         scan.laser_offset.head<2>()),
+                  0.0)) {
+    return;
+  }
+  if (trace_) trace_("as wheels say");
+  *match = other;
+  points_ = standing;
+  track_.moving = options_.clutter_memory;
+}
+
+std::vector<ScanPoint> OdometryRefiner::WithoutOneThing(
+    const Eigen::Vector2d& direction) const {
+  const auto says = [&](const ScanPoint& point) {
+    return std::abs(point.normal.dot(direction)) >= kSays;
+  };
+  std::vector<double> depths;
+  for (const ScanPoint& point : points_) {
+    if (says(point)) depths.push_back(point.position.dot(direction));
+  }
+  std::sort(depths.begin(), depths.end());
+  std::size_t most = 0;
+  double begin = 0.0;
+  for (std::size_t first = 0, end = 0; first < depths.size(); ++first) {
+    while (end < depths.size() && depths[end] <= depths[first] + kThing) ++end;
+    if (end - first > most) {
+      most = end - first;
+      begin = depths[first];
+    }
+  }
+  std::vector<ScanPoint> rest;
+  if (most == 0 || most < kOfOneThing * depths.size()) return rest;
+  for (const ScanPoint& point : points_) {
+    const double depth = point.position.dot(direction);
+    if (!says(point) || depth < begin || depth > begin + kThing) {
+      rest.push_back(point);
+    }
+  }
+  return rest;
 }
 
 void OdometryRefiner::MatchWithoutIntruders(const std::vector<bool>& intruders,
@@ -456,6 +565,7 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
       SquaredInnovation(match, prior) > options_.clutter_innovation) {
     MatchWithoutClutter(scan, prior, motion, &match);
   }
+  if (HaveWheelsBeenSteady()) MatchAsWheelsSay(scan, prior, &match);
   bool believed = match.inlier_ratio >= options_.good_inlier_ratio;
   const double innovation = SquaredInnovation(match, prior);
   // Few returns fit in many places.
@@ -612,6 +722,7 @@ void OdometryRefiner::BeginTrack(const Scan& scan, SettledScan* first) {
   track_.last_pose = refined.pose;
   track_.last_points = points_;
   key_odometry_ = scan.odometry;
+  scans_since_key_ = 0;
   odometry_calibration_.Break();
   track_.keys.push_back(
       {first->index, refined.pose, points_, scan.laser_offset.head<2>()});
@@ -684,6 +795,7 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
     open_->turn += std::abs(motion[2]);
     open_->seconds += std::max(0.0, seconds);
   }
+  NoteWheels(leapt);
   const Outcome outcome = Match(scan, step, leapt);
   NoteMatch(outcome, motion);
   done.refined = outcome.refined;
@@ -805,6 +917,7 @@ void OdometryRefiner::CompareOdometry(const Scan& scan,
                                       const Eigen::Matrix3d& information) {
   const Pose2 by_wheels = Between(key_odometry_, scan.odometry);
   key_odometry_ = scan.odometry;
+  scans_since_key_ = 0;
   if (refined.odometry_only || track_.keys.empty()) return;
   const Pose2 motion = odometry_calibration_.Corrected(by_wheels);
   odometry_calibration_.Compare(by_wheels,
@@ -951,7 +1064,8 @@ void OdometryRefiner::ExchangeState(StateArchive& archive) {
               loose_of_, wide_searches_, refusals_, losses_, loose_, guessed_,
               noise_, noise_scale_, key_odometry_, squared_innovations_,
               compared_motions_, odometry_calibration_, steady_, still_,
-              last_motion_, still_pose_, is_dead_, ahead_);
+              last_motion_, steady_wheels_, scans_since_key_, still_pose_,
+              is_dead_, ahead_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

@@ -298,6 +298,21 @@ class OdometryRefiner {
   // another one.
   void MatchWithoutClutter(const Scan& scan, const MatchPrior& prior,
                            const Pose2& motion, MatchResult* match);
+  // Takes note of how odometry's last step goes on what was before, and whether
+  // that has been so since the last key scan.
+  void NoteWheels(bool leapt);
+  bool HaveWheelsBeenSteady() const;
+  // Odometry since the last key scan, as a pose of the scan.
+  Pose2 ByWheels(const Scan& scan) const;
+  // Where the robot moves steadily and one thing alone leads a match far from
+  // where odometry since the last key scan does, takes the match without it.
+  void MatchAsWheelsSay(const Scan& scan, const MatchPrior& prior,
+                        MatchResult* match);
+  // Returns of the last scan without those of the one thing that says how far
+  // the robot went in a direction (length 1, robot's frame); none when it is
+  // more than one.
+  std::vector<ScanPoint> WithoutOneThing(
+      const Eigen::Vector2d& direction) const;
   // Takes the match of the returns that are no intruders where it agrees with
   // the reference at least as well as the present one, `here`.
   void MatchWithoutIntruders(const std::vector<bool>& intruders,
@@ -378,6 +393,10 @@ class OdometryRefiner {
   // the robot was then. Dead: the robot is known to have gone on.
   int still_ = 0;
   Pose2 last_motion_ = Pose2::Zero();
+  // Scans in a row in which odometry went on as the robot did before, and scans
+  // since the last key scan.
+  int steady_wheels_ = 0;
+  int scans_since_key_ = 0;
   Pose2 still_pose_ = Pose2::Zero();
   bool is_dead_ = false;
   // Where the robot is if it goes on while odometry stands still: the pose, the

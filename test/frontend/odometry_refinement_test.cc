@@ -541,6 +541,55 @@ TEST(OdometryRefinerTest, OnePersonInACorridorDoesNotHoldTheRobotBack) {
   EXPECT_GT(error(0.1, &share), 0.5);
 }
 
+// A board as wide as the corridor is carried along before the robot: wheels say
+// that it goes on, all that is in sight across the way that it stands.
+TEST(OdometryRefinerTest, ABoardAcrossTheCorridorDoesNotHoldTheRobotBack) {
+  OdometryRefiner refiner(RefinerOptions());
+  Laser laser;
+  laser.maximum_range = 8.0;
+  Noise noise(3);
+  Pose2 pose(-5.0, 0.0, 0.0);
+  double largest = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    if (i > 0) pose = Compose(pose, Pose2(0.05, 0.0, 0.0));
+    std::vector<WallEnds> all = {{{-20.0, 1.0}, {20.0, 1.0}},
+                                 {{-20.0, -1.0}, {20.0, -1.0}}};
+    if (i >= 20 && i < 80) {
+      const double x = pose[0] + 5.0;
+      all.push_back({{x, -0.95}, {x, 0.95}});
+    }
+    Scan scan = MakeScan(all, pose, laser, &noise);
+    scan.timestamp = 100.0 + 0.2 * i;
+    largest =
+        std::max(largest, PositionError(refiner.Process(scan).pose, pose));
+  }
+  EXPECT_LT(largest, 0.3);
+}
+
+// Wheels that slip in a corridor whose end is in sight do not count.
+TEST(OdometryRefinerTest, WheelsThatSlipBeforeTheEndOfACorridor) {
+  std::vector<Pose2> motions(60, Pose2(0.05, 0.0, 0.0));
+  std::vector<Pose2> reported = motions;
+  for (std::size_t i = 20; i < 30; ++i) reported[i][0] = 0.1;
+  const Drive drive = Along({-5.0, 0.0, 0.0}, motions, reported);
+  const std::vector<WallEnds> walls = {{{-20.0, 1.0}, {3.0, 1.0}},
+                                       {{-20.0, -1.0}, {3.0, -1.0}},
+                                       {{3.0, -1.0}, {3.0, 1.0}}};
+  Laser laser;
+  laser.maximum_range = 9.0;
+  Noise noise(3);
+  OdometryRefiner refiner(RefinerOptions());
+  double largest = 0.0;
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    Scan scan = MakeScan(walls, drive.truth[i], laser, &noise);
+    scan.odometry = drive.odometry[i];
+    scan.timestamp = 100.0 + 0.2 * static_cast<double>(i);
+    largest = std::max(
+        largest, PositionError(refiner.Process(scan).pose, drive.truth[i]));
+  }
+  EXPECT_LT(largest, 0.1);
+}
+
 TEST(OdometryRefinerTest, NoOdometryAtAll) {
   std::vector<Pose2> motions;
   for (int i = 0; i < 40; ++i) {

@@ -24,6 +24,11 @@ namespace {
 // First and last key scans of a track that are searched with.
 constexpr std::size_t kLocalKeys = 12;
 constexpr std::size_t kGlobalKeys = 24;
+// Odometry that moves by no more has not moved, m and rad; so many scans after
+// a gap it may still tell of the way at once.
+constexpr double kStandsWay = 0.02;
+constexpr double kStandsTurn = DegToRad(1.0);
+constexpr int kMostLate = 5;
 // Scans that wait for a tie at most while nothing can be tracked.
 constexpr std::size_t kMostPending = 1000;
 // No robot of a building moves faster, m/s and rad/s, but for so much, m and
@@ -86,6 +91,11 @@ Eigen::Matrix3d Diagonal(double translation, double rotation) {
 }
 
 double Square(double x) { return x * x; }
+
+bool Stands(const Pose2& motion) {
+  return motion.head<2>().norm() <= kStandsWay &&
+         std::abs(NormalizeAngle(motion[2])) <= kStandsTurn;
+}
 
 // Chi-square of what a match leaves the prior by.
 double SquaredInnovation(const MatchResult& match, const MatchPrior& prior) {
@@ -645,6 +655,8 @@ void OdometryRefiner::NoteMatch(const Outcome& outcome, const Pose2& motion) {
     track_.seconds = 0.0;
     track_.after_gap = false;
     track_.jumped = false;
+    track_.matched_pose = outcome.refined.pose;
+    track_.matched_odometry = last_odometry_;
   } else if (options_.match_scans) {
     track_.way += motion.head<2>().norm();
     track_.turn += std::abs(motion[2]);
@@ -692,6 +704,9 @@ void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
     open_->way = blind_way;
     open_->turn = blind_turn;
     open_->seconds = std::max(0.0, seconds);
+    open_->is_late =
+        open_->before.after_gap &&
+        Stands(Between(open_->before.matched_odometry, last_odometry_));
   } else {
     // What has been tracked since is too little to be a track.
     for (SettledScan& pending : pending_) {
@@ -715,11 +730,53 @@ void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
   track_ = Track(options_.matcher);
 }
 
+void OdometryRefiner::CatchUp(const Scan& scan, const Pose2& motion,
+                              const Pose2& matched, SettledScan* now) {
+  if (++open_->late_scans > kMostLate) open_->is_late = false;
+  if (!open_->is_late || Stands(motion)) return;
+  open_->is_late = false;
+  // What the scans have seen of this motion was not on the way over the gap.
+  const Pose2 seen = now->refined.odometry_only ? Pose2::Zero() : matched;
+  const Pose2 unseen = motion - seen;
+  if (unseen.head<2>().norm() <= kJumpWay &&
+      std::abs(NormalizeAngle(unseen[2])) <= kJumpTurn) {
+    return;
+  }
+  const Track& before = open_->before;
+  const Pose2 way = odometry_calibration_.Corrected(
+      Between(before.matched_odometry, scan.odometry));
+  const double length = way.head<2>().norm();
+  const double turn = std::abs(way[2]);
+  // What a robot cannot do in that time is a jump of odometry's.
+  if (length > kJumpWay + kFastest * open_->seconds ||
+      turn > kJumpTurn + kFastestTurn * open_->seconds) {
+    return;
+  }
+  open_->has_caught_up = true;
+  open_->odometry_holds = true;
+  open_->blind_way = length;
+  open_->blind_turn = turn;
+  const Pose2 shift =
+      Compose(Compose(before.matched_pose, way), Inverse(now->refined.pose));
+  if (trace_) trace_("CAUGHT UP");
+  for (SettledScan& pending : pending_) {
+    pending.refined.pose = Compose(shift, pending.refined.pose);
+  }
+  now->refined.pose = Compose(shift, now->refined.pose);
+  for (TrackKey& key : open_->keys) key.pose = Compose(shift, key.pose);
+  for (TrackKey& key : track_.keys) key.pose = Compose(shift, key.pose);
+  track_.last_pose = Compose(shift, track_.last_pose);
+  track_.matched_pose = Compose(shift, track_.matched_pose);
+  RebuildReference(&track_);
+}
+
 void OdometryRefiner::BeginTrack(const Scan& scan, SettledScan* first) {
   RefinedScan& refined = first->refined;
   refined.is_key = true;
   first->points = points_;
   track_.last_pose = refined.pose;
+  track_.matched_pose = refined.pose;
+  track_.matched_odometry = scan.odometry;
   track_.last_points = points_;
   key_odometry_ = scan.odometry;
   scans_since_key_ = 0;
@@ -800,11 +857,15 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
   NoteMatch(outcome, motion);
   done.refined = outcome.refined;
   const bool is_lost = IsLost(outcome);
+  const Pose2 last_pose = track_.last_pose;
   if (is_lost) {
     Lose(done.index, seconds, outcome);
     BeginTrack(scan, &done);
   } else {
     ContinueTrack(scan, outcome.information, &done);
+  }
+  if (open_ != nullptr && open_->is_late) {
+    CatchUp(scan, motion, Between(last_pose, done.refined.pose), &done);
   }
   if (open_ == nullptr) {
     if (done.refined.is_key) search_.Add(track_.keys.back(), part_);
@@ -999,7 +1060,10 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
   }
   pending_.clear();
   const bool goes_on = first.tie != TrackTie::kLoose && first.since < 0;
-  if (!goes_on || open_->blind_way > options_.tracking.max_silent_way) {
+  const bool is_by_late_odometry =
+      first.tie == TrackTie::kOdometry && open_->has_caught_up;
+  if (!goes_on || is_by_late_odometry ||
+      open_->blind_way > options_.tracking.max_silent_way) {
     if (guessed_ >= 0 && !goes_on) {
       loose_[guessed_].end = open_->last_sure;
       guessed_ = -1;

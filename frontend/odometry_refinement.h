@@ -213,6 +213,9 @@ class OdometryRefiner {
     ScanMatcher matcher;
     Pose2 last_pose = Pose2::Zero();
     UncertainPose2 since_key;
+    // Of the last scan that was matched, and odometry's there.
+    Pose2 matched_pose = Pose2::Zero();
+    Pose2 matched_odometry = Pose2::Zero();
     // Since the last scan that was matched: way (m), turn (rad), scans.
     double way = 0.0;
     double turn = 0.0;
@@ -231,10 +234,12 @@ class OdometryRefiner {
     // The matcher is made anew from the keys.
     template <typename Archive>
     friend void Exchange(Archive& archive, Track& track) {
-      auto& [keys, matcher, last_pose, since_key, way, turn, refused, seconds,
-             moving, after_gap, jumped, last_points] = track;
-      ExchangeAll(archive, keys, last_pose, since_key, way, turn, refused,
-                  seconds, moving, after_gap, jumped, last_points);
+      auto& [keys, matcher, last_pose, since_key, matched_pose,
+             matched_odometry, way, turn, refused, seconds, moving, after_gap,
+             jumped, last_points] = track;
+      ExchangeAll(archive, keys, last_pose, since_key, matched_pose,
+                  matched_odometry, way, turn, refused, seconds, moving,
+                  after_gap, jumped, last_points);
     }
   };
   // A track whose tie to the one before is not known.
@@ -253,6 +258,12 @@ class OdometryRefiner {
     double blind_turn = 0.0;
     // Neither a gap nor a contradiction.
     bool odometry_holds = true;
+    // Odometry has not moved over the gap in the log, and may not know of the
+    // way yet; so many scans ago, when it does not know of it still.
+    bool is_late = false;
+    int late_scans = 0;
+    // It has told of the way since.
+    bool has_caught_up = false;
     // Share of the reference that was looked through before all this.
     double seen_through = 0.0;
     std::string why;
@@ -335,6 +346,10 @@ class OdometryRefiner {
   bool IsLost(const Outcome& outcome) const;
   // Opens a tie, or starts the open one again, at this scan.
   void Lose(int scan, double seconds, const Outcome& outcome);
+  // Where odometry that did not move over a gap tells of the way at once, the
+  // open track lies where it says.
+  void CatchUp(const Scan& scan, const Pose2& motion, const Pose2& matched,
+               SettledScan* now);
   // The first scan of a track, and the ones after it.
   void BeginTrack(const Scan& scan, SettledScan* first);
   void ContinueTrack(const Scan& scan, const Eigen::Matrix3d& information,

@@ -843,6 +843,81 @@ TEST(OdometryRefinerTest, StaleOdometryAfterAGap) {
   }
 }
 
+// The same on the way through a door that falls shut: nothing behind it was
+// seen before. The odometry that catches up says where the robot went on, and
+// that it alone says so is told.
+TEST(OdometryRefinerTest, OdometryThatCatchesUpAfterAGapTellsOfTheWay) {
+  const Pose2 through(0.9, 0.2, DegToRad(65.0));
+  for (const int stale : {1, 2}) {
+    SCOPED_TRACE(stale);
+    Laser laser;
+    laser.sigma = 0.01;
+    Noise noise(7);
+    OdometryRefiner refiner(RefinerOptions());
+    Pose2 truth(-2.5, -2.0, 0.3);
+    std::vector<Pose2> truths;
+    std::vector<WallEnds> walls = PlainHall();
+    Pose2 before = truth;
+    double time = 100.0;
+    std::vector<RefinedScan> refined;
+    for (int i = 0; i < 40; ++i) {
+      time += 0.2;
+      if (i == 15) {
+        before = truth;
+        truth = Compose(truth, through);
+        walls = testing::Moved(Room(5.5, 3.0), truth);
+        time += 3.0;
+      } else if (i > 0) {
+        truth = Compose(truth, {0.08, 0.0, DegToRad(2.0)});
+      }
+      Scan scan = MakeScan(walls, truth, laser, &noise);
+      scan.timestamp = time;
+      scan.odometry = i >= 15 && i < 15 + stale ? before : truth;
+      truths.push_back(truth);
+      refiner.Process(scan);
+      refined = TakeAll(&refiner, std::move(refined));
+    }
+    refiner.Finish();
+    refined = TakeAll(&refiner, std::move(refined));
+    ASSERT_EQ(refined.size(), truths.size());
+    for (std::size_t i = 0; i < refined.size(); ++i) {
+      EXPECT_LT(PositionError(refined[i].pose, truths[i]), 0.2) << i;
+      EXPECT_LT(HeadingError(refined[i].pose, truths[i]), DegToRad(2.0)) << i;
+    }
+    ASSERT_EQ(refiner.loose().size(), 1u);
+    EXPECT_NE(refined[15].tie, TrackTie::kNone);
+    EXPECT_NE(refined[15].tie, TrackTie::kMatched);
+  }
+}
+
+// A robot that was carried over a gap and drives on is none whose odometry
+// catches up.
+TEST(OdometryRefinerTest, WheelsThatGoOnAfterAGapTellNothingOfIt) {
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(8);
+  OdometryRefiner refiner(RefinerOptions());
+  Pose2 truth(-2.5, -2.0, 0.3);
+  std::vector<RefinedScan> refined;
+  for (int i = 0; i < 40; ++i) {
+    if (i > 0 && i != 15) truth = Compose(truth, {0.1, 0.0, DegToRad(5.0)});
+    const Pose2 elsewhere(0.3, -2.0 + 0.1 * (i - 15),
+                          1.6 + DegToRad(5.0) * (i - 15));
+    Scan scan = i < 15 ? MakeScan(PlainHall(), truth, laser, &noise)
+                       : MakeScan(Room(3.0, 5.5), elsewhere, laser, &noise);
+    scan.timestamp = 100.0 + 0.2 * i + (i < 15 ? 0.0 : 40.0);
+    scan.odometry = truth;
+    refiner.Process(scan);
+    refined = TakeAll(&refiner, std::move(refined));
+  }
+  refiner.Finish();
+  refined = TakeAll(&refiner, std::move(refined));
+  ASSERT_EQ(refined.size(), 40u);
+  EXPECT_EQ(refined[15].tie, TrackTie::kLoose);
+  ASSERT_EQ(refiner.loose().size(), 1u);
+  EXPECT_FALSE(refiner.loose()[0].found);
+}
+
 // A corridor of 10 m along x from the origin, with a pillar and a niche.
 std::vector<WallEnds> ShortCorridor(const Pose2& at) {
   const std::vector<WallEnds> walls = {

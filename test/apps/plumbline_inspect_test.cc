@@ -57,10 +57,11 @@ class InspectTest : public ::testing::Test {
     const std::string pipe = folder_ / "pipe";
     ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
     std::string output;
-    EXPECT_EQ(RunInShell("timeout --signal=INT --kill-after=20 1 " + binary_ +
-                             " " + pipe + "; exit $?",
-                         &output),
-              124);
+    EXPECT_EQ(
+        RunInShell("timeout --foreground --signal=INT --kill-after=20 1 " +
+                       binary_ + " " + pipe + "; exit $?",
+                   &output),
+        124);
     EXPECT_THAT(output, HasSubstr("interrupted"));
   }
 

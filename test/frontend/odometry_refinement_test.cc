@@ -798,95 +798,84 @@ std::vector<RefinedScan> TakeAll(OdometryRefiner* refiner,
   return before;
 }
 
-// While the robot turned by 70 degrees scans are missing for three seconds; the
-// first ones after that carry the odometry of before, which then catches up at
-// once. Such a scan anchors nothing: what follows is tied to what was before by
-// what it sees.
+// Drives through the hall. Before scan 12 the robot moves by `motion` while
+// scans are missing for three seconds; the first `stale` ones after that carry
+// the odometry of before, which then catches up at once. `is_shut`: from then
+// on the robot is in a room that it did not see before.
+struct GapDrive {
+  std::vector<Pose2> truth;
+  std::vector<RefinedScan> refined;
+  std::vector<LooseTrack> loose;
+};
+
+GapDrive DriveOverAGap(const Pose2& motion, int stale, bool is_shut) {
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(5);
+  OdometryRefiner refiner(RefinerOptions());
+  GapDrive drive;
+  std::vector<WallEnds> walls = PlainHall();
+  Pose2 truth(-2.5, -2.0, 0.3);
+  Pose2 before = truth;
+  double time = 100.0;
+  for (int i = 0; i < 30; ++i) {
+    time += 0.2;
+    if (i == 12) {
+      before = truth;
+      truth = Compose(truth, motion);
+      if (is_shut) walls = testing::Moved(Room(5.5, 3.0), truth);
+      time += 3.0;
+    } else if (i > 0) {
+      truth = Compose(truth, {0.1, 0.0, DegToRad(2.0)});
+    }
+    Scan scan = MakeScan(walls, truth, laser, &noise);
+    scan.timestamp = time;
+    scan.odometry = i >= 12 && i < 12 + stale ? before : truth;
+    drive.truth.push_back(truth);
+    refiner.Process(scan);
+    drive.refined = TakeAll(&refiner, std::move(drive.refined));
+  }
+  refiner.Finish();
+  drive.refined = TakeAll(&refiner, std::move(drive.refined));
+  drive.loose = refiner.loose();
+  return drive;
+}
+
+void ExpectNearTruth(const GapDrive& drive, double position, double heading) {
+  ASSERT_EQ(drive.refined.size(), drive.truth.size());
+  for (std::size_t i = 0; i < drive.refined.size(); ++i) {
+    EXPECT_LT(PositionError(drive.refined[i].pose, drive.truth[i]), position)
+        << i;
+    EXPECT_LT(HeadingError(drive.refined[i].pose, drive.truth[i]), heading)
+        << i;
+  }
+}
+
+// A scan with stale odometry anchors nothing: what follows is tied to what was
+// before by what it sees.
 TEST(OdometryRefinerTest, StaleOdometryAfterAGap) {
   for (const int stale : {1, 2}) {
     for (const double turn : {70.0, -60.0}) {
       SCOPED_TRACE(turn);
-      Laser laser;
-      laser.sigma = 0.01;
-      Noise noise(5);
-      OdometryRefiner refiner(RefinerOptions());
-      Pose2 truth(-2.5, -2.0, 0.3);
-      Pose2 before = truth;
-      double time = 100.0;
-      std::vector<Pose2> truths;
-      std::vector<RefinedScan> refined;
-      for (int i = 0; i < 30; ++i) {
-        time += 0.2;
-        if (i == 12) {
-          before = truth;
-          truth = Compose(truth, {0.5, 0.1, DegToRad(turn)});
-          time += 3.0;
-        } else if (i > 0) {
-          truth = Compose(truth, {0.1, 0.0, DegToRad(2.0)});
-        }
-        Scan scan = MakeScan(PlainHall(), truth, laser, &noise);
-        scan.timestamp = time;
-        scan.odometry = i >= 12 && i < 12 + stale ? before : truth;
-        truths.push_back(truth);
-        refiner.Process(scan);
-        refined = TakeAll(&refiner, std::move(refined));
-      }
-      refiner.Finish();
-      refined = TakeAll(&refiner, std::move(refined));
-      ASSERT_EQ(refined.size(), truths.size());
-      EXPECT_TRUE(refiner.loose().empty());
-      for (std::size_t i = 0; i < refined.size(); ++i) {
-        EXPECT_LT(PositionError(refined[i].pose, truths[i]), 0.1) << i;
-        EXPECT_LT(HeadingError(refined[i].pose, truths[i]), DegToRad(1.5)) << i;
-      }
+      const GapDrive drive =
+          DriveOverAGap({0.5, 0.1, DegToRad(turn)}, stale, false);
+      EXPECT_TRUE(drive.loose.empty());
+      ExpectNearTruth(drive, 0.1, DegToRad(1.5));
     }
   }
 }
 
-// The same on the way through a door that falls shut: nothing behind it was
-// seen before. The odometry that catches up says where the robot went on, and
-// that it alone says so is told.
+// Nothing behind a door that fell shut was seen before. The odometry that
+// catches up says where the robot went on, and that it alone says so is told.
 TEST(OdometryRefinerTest, OdometryThatCatchesUpAfterAGapTellsOfTheWay) {
-  const Pose2 through(0.9, 0.2, DegToRad(65.0));
   for (const int stale : {1, 2}) {
     SCOPED_TRACE(stale);
-    Laser laser;
-    laser.sigma = 0.01;
-    Noise noise(7);
-    OdometryRefiner refiner(RefinerOptions());
-    Pose2 truth(-2.5, -2.0, 0.3);
-    std::vector<Pose2> truths;
-    std::vector<WallEnds> walls = PlainHall();
-    Pose2 before = truth;
-    double time = 100.0;
-    std::vector<RefinedScan> refined;
-    for (int i = 0; i < 40; ++i) {
-      time += 0.2;
-      if (i == 15) {
-        before = truth;
-        truth = Compose(truth, through);
-        walls = testing::Moved(Room(5.5, 3.0), truth);
-        time += 3.0;
-      } else if (i > 0) {
-        truth = Compose(truth, {0.08, 0.0, DegToRad(2.0)});
-      }
-      Scan scan = MakeScan(walls, truth, laser, &noise);
-      scan.timestamp = time;
-      scan.odometry = i >= 15 && i < 15 + stale ? before : truth;
-      truths.push_back(truth);
-      refiner.Process(scan);
-      refined = TakeAll(&refiner, std::move(refined));
-    }
-    refiner.Finish();
-    refined = TakeAll(&refiner, std::move(refined));
-    ASSERT_EQ(refined.size(), truths.size());
-    for (std::size_t i = 0; i < refined.size(); ++i) {
-      EXPECT_LT(PositionError(refined[i].pose, truths[i]), 0.2) << i;
-      EXPECT_LT(HeadingError(refined[i].pose, truths[i]), DegToRad(2.0)) << i;
-    }
-    ASSERT_EQ(refiner.loose().size(), 1u);
-    EXPECT_NE(refined[15].tie, TrackTie::kNone);
-    EXPECT_NE(refined[15].tie, TrackTie::kMatched);
+    const GapDrive drive =
+        DriveOverAGap({0.9, 0.2, DegToRad(65.0)}, stale, true);
+    ExpectNearTruth(drive, 0.2, DegToRad(2.0));
+    ASSERT_EQ(drive.loose.size(), 1u);
+    EXPECT_NE(drive.refined[12].tie, TrackTie::kNone);
+    EXPECT_NE(drive.refined[12].tie, TrackTie::kMatched);
   }
 }
 

@@ -50,7 +50,7 @@ endfunction()
 plumbline_pkg_config(plumbline-factors "Relations, manifolds and losses for a ceres::Problem"
   "eigen3 >= 3.3 libglog" "-lceres")
 plumbline_pkg_config(plumbline-core "Graph, plug-in registry, solver session, EM"
-  "plumbline-factors" "-L\${libdir} -lplumbline_core -lcholmod")
+  "plumbline-factors" "-L\${libdir} -lplumbline_core -lcholmod -lnettle")
 plumbline_pkg_config(plumbline-detectors "Structure detectors"
   "plumbline-core" "-L\${libdir} -lplumbline_detectors")
 plumbline_pkg_config(plumbline-frontend "Log readers and laser front-end"

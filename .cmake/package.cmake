@@ -30,7 +30,7 @@ that simulate buildings and measure how good a map is.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libplumbline-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libceres-dev (>= 2.1), libeigen3-dev (>= 3.3), libsuitesparse-dev, zlib1g-dev, libbz2-dev, libarchive-dev, libsqlite3-dev, liblz4-dev, libzstd-dev, libgeos-dev, libcairo2-dev")
+  "libceres-dev (>= 2.1), libeigen3-dev (>= 3.3), libsuitesparse-dev, nettle-dev, zlib1g-dev, libbz2-dev, libarchive-dev, libsqlite3-dev, liblz4-dev, libzstd-dev, libgeos-dev, libcairo2-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
 "relations between walls, points and directions for Ceres Solver
 Cost functions, manifolds and losses for use in a ceres::Problem, and the

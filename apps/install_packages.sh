@@ -7,7 +7,7 @@ packages=(
   cmake ninja-build ccache g++ pkg-config
   libceres-dev libeigen3-dev libsuitesparse-dev libgoogle-glog-dev libgflags-dev
   libgtest-dev libgmock-dev libbenchmark-dev
-  libarchive-dev libsqlite3-dev liblz4-dev libzstd-dev
+  libarchive-dev libsqlite3-dev liblz4-dev libzstd-dev nettle-dev
   libcairo2-dev libgeos-dev libbz2-dev zlib1g-dev nlohmann-json3-dev libnanoflann-dev
   "$@"
 )

@@ -1,9 +1,7 @@
 #ifndef PLUMBLINE_CORE_SHA256_H_
 #define PLUMBLINE_CORE_SHA256_H_
 
-#include <array>
-#include <cstddef>
-#include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -13,21 +11,23 @@ namespace plumbline {
 /// as sha256sum prints.
 class Sha256 {
  public:
+  Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
+  ~Sha256();
+
   /// Takes the next bytes.
   void Update(std::string_view bytes);
 
-  /// Digest of everything taken, 64 lowercase hexadecimal digits. Nothing may
-  /// be taken afterwards.
+  /// Digest of everything taken, 64 lowercase hexadecimal digits. What is taken
+  /// afterwards begins another one.
   std::string HexDigest();
 
  private:
-  void TakeBlock(const unsigned char* block);
+  // Of libnettle, which users of this header need not have.
+  struct State;
 
-  std::array<std::uint32_t, 8> state_ = {0x6a09e667, 0xbb67ae85, 0x3c6ef372,
-                                         0xa54ff53a, 0x510e527f, 0x9b05688c,
-                                         0x1f83d9ab, 0x5be0cd19};
-  std::array<unsigned char, 64> block_ = {};
-  std::uint64_t size_ = 0;
+  std::unique_ptr<State> state_;
 };
 
 /// Digest of a regular file's content; empty for anything else and when the

@@ -118,7 +118,7 @@ class PlaceSearch {
   };
 
   // Of one place with those before it.
-  struct Comparison {
+  struct alignas(kCacheLine) Comparison {
     std::vector<Found> found;
     Tally tally;
     WallWays::Search search;

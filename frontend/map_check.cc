@@ -24,8 +24,8 @@ constexpr double kLongestStep = 2.0;
 
 // Between two times that `stop` is asked.
 constexpr std::size_t kScansAtOnce = 128;
-// Looked at by one thread.
-constexpr std::size_t kScansInARow = 16;
+// Scans whose returns each thread keeps at least.
+constexpr std::size_t kFewestKept = 64;
 
 // In which parts of a track are compared.
 constexpr std::size_t kRounds = 4;
@@ -48,13 +48,17 @@ Verdict Judge(const ScanAgreement& agreement, const MapCheckOptions& options) {
 // The returns of scans, those of some of the last ones kept.
 class ScanReturns {
  public:
-  // Both must outlive it.
-  ScanReturns(const std::vector<Scan>& scans, const ScanPointsOptions& options)
-      : scans_(scans), options_(options) {}
+  // As many as lie around a few visits; some megabytes.
+  static constexpr std::size_t kMostKept = 1024;
+
+  // Scans and options must outlive it. At most so many scans are kept.
+  ScanReturns(const std::vector<Scan>& scans, const ScanPointsOptions& options,
+              std::size_t most_kept = kMostKept)
+      : scans_(scans), options_(options), most_kept_(most_kept) {}
 
   // Valid until the next call.
   const std::vector<ScanPoint>& Of(int scan) {
-    if (kept_.size() >= kMostKept) kept_.clear();
+    if (kept_.size() >= most_kept_) kept_.clear();
     const auto [entry, is_new] = kept_.try_emplace(scan);
     if (is_new) {
       ExtractScanPoints(scans_[static_cast<std::size_t>(scan)], options_,
@@ -64,11 +68,9 @@ class ScanReturns {
   }
 
  private:
-  // As many as lie around a few visits; some megabytes.
-  static constexpr std::size_t kMostKept = 1024;
-
   const std::vector<Scan>& scans_;
   const ScanPointsOptions& options_;
+  const std::size_t most_kept_;
   std::unordered_map<int, std::vector<ScanPoint>> kept_;
 };
 
@@ -213,19 +215,24 @@ JudgedScans JudgeScans(const std::vector<Scan>& scans,
         Judge(comparison.Compare(keys[k], poses[k], std::move(others), returns),
               options);
   };
+  ThreadTeam team(options.num_threads);
+  const auto threads =
+      static_cast<std::size_t>(std::max(1, options.num_threads));
+  // Each used by one thread at a time.
+  std::vector<ScanReturns> returns(
+      threads,
+      ScanReturns(scans, options.points,
+                  std::max(kFewestKept, ScanReturns::kMostKept / threads)));
   for (std::size_t begin = 0; begin < looked_at.size(); begin += kScansAtOnce) {
     if (stop && stop()) return {};
     // Those that follow each other are compared with many of the same scans.
-    const std::size_t end = std::min(begin + kScansAtOnce, looked_at.size());
-    ParallelFor((end - begin + kScansInARow - 1) / kScansInARow,
-                options.num_threads, [&](std::size_t row) {
-                  ScanReturns returns(scans, options.points);
-                  const std::size_t first = begin + row * kScansInARow;
-                  for (std::size_t i = first;
-                       i < std::min(first + kScansInARow, end); ++i) {
-                    judge(i, &returns);
-                  }
-                });
+    const std::size_t count = std::min(kScansAtOnce, looked_at.size() - begin);
+    team.For(threads, [&](std::size_t t) {
+      for (std::size_t i = count * t / threads; i < count * (t + 1) / threads;
+           ++i) {
+        judge(begin + i, &returns[t]);
+      }
+    });
   }
   return {std::move(looked_at), std::move(verdicts)};
 }

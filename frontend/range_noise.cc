@@ -25,6 +25,9 @@ double RangeNoiseScale(double range_sigma) {
 }
 
 void RangeNoise::Add(const Scan& scan) {
+  // Of beams whose angles to both neighbours are the same.
+  const double even = scan.angle_step;
+  const double even_weight = std::sin(even) / std::sin(even + even);
   for (std::size_t i = 1; i + 1 < scan.ranges.size(); ++i) {
     const double before = scan.ranges[i - 1];
     const double range = scan.ranges[i];
@@ -35,11 +38,15 @@ void RangeNoise::Add(const Scan& scan) {
         std::abs(after - range) > kLargestStep) {
       continue;
     }
-    const double step_before = scan.Bearing(i) - scan.Bearing(i - 1);
-    const double step_after = scan.Bearing(i + 1) - scan.Bearing(i);
-    const double both = std::sin(step_before + step_after);
-    const double weight_before = std::sin(step_after) / both;
-    const double weight_after = std::sin(step_before) / both;
+    double weight_before = even_weight;
+    double weight_after = even_weight;
+    if (!scan.bearings.empty()) {
+      const double step_before = scan.Bearing(i) - scan.Bearing(i - 1);
+      const double step_after = scan.Bearing(i + 1) - scan.Bearing(i);
+      const double both = std::sin(step_before + step_after);
+      weight_before = std::sin(step_after) / both;
+      weight_after = std::sin(step_before) / both;
+    }
     const double straight =
         1.0 / (weight_before / before + weight_after / after);
     // Of `straight` with respect to its neighbours' ranges.

@@ -8,6 +8,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
@@ -25,8 +26,8 @@ constexpr std::size_t kFewestCells = 6;
 // Scans and seeds that are looked at by all threads together, before what was
 // found is taken in.
 constexpr std::size_t kScansAtOnce = 256;
-constexpr std::size_t kSeedsAtOnce = 16;
-constexpr std::size_t kMostSeedsAtOnce = 128;
+constexpr std::size_t kSeedsAtOnce = 4;
+constexpr std::size_t kMostSeedsAtOnce = 16;
 // A cell is no seed any more once it lay on so many lines that came to nothing:
 // so close to them, in scatters, and turned against them by no more than this.
 constexpr std::uint8_t kSpentBy = 3;
@@ -157,13 +158,13 @@ struct GrownWall {
   Eigen::Vector2d view = Eigen::Vector2d::Zero();
 };
 
-// What came of a seed.
+// What came of a seed. Kept for its memory.
 struct Trial {
   // The seed's place among all.
   std::size_t position = 0;
   bool is_made = false;
   std::optional<GrownWall> wall;
-  // Cells that lay on the line which did not become a wall.
+  // Without a wall: cells that lay on the line which did not become one.
   std::vector<int> spent;
 };
 
@@ -171,7 +172,7 @@ struct Trial {
 class WallGrower {
  public:
   // What growing needs, kept for its memory.
-  struct Scratch {
+  struct alignas(kCacheLine) Scratch {
     ReturnCells::Marks marks;
     std::vector<int> members;
     // What was grown last, wall or not.
@@ -224,17 +225,16 @@ class WallGrower {
 
   // After Grow came to nothing: the cells from which it would most likely come
   // to the same line once more.
-  std::vector<int> CellsOf(const Scratch& failed) const {
+  void FindCellsOf(const Scratch& failed, std::vector<int>* cells) const {
     const double cos_turn = std::cos(kSpentTurn);
-    std::vector<int> cells;
+    cells->clear();
     for (const int index : failed.members) {
       const ReturnCells::Cell& cell = Of(index);
       if (std::abs(cell.direction.dot(failed.line.direction)) >= cos_turn &&
           failed.line.Distance(cell.mean) <= kSpentScatters * scatter_) {
-        cells.push_back(index);
+        cells->push_back(index);
       }
     }
-    return cells;
   }
 
  private:
@@ -372,6 +372,7 @@ class Completion {
       : registry_(registry),
         options_(options),
         stop_(stop),
+        team_(options.num_threads),
         index_(graph, options.explained_gap),
         returns_(options.cell_size, options.normal_radius, options.max_gap) {}
 
@@ -475,31 +476,40 @@ class Completion {
     const std::size_t most = threads > 1 ? kMostSeedsAtOnce * threads : 1;
     std::size_t at_once = fewest;
     std::vector<std::uint8_t> spent(returns_.cells().size(), 0);
-    std::vector<Trial> trials;
+    std::vector<Trial> trials(most);
     scratch_.resize(threads);
     for (std::size_t k = 0; k < seeds.size() && !IsStopped();) {
-      trials.clear();
+      std::size_t count = 0;
       std::size_t end = k;
-      for (; end < seeds.size() && trials.size() < at_once; ++end) {
+      for (; end < seeds.size() && count < at_once; ++end) {
         if (returns_.cells()[seeds[end]].used || spent[seeds[end]] >= kSpentBy)
           continue;
-        trials.emplace_back();
-        trials.back().position = end;
+        trials[count].position = end;
+        trials[count].is_made = false;
+        ++count;
       }
-      const std::size_t share = (trials.size() + threads - 1) / threads;
-      ParallelFor(threads, options_.num_threads, [&](std::size_t t) {
-        const std::size_t last = std::min(trials.size(), (t + 1) * share);
-        for (std::size_t i = t * share; i < last; ++i) {
+      // In turn: all before the first that makes a wall are tried.
+      std::atomic<std::size_t> next{0};
+      std::atomic<bool> is_found{false};
+      team_.For(threads, [&](std::size_t t) {
+        while (!is_found) {
+          const std::size_t i = next++;
+          if (i >= count) break;
           Trial& trial = trials[i];
           trial.is_made = true;
           trial.wall = grower.Grow(seeds[trial.position], &scratch_[t]);
-          if (trial.wall) break;
-          trial.spent = grower.CellsOf(scratch_[t]);
+          if (trial.wall) {
+            is_found = true;
+          } else {
+            grower.FindCellsOf(scratch_[t], &trial.spent);
+          }
         }
       });
       at_once = std::min(2 * at_once, most);
       k = end;
-      for (const Trial& trial : trials) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const Trial& trial = trials[i];
+        // After one that made a wall, but lay on others which came to nothing.
         if (!trial.is_made) {
           k = trial.position;
           break;
@@ -533,15 +543,16 @@ class Completion {
   void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
               std::size_t begin, std::size_t end, double reach) {
     returns_.Clear();
-    std::vector<std::vector<Return>> unexplained(kScansAtOnce);
+    std::vector<ReturnsOfScan> unexplained(kScansAtOnce);
     for (std::size_t i = begin; i < end && !IsStopped(); i += kScansAtOnce) {
       const std::size_t count = std::min(kScansAtOnce, end - i);
-      ParallelFor(count, options_.num_threads, [&](std::size_t k) {
+      team_.For(count, [&](std::size_t k) {
         FindUnexplained(scans[i + k], poses[i + k], reach,
-                        is_done_.data() + first_word_[i + k], &unexplained[k]);
+                        is_done_.data() + first_word_[i + k],
+                        &unexplained[k].returns);
       });
       for (std::size_t k = 0; k < count; ++k) {
-        for (const Return& one : unexplained[k]) {
+        for (const Return& one : unexplained[k].returns) {
           returns_.Add(one.point, one.ray, i + k);
         }
       }
@@ -552,6 +563,11 @@ class Completion {
     Eigen::Vector2d point;
     // From the laser, of length 1.
     Eigen::Vector2d ray;
+  };
+
+  // Each filled by one thread.
+  struct alignas(kCacheLine) ReturnsOfScan {
+    std::vector<Return> returns;
   };
 
   // Those of a scan up to `reach`, at this pose. Explained once is explained
@@ -676,6 +692,7 @@ class Completion {
   const Registry& registry_;
   const WallCompletionOptions options_;
   const std::function<bool()>& stop_;
+  ThreadTeam team_;
   bool is_stopped_ = false;
   double stray_share_ = 0.0;
   WallIndex index_;

@@ -3,8 +3,13 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <fstream>
+#include <future>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -38,6 +43,54 @@ TEST(ParallelForTest, TheFirstExceptionIsThrownAfterAllIsDone) {
       EXPECT_STREQ(error.what(), "3");
     }
     EXPECT_EQ(calls, std::vector<int>(9, 1));
+  }
+}
+
+TEST(ThreadTeamTest, ManyLoopsOnTheSameThreads) {
+  for (const int threads : {-1, 1, 2, 5}) {
+    ThreadTeam team(threads);
+    std::mutex mutex;
+    std::set<std::thread::id> at_work;
+    for (std::size_t count = 0; count < 300; ++count) {
+      std::vector<int> calls(count, 0);
+      team.For(count, [&](std::size_t i) {
+        ++calls[i];
+        const std::lock_guard<std::mutex> lock(mutex);
+        at_work.insert(std::this_thread::get_id());
+      });
+      ASSERT_EQ(calls, std::vector<int>(count, 1)) << threads;
+    }
+    EXPECT_LE(static_cast<int>(at_work.size()), std::max(1, threads));
+    EXPECT_EQ(at_work.count(std::this_thread::get_id()), 1u);
+  }
+}
+
+// Two calls that wait for each other come to an end only on two threads, in
+// later loops, too.
+TEST(ThreadTeamTest, ThreadsWorkAtTheSameTime) {
+  ThreadTeam team(2);
+  for (int loop = 0; loop < 3; ++loop) {
+    std::promise<void> here[2];
+    std::future<void> there[2] = {here[0].get_future(), here[1].get_future()};
+    team.For(2, [&](std::size_t i) {
+      here[i].set_value();
+      EXPECT_EQ(there[1 - i].wait_for(std::chrono::seconds(60)),
+                std::future_status::ready);
+    });
+  }
+}
+
+TEST(ThreadTeamTest, GoesOnAfterAnException) {
+  for (const int threads : {1, 3}) {
+    ThreadTeam team(threads);
+    EXPECT_THROW(team.For(9,
+                          [&](std::size_t i) {
+                            if (i == 4) throw std::runtime_error("4");
+                          }),
+                 std::runtime_error);
+    std::atomic<int> calls{0};
+    team.For(9, [&](std::size_t) { ++calls; });
+    EXPECT_EQ(calls, 9);
   }
 }
 

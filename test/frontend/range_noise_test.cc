@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -50,6 +51,24 @@ TEST(RangeNoiseTest, ThatGrowsWithTheRange) {
 }
 
 TEST(RangeNoiseTest, ExactRangesHaveNone) { EXPECT_LT(Measured(0.0), 0.0005); }
+
+// Told by their step or one by one.
+TEST(RangeNoiseTest, OfEvenlySpacedBeams) {
+  std::mt19937_64 random(6);
+  RangeNoise by_step, one_by_one;
+  for (int k = 0; k < 20; ++k) {
+    Scan scan = RoomScan(0.02, 0.0, &random);
+    by_step.Add(scan);
+    std::vector<float> bearings;
+    for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+      bearings.push_back(static_cast<float>(scan.Bearing(i)));
+    }
+    scan.bearings = bearings;
+    one_by_one.Add(scan);
+  }
+  // Bearings are stored in single precision.
+  EXPECT_NEAR(by_step.sigma(), one_by_one.sigma(), 1e-5);
+}
 
 TEST(RangeNoiseTest, OfBeamsThatAreNotEvenlySpaced) {
   std::mt19937_64 random(4);

@@ -180,8 +180,8 @@ DEFINE_string(delta_mode, "frozen",
 PLUMBLINE_FLAG_CHOICES(delta_mode, "frozen", "continuous", "huber", "cauchy",
                        "tukey", "geman_mcclure", "dcs");
 DEFINE_string(minimizer, "resident",
-              "Solves of the whole graph: ceres, resident (keeps the analysis "
-              "of the graph between solves)");
+              "Solves but small ones: ceres, resident (keeps the analysis of "
+              "the graph between solves)");
 PLUMBLINE_FLAG_CHOICES(minimizer, "ceres", "resident");
 DEFINE_int32(em_every, 20,
              "Scans between EM steps while replaying; 0: only at the end");

@@ -315,7 +315,7 @@ struct SolverSession::Impl {
     return ids;
   }
 
-  // Runs Ceres on a problem of which `variables` are the blocks that vary;
+  // Solves a problem of which `variables` are the blocks that vary;
   // `rows` and `columns` are the size of its Jacobian.
   SolveReport Solve(ceres::Problem* solved,
                     const std::vector<Block*>& variables, int num_residuals,
@@ -355,15 +355,18 @@ struct SolverSession::Impl {
       StopWhenAsked stop_when_asked(stop);
       if (stop) solver.callbacks.push_back(&stop_when_asked);
       ceres::Solver::Summary summary;
-      if (resident != nullptr && solved == &problem &&
-          solver.linear_solver_type == ceres::SPARSE_NORMAL_CHOLESKY) {
+      if (resident == nullptr ||
+          solver.linear_solver_type != ceres::SPARSE_NORMAL_CHOLESKY) {
+        ceres::Solve(solver, solved, &summary);
+      } else if (solved == &problem) {
         solver.use_nonmonotonic_steps = true;
         solver.max_consecutive_nonmonotonic_steps = kUphillSteps;
         resident->Solve(solver, &summary,
                         is_coarse ? ResidentMinimizer::Damping::kAsGiven
                                   : ResidentMinimizer::Damping::kWhereNeeded);
       } else {
-        ceres::Solve(solver, solved, &summary);
+        // Of a problem that is there but once.
+        ResidentMinimizer(solved).Solve(solver, &summary);
       }
       report.usable = summary.IsSolutionUsable();
       report.converged = !stop_when_asked.has_stopped() &&

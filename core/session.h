@@ -18,8 +18,7 @@ struct SessionOptions {
   /// Weighting of structure constraints: a LossType's name.
   std::string delta_mode = "frozen";
   /// "resident" (ResidentMinimizer) keeps the analysis of the graph between
-  /// global solves, "ceres" makes it anew. Small and local solves are Ceres' in
-  /// any case.
+  /// global solves, "ceres" makes it anew. Small solves are Ceres' in any case.
   std::string minimizer = "ceres";
   int max_iterations = 50;
   /// Relative change of the cost at which a solve ends.

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <random>
@@ -103,53 +104,84 @@ class SessionTest : public ::testing::Test {
 
 constexpr ConstraintClass kStructure = ConstraintClass::kStructure;
 
-TEST_F(SessionTest, BothMinimizersComeToOneMinimum) {
-  std::mt19937 random(3);
-  std::normal_distribution<double> noise(0.0, 0.03);
-  std::vector<FeatureId> poses;
-  for (int i = 0; i < 120; ++i) {
-    poses.push_back(
-        Add("pose", {i + noise(random), noise(random), noise(random)}));
-  }
-  std::vector<ConstraintId> chords;
-  for (int i = 1; i < 120; ++i) {
-    Add(Step(poses[i - 1], poses[i], 1.0 + noise(random), noise(random),
-             noise(random), {1e4, 1e4, 1e5}));
-    if (i < 7) continue;
-    chords.push_back(Add(Step(poses[i - 7], poses[i], 7.0, noise(random),
-                              0.3 * noise(random), {1e3, 1e3, 1e4})));
-  }
-  SessionOptions options;
-  SolverSession ceres_session(&graph_, registry_, options);
-  options.minimizer = "resident";
-  SolverSession resident(&graph_, registry_, options);
-  std::vector<double> start;
-  for (int round = 0; round < 3; ++round) {
-    start.clear();
-    for (const FeatureId id : poses) {
-      for (int k = 0; k < 3; ++k) start.push_back(Value(id, k));
+// A chain of poses with chords.
+class MinimizersTest : public SessionTest {
+ protected:
+  MinimizersTest() {
+    std::mt19937 random(3);
+    std::normal_distribution<double> noise(0.0, 0.03);
+    for (int i = 0; i < 120; ++i) {
+      poses_.push_back(
+          Add("pose", {i + noise(random), noise(random), noise(random)}));
     }
-    const SolveReport expected = ceres_session.SolveGlobal();
-    std::vector<double> minimum;
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      for (int k = 0; k < 3; ++k) {
-        minimum.push_back(Value(poses[i], k));
-        graph_.GetFeature(poses[i]).parameters[k] = start[3 * i + k];
-      }
+    for (int i = 1; i < 120; ++i) {
+      Add(Step(poses_[i - 1], poses_[i], 1.0 + noise(random), noise(random),
+               noise(random), {1e4, 1e4, 1e5}));
+      if (i < 7) continue;
+      chords_.push_back(Add(Step(poses_[i - 7], poses_[i], 7.0, noise(random),
+                                 0.3 * noise(random), {1e3, 1e3, 1e4})));
     }
-    const SolveReport report = resident.SolveGlobal();
+  }
+
+  // Solves with both from where the poses are.
+  void ExpectOneMinimum(
+      const std::function<SolveReport(SolverSession*)>& solve) {
+    const std::vector<double> start = Values();
+    const SolveReport expected = solve(&ceres_);
+    const std::vector<double> minimum = Values();
+    EXPECT_NE(minimum, start);
+    for (std::size_t i = 0; i < start.size(); ++i) {
+      graph_.GetFeature(poses_[i / 3]).parameters[i % 3] = start[i];
+    }
+    const SolveReport report = solve(&resident_);
     EXPECT_TRUE(report.usable) << report.message;
     EXPECT_TRUE(report.converged);
     EXPECT_NEAR(report.initial_cost, expected.initial_cost,
                 1e-9 * expected.initial_cost);
     EXPECT_NEAR(report.final_cost, expected.final_cost,
                 1e-9 * expected.final_cost);
+    const std::vector<double> other = Values();
     for (std::size_t i = 0; i < minimum.size(); ++i) {
-      EXPECT_NEAR(Value(poses[i / 3], static_cast<int>(i % 3)), minimum[i],
-                  1e-6);
+      EXPECT_NEAR(other[i], minimum[i], 1e-6);
     }
-    Remove(chords[5 + round]);
-    Break(chords[40 + 2 * round]);
+  }
+
+  std::vector<double> Values() const {
+    std::vector<double> values;
+    for (const FeatureId id : poses_) {
+      for (int k = 0; k < 3; ++k) values.push_back(Value(id, k));
+    }
+    return values;
+  }
+
+  std::vector<FeatureId> poses_;
+  std::vector<ConstraintId> chords_;
+  SolverSession ceres_{&graph_, registry_, SessionOptions()};
+  SolverSession resident_{&graph_, registry_, ResidentOptions()};
+
+ private:
+  static SessionOptions ResidentOptions() {
+    SessionOptions options;
+    options.minimizer = "resident";
+    return options;
+  }
+};
+
+TEST_F(MinimizersTest, ComeToOneMinimum) {
+  for (int round = 0; round < 3; ++round) {
+    ExpectOneMinimum(
+        [](SolverSession* session) { return session->SolveGlobal(); });
+    Remove(chords_[5 + round]);
+    Break(chords_[40 + 2 * round]);
+  }
+}
+
+TEST_F(MinimizersTest, ComeToOneMinimumOfANeighbourhood) {
+  for (const int begin : {0, 20, 45}) {
+    const std::vector<FeatureId> near(poses_.begin() + begin,
+                                      poses_.begin() + begin + 70);
+    ExpectOneMinimum(
+        [&near](SolverSession* session) { return session->SolveLocal(near); });
   }
 }
 

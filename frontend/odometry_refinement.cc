@@ -66,6 +66,9 @@ constexpr double kApart = 0.15;
 // Counted returns from which on a share of them says something.
 constexpr int kLeastIntruders = 5;
 constexpr int kLeastSeenThrough = 20;
+// Share of a scan that must not lie in the unknown where odometry, which is in
+// doubt, speaks of another place.
+constexpr double kLeastKnown = 0.7;
 // Standard deviations of a tie: m and rad, and those that grow with the way.
 constexpr double kTieSigma = 0.03;
 constexpr double kTieAngle = DegToRad(0.5);
@@ -394,9 +397,16 @@ bool OdometryRefiner::Contradicts(const ScanAgreement& agreement,
           agreement.SeenThroughShare() > through + seen_through);
 }
 
+double OdometryRefiner::RoomSinceMatch(const MatchPrior& prior,
+                                       const Pose2& motion) const {
+  if (track_.refused == 0) return 0.0;
+  const double usual = OdometryCovariance(motion, options_.noise).determinant();
+  return std::max(0.0, -std::log(usual * prior.information.determinant()));
+}
+
 bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
-                                 double innovation, MatchResult* match,
-                                 Outcome* outcome) const {
+                                 double innovation, double room,
+                                 MatchResult* match, Outcome* outcome) const {
   const TrackingOptions& tracking = options_.tracking;
   const Eigen::Vector2d laser = scan.laser_offset.head<2>();
   std::vector<bool> intruders;
@@ -409,11 +419,13 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
     MatchWithoutIntruders(intruders, prior, laser, match, &here);
     innovation = SquaredInnovation(*match, prior);
   }
-  // Few returns fit in many places: they may leave odometry by little.
+  // Few returns fit in many places: they may leave odometry by little, and by
+  // less the more places odometry leaves open.
   const bool agrees =
-      innovation <=
-      tracking.max_innovation *
-          std::min(1.0, static_cast<double>(here.hits) / tracking.min_hits);
+      here.hits >= tracking.min_hits
+          ? innovation <= tracking.max_innovation
+          : innovation + room <=
+                tracking.max_innovation * here.hits / tracking.min_hits;
   // What contradicted the scan before already is no news.
   const double before =
       track_.after_gap
@@ -421,15 +433,16 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
                 .SeenThroughShare()
           : 0.0;
   const double ratio = here.OfKnown(match->inlier_ratio);
-  // After a gap a match must be better.
-  const double least = !track_.after_gap ? options_.minimum_inlier_ratio
-                       : agrees          ? tracking.min_ratio_after_gap
-                                         : options_.good_inlier_ratio;
+  // After a gap a match must be better, and so must one that leaves odometry.
+  const double least = agrees == track_.after_gap ? tracking.min_ratio_after_gap
+                       : agrees ? options_.minimum_inlier_ratio
+                                : options_.good_inlier_ratio;
   const bool believed =
       ratio >= least && match->inliers >= options_.minimum_points &&
       (agrees || here.hits >= tracking.min_hits) &&
       (agrees || !track_.after_gap ||
-       here.Support() >= tracking.min_unexpected_support) &&
+       (here.Support() >= tracking.min_unexpected_support &&
+        here.KnownShare() >= kLeastKnown)) &&
       !((track_.after_gap || !agrees) && Contradicts(here, before));
   if (!believed && (track_.after_gap || Contradicts(there, before))) {
     outcome->verdict = Outcome::Verdict::kContradicted;
@@ -441,15 +454,16 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
   if (trace_) {
     char text[256];
     std::snprintf(text, sizeof text,
-                  "%s gap %d ratio %.2f/%.2f n %d chi %.1f hits %d intr %d "
+                  "%s gap %d ratio %.2f/%.2f n %d chi %.1f room %.1f hits %d "
+                  "intr %d "
                   "unk %d seen %d thr %d before %.2f refused %d",
                   believed               ? "believed"
                   : outcome->why.empty() ? "odometry"
                                          : "contra",
                   static_cast<int>(track_.after_gap), match->inlier_ratio,
-                  ratio, match->inliers, innovation, here.hits, here.intruders,
-                  here.unknown, here.seen, here.seen_through, before,
-                  track_.refused);
+                  ratio, match->inliers, innovation, room, here.hits,
+                  here.intruders, here.unknown, here.seen, here.seen_through,
+                  before, track_.refused);
     trace_(text);
   }
   return believed;
@@ -581,8 +595,10 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   // Few returns fit in many places.
   const bool sees_little = 2 * points_.size() < scan.ranges.size();
   if (!believed || track_.after_gap ||
-      (sees_little && innovation > options_.tracking.max_innovation)) {
-    believed = StandsUpTo(scan, prior, innovation, &match, &outcome);
+      (sees_little &&
+       (track_.refused > 0 || innovation > options_.tracking.max_innovation))) {
+    believed = StandsUpTo(scan, prior, innovation,
+                          RoomSinceMatch(prior, motion), &match, &outcome);
   }
   believed = believed && !Leaps(match.pose, motion);
   if (!believed && moves_on && leapt) return Match(scan, step, false);
@@ -910,10 +926,7 @@ void OdometryRefiner::Tie(bool last) {
           AgreesWithOdometry(found, middle, search_.seen().size() - 1);
       // Where the robot was carried the right place need not be among those
       // that were searched, and the next door looks like this one.
-      if (is_expected || (!open_->odometry_holds &&
-                          found.support >= tracking.min_unexpected_support)) {
-        first.tie = TrackTie::kMatched;
-      }
+      if (is_expected) first.tie = TrackTie::kMatched;
     }
   }
   if (first.tie == TrackTie::kNone && count >= tracking.first_global_keys &&

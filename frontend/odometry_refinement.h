@@ -332,9 +332,15 @@ class OdometryRefiner {
                              ScanAgreement* here) const;
   // Whether a match that is not plainly good stands up to what the reference
   // knows of solid and free space. Otherwise the outcome says if the scan
-  // contradicts the reference. `innovation`: chi-square against the prior.
+  // contradicts the reference. `innovation`: chi-square against the prior;
+  // `room`: RoomSinceMatch.
   bool StandsUpTo(const Scan& scan, const MatchPrior& prior, double innovation,
-                  MatchResult* match, Outcome* outcome) const;
+                  double room, MatchResult* match, Outcome* outcome) const;
+  // By how much wider the prior is than odometry of one step, `motion`, leaves
+  // it, as scans before were not matched: the logarithm of the ratio of the
+  // determinants of their covariances, which adds to a chi-square where
+  // densities are compared. At least 0.
+  double RoomSinceMatch(const MatchPrior& prior, const Pose2& motion) const;
   // Whether more is intruding or seen through than may be; `seen_through`:
   // share that was before.
   bool Contradicts(const ScanAgreement& agreement, double seen_through) const;

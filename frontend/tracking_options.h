@@ -58,8 +58,8 @@ struct TrackingOptions {
   double max_tie_seen_through = 0.15;
   double min_tie_known = 0.4;
   int min_tie_hits = 15;
-  /// The same share where odometry, which a gap or a contradiction has put in
-  /// doubt, speaks of another place: also for a single scan after a gap.
+  /// The same share for a single scan after a gap where odometry speaks of
+  /// another place.
   double min_unexpected_support = 0.97;
   /// What a tie needs that was found in everything seen so far, where many
   /// places look alike and the right one need not be among them.

@@ -501,6 +501,30 @@ TEST(OdometryRefinerTest, FewReturnsLeaveOdometryByLittle) {
   EXPECT_GT(heading_error(1), DegToRad(8.0));
 }
 
+// The same after scans that showed nothing: odometry of three steps leaves so
+// much open that a board fits somewhere in it, and says nothing.
+TEST(OdometryRefinerTest, FewReturnsSayNothingWhereOdometryLeavesMuchOpen) {
+  const Pose2 end(-2.0, 2.5, 0.5 * kPi);
+  // A piece of the wall ahead as it would look if the robot had turned less.
+  const std::vector<WallEnds> board = testing::Moved(
+      {{{1.5, -0.5}, {1.5, 0.5}}}, {end.x(), end.y(), end[2] + DegToRad(25.0)});
+  constexpr int kTurns = 8;
+  constexpr int kDark = 2;
+  OdometryRefiner refiner(RefinerOptions());
+  RefinedScan last;
+  for (int i = 0; i < kTurns; ++i) {
+    const Pose2 truth(end.x(), end.y(),
+                      end[2] - DegToRad(12.0) * (kTurns - 1 - i));
+    Scan scan = MakeScan(i + 1 < kTurns ? Hall() : board, truth, FullCircle());
+    if (i + 1 < kTurns && i + 1 + kDark >= kTurns) {
+      std::fill(scan.ranges.begin(), scan.ranges.end(), 0.0f);
+    }
+    scan.timestamp = 100.0 + 0.2 * i;
+    last = refiner.Process(scan);
+  }
+  EXPECT_LT(HeadingError(last.pose, end), DegToRad(1.0));
+}
+
 // Somebody walks ahead of the robot along a bare corridor, where nothing else
 // says how far it went: a tenth of the returns and less, and yet they would
 // hold the robot back for as long as they are taken for a wall.
@@ -1103,6 +1127,47 @@ TEST(OdometryRefinerTest, CarriedAlongACorridorOfEqualDoors) {
   ASSERT_EQ(refiner.loose().size(), 1u);
   EXPECT_EQ(refiner.loose()[0].begin, kCarried - 1);
   EXPECT_FALSE(refiner.loose()[0].found);
+}
+
+// Carried to another hall, whose first pillars stand as those in the hall that
+// it was taken from. That it was found there is told.
+TEST(OdometryRefinerTest, CarriedToAPlaceThatLooksAlikeAtFirst) {
+  const std::vector<WallEnds> pillars = Pillars(-10.0);
+  std::vector<WallEnds> here = Room(20.0, 6.0);
+  std::vector<WallEnds> there = here;
+  for (const WallEnds& side : pillars) {
+    here.push_back(side);
+    // The others stand on the other side.
+    const auto moved = [&side](const Eigen::Vector2d& end) {
+      return side.a.x() < -4.0 ? end : Eigen::Vector2d(end.x() + 0.9, -end.y());
+    };
+    there.push_back({moved(side.a), moved(side.b)});
+  }
+  Laser laser;
+  laser.maximum_range = 3.5;
+  laser.sigma = 0.01;
+  Noise noise(8);
+  OdometryRefiner refiner(RefinerOptions());
+  constexpr int kCarried = 45;
+  Pose2 odometry(-9.0, 0.0, 0.0);
+  Pose2 last = odometry;
+  for (int i = 0; i < 90; ++i) {
+    const bool is_carried = i >= kCarried;
+    const Pose2 truth = is_carried
+                            ? Pose2(-7.0 + 0.1 * (i - kCarried), 0.3, 0.0)
+                            : Pose2(-9.0 + 0.1 * i, 0.0, 0.0);
+    if (i > 0 && i != kCarried) {
+      odometry = Compose(odometry, Between(last, truth));
+    }
+    last = truth;
+    Scan scan = MakeScan(is_carried ? there : here, truth, laser, &noise);
+    scan.timestamp = 100.0 + 0.2 * i + (is_carried ? 40.0 : 0.0);
+    scan.odometry = odometry;
+    refiner.Process(scan);
+  }
+  refiner.Finish();
+  ASSERT_FALSE(refiner.loose().empty());
+  EXPECT_EQ(refiner.loose()[0].begin, kCarried - 1);
 }
 
 // Carried to where it has not been, from where it drives back through what it

@@ -68,7 +68,7 @@ constexpr int kLeastIntruders = 5;
 constexpr int kLeastSeenThrough = 20;
 // Share of a scan that must not lie in the unknown where odometry, which is in
 // doubt, speaks of another place.
-constexpr double kLeastKnown = 0.7;
+constexpr double kLeastKnown = 0.8;
 // Standard deviations of a tie: m and rad, and those that grow with the way.
 constexpr double kTieSigma = 0.03;
 constexpr double kTieAngle = DegToRad(0.5);
@@ -697,11 +697,12 @@ bool OdometryRefiner::IsLost(const Outcome& outcome) const {
          track_.turn > options_.tracking.max_blind_turn;
 }
 
-void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
+void OdometryRefiner::Lose(int scan, const Outcome& outcome) {
   const TrackingOptions& tracking = options_.tracking;
   if (trace_) trace_("LOST " + outcome.why);
   const double blind_way = track_.way;
   const double blind_turn = track_.turn;
+  const double blind_seconds = track_.seconds;
   const bool jumped = track_.jumped;
   const bool contradicted = IsContradicted(outcome);
   const bool tiny =
@@ -719,7 +720,7 @@ void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
                      : outcome.why;
     open_->way = blind_way;
     open_->turn = blind_turn;
-    open_->seconds = std::max(0.0, seconds);
+    open_->seconds = blind_seconds;
     open_->is_late =
         open_->before.after_gap &&
         Stands(Between(open_->before.matched_odometry, last_odometry_));
@@ -741,19 +742,20 @@ void OdometryRefiner::Lose(int scan, double seconds, const Outcome& outcome) {
   open_->first = scan;
   open_->blind_way = open_->way;
   open_->blind_turn = open_->turn;
+  open_->blind_seconds = open_->seconds;
   open_->next_attempt = tracking.min_tie_keys;
   open_->next_global = tracking.first_global_keys;
   track_ = Track(options_.matcher);
 }
 
-void OdometryRefiner::CatchUp(const Scan& scan, const Pose2& motion,
+void OdometryRefiner::CatchUp(const Scan& scan, const Pose2& by_wheels,
                               const Pose2& matched, SettledScan* now) {
   if (++open_->late_scans > kMostLate) open_->is_late = false;
-  if (!open_->is_late || Stands(motion)) return;
+  if (!open_->is_late || Stands(by_wheels)) return;
   open_->is_late = false;
   // What the scans have seen of this motion was not on the way over the gap.
   const Pose2 seen = now->refined.odometry_only ? Pose2::Zero() : matched;
-  const Pose2 unseen = motion - seen;
+  const Pose2 unseen = by_wheels - seen;
   if (unseen.head<2>().norm() <= kJumpWay &&
       std::abs(NormalizeAngle(unseen[2])) <= kJumpTurn) {
     return;
@@ -875,13 +877,13 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
   const bool is_lost = IsLost(outcome);
   const Pose2 last_pose = track_.last_pose;
   if (is_lost) {
-    Lose(done.index, seconds, outcome);
+    Lose(done.index, outcome);
     BeginTrack(scan, &done);
   } else {
     ContinueTrack(scan, outcome.information, &done);
   }
   if (open_ != nullptr && open_->is_late) {
-    CatchUp(scan, motion, Between(last_pose, done.refined.pose), &done);
+    CatchUp(scan, by_wheels, Between(last_pose, done.refined.pose), &done);
   }
   if (open_ == nullptr) {
     if (done.refined.is_key) search_.Add(track_.keys.back(), part_);
@@ -941,8 +943,9 @@ void OdometryRefiner::Tie(bool last) {
                              open_->seen_through, nullptr, &found)) {
       const std::size_t nearest = search_.NearestOf(found, where);
       const SeenKey& key = search_.seen()[nearest];
-      if (!open_->odometry_holds ||
-          AgreesWithOdometry(found, middle, nearest)) {
+      if (IsInReach(found, middle, nearest) &&
+          (!open_->odometry_holds ||
+           AgreesWithOdometry(found, middle, nearest))) {
         first.tie = TrackTie::kMatched;
         first.since = key.scan;
         first.since_key.mean = key.pose;
@@ -1024,6 +1027,19 @@ UncertainPose2 OdometryRefiner::BlindMotion() const {
   covariance.topLeftCorner<2, 2>().diagonal().array() += aside;
   return {Between(open_->before.keys.back().pose, open_->keys.front().pose),
           covariance};
+}
+
+bool OdometryRefiner::IsInReach(const FoundTrack& found, std::size_t middle,
+                                std::size_t since) const {
+  // Scans without times may be of any time, and a guess lies between.
+  if (open_->blind_seconds <= 0.0 ||
+      search_.seen()[since].part != search_.seen().back().part) {
+    return true;
+  }
+  const Pose2 first = Compose(
+      found.pose, Between(open_->keys[middle].pose, open_->keys.front().pose));
+  return Between(open_->before.matched_pose, first).head<2>().norm() <=
+         kJumpWay + kFastest * open_->blind_seconds;
 }
 
 bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,

@@ -250,12 +250,13 @@ class OdometryRefiner {
     int last_sure = 0;
     int first = 0;
     // Way (m), turn (rad) and time (s) by odometry since the last scan that is
-    // sure; way and turn of it up to the first of the track.
+    // sure; those of it up to the first of the track.
     double way = 0.0;
     double turn = 0.0;
     double seconds = 0.0;
     double blind_way = 0.0;
     double blind_turn = 0.0;
+    double blind_seconds = 0.0;
     // Neither a gap nor a contradiction.
     bool odometry_holds = true;
     // Odometry has not moved over the gap in the log, and may not know of the
@@ -351,10 +352,10 @@ class OdometryRefiner {
   bool IsContradicted(const Outcome& outcome) const;
   bool IsLost(const Outcome& outcome) const;
   // Opens a tie, or starts the open one again, at this scan.
-  void Lose(int scan, double seconds, const Outcome& outcome);
+  void Lose(int scan, const Outcome& outcome);
   // Where odometry that did not move over a gap tells of the way at once, the
   // open track lies where it says.
-  void CatchUp(const Scan& scan, const Pose2& motion, const Pose2& matched,
+  void CatchUp(const Scan& scan, const Pose2& by_wheels, const Pose2& matched,
                SettledScan* now);
   // The first scan of a track, and the ones after it.
   void BeginTrack(const Scan& scan, SettledScan* first);
@@ -376,6 +377,10 @@ class OdometryRefiner {
   // true where they say nothing of it.
   bool AgreesWithOdometry(const FoundTrack& found, std::size_t middle,
                           std::size_t since) const;
+  // Whether a robot can have got there in the time without a match, however
+  // wrong odometry is; true where it cannot be told.
+  bool IsInReach(const FoundTrack& found, std::size_t middle,
+                 std::size_t since) const;
   void Settle(const Pose2& shift, const RefinedScan& first);
 
   const OdometryRefinementOptions usual_options_;

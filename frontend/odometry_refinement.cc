@@ -434,9 +434,9 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
           : 0.0;
   const double ratio = here.OfKnown(match->inlier_ratio);
   // After a gap a match must be better, and so must one that leaves odometry.
-  const double least = agrees == track_.after_gap ? tracking.min_ratio_after_gap
-                       : agrees ? options_.minimum_inlier_ratio
-                                : options_.good_inlier_ratio;
+  double least = options_.minimum_inlier_ratio;
+  if (!agrees || track_.after_gap) least = tracking.min_ratio_after_gap;
+  if (!agrees && track_.after_gap) least = options_.good_inlier_ratio;
   const bool believed =
       ratio >= least && match->inliers >= options_.minimum_points &&
       (agrees || here.hits >= tracking.min_hits) &&

@@ -15,8 +15,8 @@ struct TrackingOptions {
   double max_seen_through = 0.25;
   double max_intruders_after_gap = 0.15;
   double max_seen_through_after_gap = 0.15;
-  /// Inlier ratio, of what is known, that a match after a gap needs when it
-  /// agrees with odometry; else OdometryRefinementOptions::good_inlier_ratio.
+  /// Inlier ratio, of what is known, that a match needs that leaves odometry or
+  /// follows a gap; both: OdometryRefinementOptions::good_inlier_ratio.
   double min_ratio_after_gap = 0.6;
   /// Chi-square of a match against odometry from which on contradictions count
   /// without a gap, too: people contradict, but odometry agrees.

@@ -1167,6 +1167,25 @@ TEST(OdometryRefinerTest, CarriedAlongACorridorOfEqualDoors) {
   EXPECT_FALSE(refiner.loose()[0].found);
 }
 
+// Drives through `here` until it is carried, for 40 s and unknown to odometry,
+// before scan `carried`, and then through `there`, where `truth` says.
+void DriveAndBeCarried(const std::vector<WallEnds>& here,
+                       const std::vector<WallEnds>& there, int carried,
+                       const std::vector<Pose2>& truth, const Laser& laser,
+                       Noise* noise, OdometryRefiner* refiner) {
+  Pose2 odometry = truth[0];
+  for (int i = 0; i < static_cast<int>(truth.size()); ++i) {
+    if (i > 0 && i != carried) {
+      odometry = Compose(odometry, Between(truth[i - 1], truth[i]));
+    }
+    Scan scan = MakeScan(i < carried ? here : there, truth[i], laser, noise);
+    scan.timestamp = 100.0 + 0.2 * i + (i < carried ? 0.0 : 40.0);
+    scan.odometry = odometry;
+    refiner->Process(scan);
+  }
+  refiner->Finish();
+}
+
 // Carried to another hall, whose first pillars stand as those in the hall that
 // it was taken from. That it was found there is told.
 TEST(OdometryRefinerTest, CarriedToAPlaceThatLooksAlikeAtFirst) {
@@ -1187,23 +1206,13 @@ TEST(OdometryRefinerTest, CarriedToAPlaceThatLooksAlikeAtFirst) {
   Noise noise(8);
   OdometryRefiner refiner(RefinerOptions());
   constexpr int kCarried = 45;
-  Pose2 odometry(-9.0, 0.0, 0.0);
-  Pose2 last = odometry;
+  std::vector<Pose2> truth;
   for (int i = 0; i < 90; ++i) {
-    const bool is_carried = i >= kCarried;
-    const Pose2 truth = is_carried
-                            ? Pose2(-7.0 + 0.1 * (i - kCarried), 0.3, 0.0)
-                            : Pose2(-9.0 + 0.1 * i, 0.0, 0.0);
-    if (i > 0 && i != kCarried) {
-      odometry = Compose(odometry, Between(last, truth));
-    }
-    last = truth;
-    Scan scan = MakeScan(is_carried ? there : here, truth, laser, &noise);
-    scan.timestamp = 100.0 + 0.2 * i + (is_carried ? 40.0 : 0.0);
-    scan.odometry = odometry;
-    refiner.Process(scan);
+    truth.push_back(i < kCarried
+                        ? Pose2(-9.0 + 0.1 * i, 0.0, 0.0)
+                        : Pose2(-7.0 + 0.1 * (i - kCarried), 0.3, 0.0));
   }
-  refiner.Finish();
+  DriveAndBeCarried(here, there, kCarried, truth, laser, &noise, &refiner);
   ASSERT_FALSE(refiner.loose().empty());
   EXPECT_EQ(refiner.loose()[0].begin, kCarried - 1);
 }
@@ -1331,23 +1340,13 @@ TEST(OdometryRefinerTest, OneWindowThatFitsDoesNotPlaceALongPart) {
   options.tracking.min_tie_score = 0.65;
   OdometryRefiner refiner(options);
   constexpr int kCarried = 110;
-  Pose2 odometry(-8.5, 0.0, 0.0);
-  Pose2 last = odometry;
+  std::vector<Pose2> truth;
   for (int i = 0; i < 290; ++i) {
-    const bool is_there = i >= kCarried;
-    const Pose2 truth = is_there
-                            ? Pose2(-19.0 + 0.15 * (i - kCarried), 0.05, 0.0)
-                            : Pose2(-8.5 + 0.15 * i, 0.0, 0.0);
-    if (i > 0 && i != kCarried) {
-      odometry = Compose(odometry, Between(last, truth));
-    }
-    last = truth;
-    Scan scan = MakeScan(is_there ? there : hall, truth, laser, &noise);
-    scan.timestamp = 100.0 + 0.2 * i + (is_there ? 40.0 : 0.0);
-    scan.odometry = odometry;
-    refiner.Process(scan);
+    truth.push_back(i < kCarried
+                        ? Pose2(-8.5 + 0.15 * i, 0.0, 0.0)
+                        : Pose2(-19.0 + 0.15 * (i - kCarried), 0.05, 0.0));
   }
-  refiner.Finish();
+  DriveAndBeCarried(hall, there, kCarried, truth, laser, &noise, &refiner);
   EXPECT_TRUE(refiner.late_ties().empty());
   ASSERT_EQ(refiner.loose().size(), 1u);
   EXPECT_FALSE(refiner.loose()[0].found);

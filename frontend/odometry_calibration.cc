@@ -9,19 +9,30 @@ namespace {
 // Shorter motions are noise, m.
 constexpr double kLeastWay = 0.1;
 // The returns' variance along the way is no larger than this share of
-// odometry's.
-constexpr double kClearShare = 0.25;
+// odometry's for the scale, and across it for the course.
+constexpr double kClearShare = 1.0;
+constexpr double kClearShareOfCourse = 0.25;
 // Where the returns say nothing, 1/m^2 and 1/rad^2.
 constexpr double kRidge = 1e-6;
-// Standard deviation of the ratio of a motion by match to that by odometry. One
-// that is more than kFarthest of these off is a slip.
-constexpr double kRatioSigma = 0.1;
-constexpr double kFarthest = 3.0;
+// A ratio of a motion by match to that by odometry that is more than so much
+// off is a slip.
+constexpr double kSlip = 0.3;
+// Standard deviation of such a ratio, and of a match's ends along the way, m.
+constexpr double kRatioSigma = 0.03;
+constexpr double kWaySigma = 0.01;
+// Odometry is a scan early or late: by so many of its last steps that what it
+// went between two scans changes a motion.
+constexpr double kLagSteps = 2.0;
+// Where the robot turns by more, rad, wheels do not roll as they do on a way
+// ahead.
+constexpr double kMostTurnOfScale = 0.1;
 // Standard deviation of the direction of a match over such a motion, rad. One
 // that is more than kFarthest of these off is a slip to the side.
 constexpr double kCourseSigma = DegToRad(3.0);
-// By how much the scale may change over a metre: a hundredth over 100 m.
-constexpr double kDriftVariance = 1e-6;
+constexpr double kFarthest = 3.0;
+// By how much the scale may change over a metre: a hundredth over 1 km, as
+// wheels get warm.
+constexpr double kDriftVariance = 1e-7;
 // By how much the course may change over a metre, rad^2: two tenths of a degree
 // over 1 km.
 constexpr double kCourseDriftVariance = 1e-8;
@@ -42,20 +53,28 @@ Pose2 OdometryCalibration::Corrected(const Pose2& motion) const {
 void OdometryCalibration::Compare(const Pose2& motion,
                                   const Eigen::Matrix3d& covariance,
                                   const Pose2& matched,
-                                  const Eigen::Matrix3d& information) {
+                                  const Eigen::Matrix3d& information,
+                                  double last_step) {
   const double way = motion.head<2>().norm();
+  const double change = last_step - last_step_;
+  last_step_ = last_step;
   variance_ += kDriftVariance * way;
   course_variance_ += kCourseDriftVariance * way;
   if (way < kLeastWay) return;
   const Eigen::Vector3d along(motion[0] / way, motion[1] / way, 0.0);
   const Eigen::Matrix3d returns =
       (information + kRidge * Eigen::Matrix3d::Identity()).inverse();
+  const double of_returns = along.dot(returns * along);
   const bool is_clear =
-      along.dot(returns * along) <= kClearShare * along.dot(covariance * along);
+      of_returns <= kClearShare * along.dot(covariance * along);
   const double ratio = along.dot(matched) / way;
-  if (is_clear && is_anchored_ &&
-      std::abs(ratio - scale_) <= kFarthest * kRatioSigma) {
-    const double gain = variance_ / (variance_ + kRatioSigma * kRatioSigma);
+  if (is_clear && is_anchored_ && std::abs(motion[2]) <= kMostTurnOfScale &&
+      std::abs(ratio - scale_) <= kSlip) {
+    const double of_ratio =
+        kRatioSigma * kRatioSigma + (of_returns + kWaySigma * kWaySigma +
+                                     kLagSteps * kLagSteps * change * change) /
+                                        (way * way);
+    const double gain = variance_ / (variance_ + of_ratio);
     scale_ += gain * (ratio - scale_);
     variance_ *= 1.0 - gain;
   }
@@ -63,7 +82,7 @@ void OdometryCalibration::Compare(const Pose2& motion,
 
   const Eigen::Vector3d across(-along[1], along[0], 0.0);
   if (across.dot(returns * across) >
-          kClearShare * across.dot(covariance * across) ||
+          kClearShareOfCourse * across.dot(covariance * across) ||
       ratio < kLeastRatio || std::abs(matched[2]) > kMostTurn) {
     return;
   }

@@ -29,12 +29,14 @@ class OdometryCalibration {
 
   /// The motion since the last key scan: as odometry has it (not corrected),
   /// its covariance, how the scans were matched, and the information of the
-  /// returns alone, all in that key scan's frame. The scale counts where the
-  /// returns say how far it went much better than odometry does, at its end and
-  /// at its beginning, the course where they say so at its end of what is
-  /// across.
+  /// returns alone, all in that key scan's frame; what odometry went between
+  /// the last two scans, m. The scale counts where the returns say how far it
+  /// went better than odometry does, at its end and at its beginning, for less
+  /// where the robot sped up or slowed down, as odometry is a little early or
+  /// late; the course where they say much better at its end what is across.
   void Compare(const Pose2& motion, const Eigen::Matrix3d& covariance,
-               const Pose2& matched, const Eigen::Matrix3d& information);
+               const Pose2& matched, const Eigen::Matrix3d& information,
+               double last_step);
 
   /// The motion that is compared next does not begin at a match.
   void Break() { is_anchored_ = false; }
@@ -42,8 +44,10 @@ class OdometryCalibration {
   /// Writes or reads all of it (state_archive.h).
   template <typename Archive>
   friend void Exchange(Archive& archive, OdometryCalibration& calibration) {
-    auto& [value, variance, is_anchored, course, course_variance] = calibration;
-    ExchangeAll(archive, value, variance, is_anchored, course, course_variance);
+    auto& [value, variance, is_anchored, last_step, course, course_variance] =
+        calibration;
+    ExchangeAll(archive, value, variance, is_anchored, last_step, course,
+                course_variance);
   }
 
  private:
@@ -51,6 +55,8 @@ class OdometryCalibration {
   double variance_ = kPriorSigma * kPriorSigma;
   // The last key scan's match told how far the robot had gone.
   bool is_anchored_ = false;
+  // What odometry went between the last two scans before, m.
+  double last_step_ = 0.0;
   double course_ = 0.0;
   double course_variance_ = kPriorCourse * kPriorCourse;
 

@@ -51,6 +51,13 @@ constexpr double kWheelSigma = 0.02;
 constexpr double kWheelSigmaPerMetre = 0.05;
 constexpr double kFarFromWheels = 3.0;
 constexpr double kNearWheels = 2.0;
+// By how much more information odometry holds a scan where it has it, and by
+// how much better (ScanAgreement::Quality) the scan agrees there with what was
+// seen, of places that are apart by more than noise.
+constexpr double kHeld = 25.0;
+constexpr double kBetter = 0.1;
+// A robot that goes by less between two scans may do so in any direction, m.
+constexpr double kLeastWayAhead = 0.02;
 // A return says something of a direction when the cosine of its normal with it
 // is no smaller than this. So deep a thing is, m, that may be all that says
 // something, and so large its least share of it.
@@ -135,6 +142,22 @@ double OdometryCost(double squared_innovation, double scale) {
   return scale * std::log1p(squared_innovation / scale);
 }
 
+// Wheels slip along their way, and get the way's sign wrong, but do not go to
+// the side of it: there odometry's cost is that of a normal distribution. 0
+// where the robot stands, as `motion` (in the frame of a pose turned by
+// `heading`) says.
+double CostAcross(const MatchResult& match, const MatchPrior& prior,
+                  double heading, const Pose2& motion) {
+  const double way = motion.head<2>().norm();
+  if (way < kLeastWayAhead) return 0.0;
+  const double direction = heading + std::atan2(motion[1], motion[0]);
+  const Eigen::Vector2d across(-std::sin(direction), std::cos(direction));
+  const double off = across.dot((match.pose - prior.pose).head<2>());
+  const Eigen::Matrix2d covariance =
+      prior.information.topLeftCorner<2, 2>().inverse();
+  return 0.5 * off * off / across.dot(covariance * across);
+}
+
 }  // namespace
 
 Eigen::Matrix3d OdometryCovariance(const Pose2& motion,
@@ -203,21 +226,32 @@ MatchResult OdometryRefiner::MatchPoints(const std::vector<ScanPoint>& points,
         std::min(options_.search_translation + 2.0 * (distance + track_.way),
                  options_.max_search_translation),
         std::min(kPi, options_.search_rotation + turn + track_.turn), nullptr);
-    MatchPrior overruled = prior;
-    overruled.information.row(2).setZero();
-    overruled.information.col(2).setZero();
-    const MatchResult wide = matcher.Refine(points, found, overruled);
-    // The scan has to speak clearly for another pose than odometry's, and for
-    // one farther away more so than odometry speaks against it.
-    const double scale = options_.tracking.odometry_tail;
-    const double against = OdometryCost(SquaredInnovation(wide, prior), scale) -
-                           OdometryCost(SquaredInnovation(match, prior), scale);
-    if (wide.cost < match.cost - 0.02 &&
-        (match.cost - wide.cost) * CountApart(points) > against) {
-      match = wide;
-    }
+    const MatchResult wide = MatchOverruling(points, found, prior);
+    if (IsClearlyBetter(wide, match, points, prior)) match = wide;
   }
   return match;
+}
+
+MatchResult OdometryRefiner::MatchOverruling(
+    const std::vector<ScanPoint>& points, const Pose2& guess,
+    const MatchPrior& prior) const {
+  MatchPrior overruled = prior;
+  overruled.information.row(2).setZero();
+  overruled.information.col(2).setZero();
+  return track_.matcher.Refine(points, guess, overruled);
+}
+
+bool OdometryRefiner::IsClearlyBetter(const MatchResult& wide,
+                                      const MatchResult& match,
+                                      const std::vector<ScanPoint>& points,
+                                      const MatchPrior& prior) const {
+  // The scan has to speak clearly for another pose than odometry's, and for
+  // one farther away more so than odometry speaks against it.
+  const double scale = options_.tracking.odometry_tail;
+  const double against = OdometryCost(SquaredInnovation(wide, prior), scale) -
+                         OdometryCost(SquaredInnovation(match, prior), scale);
+  return wide.cost < match.cost - 0.02 &&
+         (match.cost - wide.cost) * CountApart(points) > against;
 }
 
 std::vector<ScanPoint> OdometryRefiner::WithoutClutter(const Scan& scan) const {
@@ -249,13 +283,29 @@ MatchPrior OdometryRefiner::PriorOf(const Pose2& pose,
   return prior;
 }
 
+void OdometryRefiner::GoByWheels(const Pose2& motion, bool leapt,
+                                 MatchPrior* prior) {
+  WheelTrack& wheels = track_.wheels;
+  if (track_.refused > 0 || track_.after_gap || track_.jumped || leapt ||
+      is_dead_ || still_ > 0) {
+    wheels.Reset();
+  }
+  if (!wheels.exists()) return;
+  wheels.Move(motion, track_.last_pose[2]);
+  prior->pose.head<2>() = wheels.position();
+  prior->information.topLeftCorner<2, 2>() = wheels.Covariance().inverse();
+}
+
 void OdometryRefiner::MatchWithoutClutter(const Scan& scan,
                                           const MatchPrior& prior,
                                           const Pose2& motion,
                                           MatchResult* match) {
   std::vector<ScanPoint> standing = WithoutClutter(scan);
   if (standing.empty()) return;
-  const MatchResult other = MatchPoints(standing, prior, motion);
+  MatchResult other = MatchPoints(standing, prior, motion);
+  // The rest may fit where all do, too, far from odometry.
+  const MatchResult same = MatchOverruling(standing, match->pose, prior);
+  if (IsClearlyBetter(same, other, standing, prior)) other = same;
   const Pose2 apart = Between(match->pose, other.pose);
   if (other.inlier_ratio >= options_.minimum_inlier_ratio &&
       other.inliers >= options_.minimum_points &&
@@ -333,6 +383,37 @@ void OdometryRefiner::MatchAsWheelsSay(const Scan& scan,
   *match = other;
   points_ = standing;
   track_.moving = options_.clutter_memory;
+}
+
+// Where a scan has little in common with what was seen before, the returns that
+// it has slide along to wherever more of them find a partner.
+void OdometryRefiner::StayUnlessClear(const MatchPrior& prior,
+                                      const Pose2& motion,
+                                      const Eigen::Vector2d& laser,
+                                      MatchResult* match) {
+  if (SquaredInnovation(*match, prior) <= options_.tracking.max_innovation) {
+    return;
+  }
+  MatchPrior held = prior;
+  held.pose[2] = match->pose[2];
+  held.information *= kHeld;
+  held.is_heavy_tailed = false;
+  const MatchResult there = track_.matcher.Refine(points_, held.pose, held);
+  const double better =
+      track_.matcher.Compare(points_, there.pose, laser).Quality() -
+      track_.matcher.Compare(points_, match->pose, laser).Quality();
+  const bool is_clear =
+      better <= kBetter && IsClearlyBetter(*match, there, points_, prior) &&
+      (there.cost - match->cost) * CountApart(points_) >
+          CostAcross(*match, prior, track_.last_pose[2], motion);
+  if (trace_) {
+    char text[100];
+    std::snprintf(text, sizeof text, "far %s cost %.3f there %.3f better %.3f",
+                  is_clear ? "clear" : "stays", match->cost, there.cost,
+                  better);
+    trace_(text);
+  }
+  if (!is_clear) *match = there;
 }
 
 std::vector<ScanPoint> OdometryRefiner::WithoutOneThing(
@@ -575,9 +656,11 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
     return outcome;
   }
   MatchPrior prior = PriorOf(result.pose, step);
+  GoByWheels(motion, leapt, &prior);
   MatchResult match = MatchPoints(points_, prior, motion);
   const bool moves_on = MovesOn(leapt, &result.since_key, &prior, &match);
   if (moves_on) {
+    track_.wheels.Reset();
     result.pose = prior.pose;
     motion = Between(track_.last_pose, result.pose);
   }
@@ -590,6 +673,10 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
     MatchWithoutClutter(scan, prior, motion, &match);
   }
   if (HaveWheelsBeenSteady()) MatchAsWheelsSay(scan, prior, &match);
+  if (!moves_on && !is_dead_ && !leapt && !track_.jumped && !track_.after_gap &&
+      track_.refused == 0) {
+    StayUnlessClear(prior, motion, scan.laser_offset.head<2>(), &match);
+  }
   bool believed = match.inlier_ratio >= options_.good_inlier_ratio;
   const double innovation = SquaredInnovation(match, prior);
   // Few returns fit in many places.
@@ -603,9 +690,11 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   believed = believed && !Leaps(match.pose, motion);
   if (!believed && moves_on && leapt) return Match(scan, step, false);
   if (!believed) {
+    track_.wheels.Reset();
     ++refusals_;
     return outcome;
   }
+  track_.wheels.Follow(match.pose.head<2>(), match.information);
   outcome.verdict = Outcome::Verdict::kBelieved;
   result.pose = match.pose;
   result.odometry_only = false;
@@ -844,6 +933,7 @@ RefinedScan OdometryRefiner::Process(const Scan& scan) {
   const Pose2& motion = step.mean;
   const double seconds = started_ ? scan.timestamp - last_time_ : 0.0;
   last_odometry_ = scan.odometry;
+  last_step_ = by_wheels.head<2>().norm();
   last_time_ = scan.timestamp;
   if (!started_) {
     started_ = true;
@@ -997,9 +1087,9 @@ void OdometryRefiner::CompareOdometry(const Scan& scan,
   scans_since_key_ = 0;
   if (refined.odometry_only || track_.keys.empty()) return;
   const Pose2 motion = odometry_calibration_.Corrected(by_wheels);
-  odometry_calibration_.Compare(by_wheels,
-                                OdometryCovariance(by_wheels, options_.noise),
-                                refined.since_key.mean, information);
+  odometry_calibration_.Compare(
+      by_wheels, OdometryCovariance(by_wheels, options_.noise),
+      refined.since_key.mean, information, last_step_);
   Pose2 left = refined.since_key.mean - motion;
   left[2] = NormalizeAngle(left[2]);
   const double innovation =
@@ -1155,10 +1245,10 @@ void OdometryRefiner::ExchangeState(StateArchive& archive) {
   ExchangeAll(archive, track_, points_, started_, count_, last_odometry_,
               last_time_, usual_step_, search_.seen(), part_, num_parts_,
               loose_of_, wide_searches_, refusals_, losses_, loose_, guessed_,
-              noise_, noise_scale_, key_odometry_, squared_innovations_,
-              compared_motions_, odometry_calibration_, steady_, still_,
-              last_motion_, steady_wheels_, scans_since_key_, still_pose_,
-              is_dead_, ahead_);
+              noise_, noise_scale_, last_step_, key_odometry_,
+              squared_innovations_, compared_motions_, odometry_calibration_,
+              steady_, still_, last_motion_, steady_wheels_, scans_since_key_,
+              still_pose_, is_dead_, ahead_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

@@ -13,6 +13,7 @@
 #include <plumbline/frontend/steady_motion.h>
 #include <plumbline/frontend/track_search.h>
 #include <plumbline/frontend/tracking_options.h>
+#include <plumbline/frontend/wheel_track.h>
 
 #include <Eigen/Core>
 #include <deque>
@@ -216,6 +217,8 @@ class OdometryRefiner {
     // Of the last scan that was matched, and odometry's there.
     Pose2 matched_pose = Pose2::Zero();
     Pose2 matched_odometry = Pose2::Zero();
+    // Where odometry has the robot, held by matches.
+    WheelTrack wheels;
     // Since the last scan that was matched: way (m), turn (rad), scans.
     double way = 0.0;
     double turn = 0.0;
@@ -235,10 +238,10 @@ class OdometryRefiner {
     template <typename Archive>
     friend void Exchange(Archive& archive, Track& track) {
       auto& [keys, matcher, last_pose, since_key, matched_pose,
-             matched_odometry, way, turn, refused, seconds, moving, after_gap,
-             jumped, last_points] = track;
+             matched_odometry, wheels, way, turn, refused, seconds, moving,
+             after_gap, jumped, last_points] = track;
       ExchangeAll(archive, keys, last_pose, since_key, matched_pose,
-                  matched_odometry, way, turn, refused, seconds, moving,
+                  matched_odometry, wheels, way, turn, refused, seconds, moving,
                   after_gap, jumped, last_points);
     }
   };
@@ -296,6 +299,10 @@ class OdometryRefiner {
   // sets where it is, and its match.
   bool MovesOn(bool leapt, UncertainPose2* since_key, MatchPrior* prior,
                MatchResult* match);
+  // Takes the match back to where odometry has the robot when the returns do
+  // not speak clearly for the place where it is.
+  void StayUnlessClear(const MatchPrior& prior, const Pose2& motion,
+                       const Eigen::Vector2d& laser, MatchResult* match);
   // Whether a match goes where the robot cannot have got to by itself.
   bool Leaps(const Pose2& matched, const Pose2& motion) const;
   // The pose by odometry, as uncertain as all odometry since the last match.
@@ -303,9 +310,21 @@ class OdometryRefiner {
   // The best pose of `points` near the prior's.
   MatchResult MatchPoints(const std::vector<ScanPoint>& points,
                           const MatchPrior& prior, const Pose2& motion);
+  // The best pose of `points` near a guess, whatever odometry says of the turn.
+  MatchResult MatchOverruling(const std::vector<ScanPoint>& points,
+                              const Pose2& guess,
+                              const MatchPrior& prior) const;
+  // Whether `points` speak for the pose of one match against that of another by
+  // more than odometry speaks against it.
+  bool IsClearlyBetter(const MatchResult& wide, const MatchResult& match,
+                       const std::vector<ScanPoint>& points,
+                       const MatchPrior& prior) const;
   // Returns of the last scan that do not lie on clutter; none when there is
   // little of it.
   std::vector<ScanPoint> WithoutClutter(const Scan& scan) const;
+  // Takes the place from where odometry has the robot, held by matches, where
+  // that is known.
+  void GoByWheels(const Pose2& motion, bool leapt, MatchPrior* prior);
   // Takes the match of the returns that do not lie on clutter where it is
   // another one.
   void MatchWithoutClutter(const Scan& scan, const MatchPrior& prior,
@@ -394,6 +413,8 @@ class OdometryRefiner {
   bool started_ = false;
   int count_ = 0;
   Pose2 last_odometry_ = Pose2::Zero();
+  // What it went between the last two scans, m.
+  double last_step_ = 0.0;
   double last_time_ = 0.0;
   double usual_step_ = 0.0;
   // Order of settled scans: front to be taken first.

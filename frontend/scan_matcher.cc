@@ -592,10 +592,11 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
     result.cost = sums.tried > 0 ? sums.cost / sums.tried : kUnmatchedCost;
     Eigen::Vector3d difference = result.pose - prior.pose;
     difference[2] = NormalizeAngle(difference[2]);
-    // The prior is heavy tailed: odometry that is plainly wrong (a slip, a
+    // The prior may be heavy tailed: odometry that is plainly wrong (a slip, a
     // turn, a direction of travel with the wrong sign) must not drag along.
     const double prior_squared = difference.dot(prior.information * difference);
-    const double prior_weight = 1.0 / (1.0 + prior_squared / 3.0);
+    const double prior_weight =
+        prior.is_heavy_tailed ? 1.0 / (1.0 + prior_squared / 3.0) : 1.0;
     Eigen::Matrix3d hessian = information + prior_weight * prior.information;
     gradient += prior_weight * (prior.information * difference);
     hessian.diagonal().array() += kLeastInformation;

@@ -47,6 +47,8 @@ struct MatchPrior {
   Pose2 pose = Pose2::Zero();
   /// Inverse covariance in the frame of `pose`'s parent (m, m, rad).
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  /// Whether what is plainly off it lets it go; else it holds.
+  bool is_heavy_tailed = true;
 };
 
 /// Result of matching a scan.

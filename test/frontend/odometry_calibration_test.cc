@@ -12,6 +12,8 @@ namespace {
 const Eigen::Matrix3d kWheels =
     Eigen::Vector3d(0.0016, 0.0016, 0.001).asDiagonal();
 const Eigen::Matrix3d kClear = Eigen::Vector3d(1e4, 1e4, 1e5).asDiagonal();
+// What odometry goes between two scans at an even speed, m.
+constexpr double kStep = 0.1;
 
 // `count` motions by 0.3 m in direction `angle`, matched as `ratio` times that.
 void DriveStraight(int count, double ratio, double angle,
@@ -20,7 +22,7 @@ void DriveStraight(int count, double ratio, double angle,
   const Pose2 motion(0.3 * std::cos(angle), 0.3 * std::sin(angle), 0.01);
   const Pose2 matched(ratio * motion[0], ratio * motion[1], 0.01);
   for (int i = 0; i < count; ++i) {
-    scale->Compare(motion, kWheels, matched, information);
+    scale->Compare(motion, kWheels, matched, information, kStep);
   }
 }
 
@@ -44,9 +46,9 @@ TEST(OdometryCalibrationTest, IsLearntInAnyDirection) {
 
 TEST(OdometryCalibrationTest, FewMotionsSayLittle) {
   OdometryCalibration scale;
-  DriveStraight(4, 0.9, 0.0, kClear, &scale);
+  DriveStraight(3, 0.9, 0.0, kClear, &scale);
   EXPECT_LT(scale.scale(), 1.0);
-  EXPECT_GT(scale.scale(), 0.94);
+  EXPECT_GT(scale.scale(), 0.93);
 }
 
 TEST(OdometryCalibrationTest, ACorridorSaysNothing) {
@@ -83,7 +85,7 @@ TEST(OdometryCalibrationTest, SlipsAndNoiseDoNotCount) {
     DriveStraight(1, -1.0, 0.0, kClear, &scale);
     DriveStraight(1, 0.2, 0.0, kClear, &scale);
     const Pose2 small(0.02, 0.0, 0.3);
-    scale.Compare(small, kWheels, Pose2(0.018, 0.0, 0.3), kClear);
+    scale.Compare(small, kWheels, Pose2(0.018, 0.0, 0.3), kClear, kStep);
   }
   EXPECT_EQ(scale.scale(), 1.0);
 }
@@ -93,6 +95,44 @@ TEST(OdometryCalibrationTest, AnotherFloorIsFollowed) {
   DriveStraight(1000, 0.97, 0.0, kClear, &scale);
   DriveStraight(1000, 1.02, 0.0, kClear, &scale);
   EXPECT_NEAR(scale.scale(), 1.02, 0.005);
+}
+
+TEST(OdometryCalibrationTest, SpeedingUpCountsLess) {
+  // Odometry that is a scan late has the motion too short when the robot speeds
+  // up, and too long when it slows down by as much later.
+  const auto after = [](double step) {
+    OdometryCalibration scale;
+    scale.Compare(Pose2(0.3, 0.0, 0.0), kWheels, Pose2(0.3, 0.0, 0.0), kClear,
+                  kStep);
+    scale.Compare(Pose2(0.3, 0.0, 0.0), kWheels, Pose2(0.33, 0.0, 0.0), kClear,
+                  step);
+    return scale.scale() - 1.0;
+  };
+  const double even = after(kStep);
+  EXPECT_GT(even, 0.0);
+  EXPECT_LT(after(kStep + 0.05), 0.2 * even);
+  EXPECT_LT(after(kStep - 0.05), 0.2 * even);
+}
+
+TEST(OdometryCalibrationTest, ReturnsThatSayLessCountLess) {
+  const auto after = [](double information) {
+    OdometryCalibration scale;
+    const Eigen::Matrix3d returns =
+        Eigen::Vector3d(information, 1e4, 1e5).asDiagonal();
+    DriveStraight(2, 1.1, 0.0, returns, &scale);
+    return scale.scale() - 1.0;
+  };
+  EXPECT_GT(after(1e3), 0.0);
+  EXPECT_LT(after(1e3), 0.6 * after(1e5));
+}
+
+TEST(OdometryCalibrationTest, NoScaleFromTurns) {
+  OdometryCalibration scale;
+  for (int i = 0; i < 50; ++i) {
+    scale.Compare(Pose2(0.3, 0.0, 0.12), kWheels, Pose2(0.27, 0.0, 0.12),
+                  kClear, kStep);
+  }
+  EXPECT_EQ(scale.scale(), 1.0);
 }
 
 // `count` motions of 0.3 m in direction `angle` by odometry that turns `turn`
@@ -107,7 +147,7 @@ void DriveAskew(int count, double course, double angle, double turn,
   const Pose2 matched(0.3 * std::cos(angle + course),
                       0.3 * std::sin(angle + course), 0.01);
   for (int i = 0; i < count; ++i) {
-    calibration->Compare(motion, kWheels, matched, information);
+    calibration->Compare(motion, kWheels, matched, information, kStep);
   }
 }
 
@@ -146,9 +186,9 @@ TEST(OdometryCalibrationTest, NoCourseWhereNothingSaysWhatIsAcross) {
   DriveAskew(200, 0.5, 0.0, 0.0, kClear, &calibration);
   EXPECT_EQ(calibration.course(), 0.0);
   calibration.Compare(Pose2(0.02, 0.0, 0.4), kWheels, Pose2(0.02, 0.01, 0.4),
-                      kClear);
+                      kClear, kStep);
   calibration.Compare(Pose2(0.3, 0.0, 0.0), kWheels, Pose2(-0.3, 0.01, 0.0),
-                      kClear);
+                      kClear, kStep);
   EXPECT_EQ(calibration.course(), 0.0);
 }
 

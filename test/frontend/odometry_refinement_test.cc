@@ -1466,5 +1466,49 @@ TEST(OdometryRefinerTest, SomeReturnsThatFitDoNotOutweighOdometry) {
   }
 }
 
+// Motions from scan to scan of a piece of the log of fr079; none without it.
+std::vector<Pose2> MotionsOfFr079(std::size_t begin, std::size_t end) {
+  const char* const folder = std::getenv("PLUMBLINE_DATASETS");
+  const std::string path =
+      std::string(folder == nullptr ? "" : folder) + "/fr079.clf.bz2";
+  if (!std::ifstream(path)) return {};
+  const Log log = ReadCarmenLog(path, {});
+  OdometryRefiner refiner(OdometryRefinementOptions{});
+  std::vector<Pose2> motions;
+  Pose2 last = Pose2::Zero();
+  for (std::size_t i = begin; i < end; ++i) {
+    const Pose2 pose = refiner.Process(log.scans[i]).pose;
+    motions.push_back(Between(last, pose));
+    last = pose;
+  }
+  return motions;
+}
+
+// On the way into an office little is seen that was seen before. The returns
+// that find a partner slide along it, 0.35 m to the side between two scans.
+TEST(OdometryRefinerTest, FewReturnsInCommonDoNotSlide) {
+  for (const std::size_t begin : {1200, 1300, 1400, 1450, 1500, 1550}) {
+    const std::vector<Pose2> motions = MotionsOfFr079(begin, 1613);
+    if (motions.empty()) GTEST_SKIP() << "fr079 is not there";
+    for (std::size_t i = 1595; i < 1611; ++i) {
+      EXPECT_NEAR(motions[i - begin][0], 0.107, 0.06) << begin << " " << i;
+      EXPECT_NEAR(motions[i - begin][1], 0.0, 0.06) << begin << " " << i;
+    }
+  }
+}
+
+// The robot backs while its odometry has it go forwards, which it does for
+// some scans before its odometry is not believed any more.
+TEST(OdometryRefinerTest, BacksWhileOdometryGoesForwards) {
+  for (const std::size_t begin : {1000, 1200, 1250, 1300, 1350}) {
+    const std::vector<Pose2> motions = MotionsOfFr079(begin, 1426);
+    if (motions.empty()) GTEST_SKIP() << "fr079 is not there";
+    for (std::size_t i = 1406; i < 1426; ++i) {
+      EXPECT_NEAR(motions[i - begin][0], -0.107, 0.06) << begin << " " << i;
+      EXPECT_NEAR(motions[i - begin][1], 0.0, 0.04) << begin << " " << i;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -421,6 +421,23 @@ TEST(ScanMatcherTest, PriorPullsOnlyWhereTheReturnsAreSilent) {
   EXPECT_LT((match.pose - Pose2(0.1, 0.1, 0.1)).norm(), 0.01);
 }
 
+TEST(ScanMatcherTest, APriorThatHoldsDoesNotLetGo) {
+  ScanMatcher matcher(MatcherOptions());
+  matcher.SetReference(
+      PointsOf(MakeScan(Room(8.0, 6.0), Pose2::Zero(), FullCircle())));
+  const Pose2 truth(0.2, -0.1, 0.0);
+  const std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(Room(8.0, 6.0), truth, FullCircle()));
+  MatchPrior prior;
+  prior.pose = Pose2::Zero();
+  prior.information = Eigen::Matrix3d::Identity() * 1e6;
+  const MatchResult free = matcher.Refine(scan, truth, prior);
+  EXPECT_LT((free.pose - truth).norm(), 0.01);
+  prior.is_heavy_tailed = false;
+  const MatchResult held = matcher.Refine(scan, truth, prior);
+  EXPECT_GT((held.pose - truth).norm(), 0.1);
+}
+
 TEST(ScanMatcherTest, InformationAndCovarianceAreSymmetricPositive) {
   ScanMatcher matcher(MatcherOptions());
   matcher.SetReference(Seen(RoomWithPillar(), Pose2::Zero()));

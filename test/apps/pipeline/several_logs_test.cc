@@ -388,7 +388,7 @@ TEST_F(SeveralLogsTest, ADoorThatMovedIsAnotherBuildingUnlessSomebodyKnows) {
 TEST_F(SeveralLogsTest, CorridorsThatLookAlikeAreKeptApart) {
   const Log one = NichedCorridor(
       0.25, {5.35, 7.01, 9.6, 14.69, 18.05, 20.33, 24.3, 28.96, 33.5, 36.68},
-      {4.99, 9.99, 13.84, 17.1, 20.81, 22.44, 24.14, 28.8, 34.73}, false, 1);
+      {4.99, 9.99, 13.84, 17.1, 20.81, 22.44, 24.14, 28.8, 34.73}, false, 3);
   const Log other = NichedCorridor(0.4,
                                    {3.19, 7.5, 10.55, 12.37, 14.59, 18.46,
                                     20.72, 23.44, 28.15, 31.69, 34.64, 38.27},

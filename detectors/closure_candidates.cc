@@ -10,7 +10,7 @@ namespace {
 
 // Wider searches wait until the narrowest are done; this much wider is the
 // same.
-constexpr double kSameWidth = 1.5;
+constexpr double kSameWidth = 2.0;
 
 }  // namespace
 

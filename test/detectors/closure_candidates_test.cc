@@ -31,17 +31,17 @@ TEST_F(ClosureCandidatesTest, TheNarrowestSearchesComeFirst) {
   const WallGraph walls(graph_);
   ClosureCandidates candidates(&walls);
   EXPECT_TRUE(candidates.Add(0, 1, WallMatch(), 2.0, 5.0));
-  EXPECT_TRUE(candidates.Add(2, 3, WallMatch(), 2.9, 9.0));
-  EXPECT_TRUE(candidates.Add(4, 5, WallMatch(), 3.1, 20.0));
+  EXPECT_TRUE(candidates.Add(2, 3, WallMatch(), 3.9, 9.0));
+  EXPECT_TRUE(candidates.Add(4, 5, WallMatch(), 4.1, 20.0));
   DetectionCounts counts;
   DetectionScope scope;
   scope.counts = &counts;
-  // Up to half as wide again is the same; the larger evidence first.
+  // Up to twice as wide is the same; the larger evidence first.
   EXPECT_THAT(Pairs(candidates.Choose(0.7, scope)),
               ElementsAre(WallPair{2, 3}, WallPair{0, 1}));
   EXPECT_EQ(counts["candidates"], 3);
   EXPECT_EQ(counts["candidates refused: wider search than the narrowest"], 1);
-  EXPECT_THAT(Pairs(candidates.Choose(3.5, scope)),
+  EXPECT_THAT(Pairs(candidates.Choose(4.5, scope)),
               ElementsAre(WallPair{4, 5}, WallPair{2, 3}, WallPair{0, 1}));
 }
 

@@ -2,10 +2,10 @@
 #define PLUMBLINE_OUTPUTS_BUILDING_FRAME_H_
 
 #include <plumbline/core/graph.h>
+#include <plumbline/core/rigid_motion.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/map_without_structure.h>
 
-#include <memory>
 #include <vector>
 
 namespace plumbline {
@@ -18,18 +18,7 @@ namespace plumbline {
 /// walls.
 Pose2 BuildingFrame(const Graph& graph, const std::vector<Pose2>& path);
 
-/// A feature moved rigidly: its anchor, its position and its angles. Throws
-/// Error for types that it does not know how to move: those that neither begin
-/// with a position, nor refer to an anchor, nor consist of angles, nor are a
-/// single measure (a thickness), which stays.
-Feature Moved(const Pose2& by, Feature feature);
-
-/// A copy of a graph with all features moved, under the same ids. Measurements
-/// between features stay as they are. Throws Error as the other Moved does, and
-/// for live relations of a single feature, which tie it to the map frame.
-std::unique_ptr<Graph> Moved(const Pose2& by, const Graph& graph);
-
-/// A map without structure moved. Throws Error as above.
+/// A map without structure moved. Throws Error as Moved of a feature does.
 MapWithoutStructure Moved(const Pose2& by, MapWithoutStructure map);
 
 }  // namespace plumbline

@@ -104,6 +104,8 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
 // of them make.
 struct LogSolver::Context : LogRun {
   SecondMap second;
+  // False where the frame is that of another log.
+  bool has_own_frame = true;
 
   Context(const std::vector<Scan>& all_scans, const RunControl& run_control,
           LogSolver* solver)
@@ -393,6 +395,7 @@ LogSolverResult LogSolver::GoOn(const std::vector<Scan>& scans,
   is_finished_ = true;
   builder_.reset();
   Context context(scans, control, this);
+  context.has_own_frame = false;
   context.result = std::move(first);
   context.second.SetFirstLength(wall_length);
   for (const KeyScanRecord& record : context.result.records) {
@@ -503,6 +506,7 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Stage end,
     if (RecoversPoses(options_)) BringPosesBack(context);
     FindScansAgain(context);
     CompleteWalls(context);
+    BeginAtOdometry(context);
     BeginStage(stage = Stage::kAdjustPoses, context);
   }
   if (stage == Stage::kAdjustPoses && stage != end) {
@@ -659,6 +663,23 @@ void LogSolver::CompleteWalls(Context* context) {
   FindScansAgain(context);
 }
 
+// The frame is that of the first pose, where odometry has it. While the map
+// grew a wall that the first scan saw held it, whose direction that scan alone
+// tells to a few tenths of a degree: the whole map would be turned by as much.
+void LogSolver::BeginAtOdometry(Context* context) {
+  LogSolverResult& result = context->result;
+  if (!context->has_own_frame || options_.refine == Refinement::kNone ||
+      result.records.empty() || result.trajectory.empty()) {
+    return;
+  }
+  const auto first = static_cast<std::size_t>(result.records.front().scan);
+  const Pose2 by =
+      Compose(result.refined[first].pose, Inverse(result.trajectory[first]));
+  if (!map_.Move(by)) return;
+  for (Pose2& pose : result.trajectory) pose = Compose(by, pose);
+  for (Pose2& pose : context->keys) pose = Compose(by, pose);
+}
+
 void LogSolver::AdjustPoses(Context* context) {
   if (options_.refine != Refinement::kFull || context->IsStopped()) return;
   const ScopedTimer timer(&context->result.adjustment_seconds);
@@ -686,6 +707,7 @@ void LogSolver::AdjustWalls(Context* context) {
   }
   BringPosesBack(context);
   FindScansAgain(context);
+  BeginAtOdometry(context);
 }
 
 void LogSolver::FindStructureAgain(Context* context) {

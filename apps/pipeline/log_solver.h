@@ -305,6 +305,7 @@ class LogSolver {
   void CloseLoops(Context* context);
   void BringPosesBack(Context* context);
   void FindScansAgain(Context* context);
+  void BeginAtOdometry(Context* context);
   void CompleteWalls(Context* context);
   // The second map, in three stages.
   void AdjustPoses(Context* context);

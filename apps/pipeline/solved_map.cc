@@ -1,3 +1,5 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/rigid_motion.h>
 #include <plumbline/core/transaction.h>
 #include <plumbline/pipeline/map_state.h>
 #include <plumbline/pipeline/solved_map.h>
@@ -73,6 +75,21 @@ void SolvedMap::Clear() {
     clear.RemoveFeature(feature->id);
   }
   graph_->Apply(std::move(clear));
+}
+
+bool SolvedMap::Move(const Pose2& by) {
+  std::unique_ptr<Graph> moved;
+  try {
+    moved = Moved(by, *graph_);
+  } catch (const Error&) {
+    return false;
+  }
+  for (Feature* feature : graph_->MutableFeatures()) {
+    const Feature& there = moved->GetFeature(feature->id);
+    feature->parameters = there.parameters;
+    feature->anchor = there.anchor;
+  }
+  return true;
 }
 
 void SolvedMap::WriteGraph(StateWriter* state) const {

@@ -8,6 +8,7 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/core/session.h>
 #include <plumbline/core/state_archive.h>
+#include <plumbline/factors/pose2.h>
 
 #include <memory>
 #include <vector>
@@ -54,6 +55,11 @@ class SolvedMap {
   void StartOver();
   /// Takes everything out of the graph, which stays the same one.
   void Clear();
+
+  /// Moves all features rigidly. False, and nothing is done, where something
+  /// cannot be moved (rigid_motion.h): a relation to the map frame, a plug-in's
+  /// feature. The session has to be renewed.
+  bool Move(const Pose2& by);
 
   /// The graph alone, as it stands.
   void WriteGraph(StateWriter* state) const;

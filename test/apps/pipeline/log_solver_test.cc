@@ -65,6 +65,22 @@ LogSolverOptions Points() {
   return options;
 }
 
+// Where odometry begins, not where the first scan's best wall would have it.
+TEST_F(LogSolverTest, TheFrameIsThatOfTheFirstPose) {
+  Log log = Office(300);
+  for (Scan& scan : log.scans) {
+    scan.odometry = Compose(Pose2(3.0, -2.0, 1.0), scan.odometry);
+  }
+  for (const Refinement refine :
+       {Refinement::kFull, Refinement::kMap, Refinement::kNone}) {
+    LogSolverOptions options;
+    options.refine = refine;
+    LogSolver solver(registry_, options);
+    const Pose2 first = solver.Run(log).trajectory.front();
+    EXPECT_LT(Between(log.scans.front().odometry, first).norm(), 1e-9);
+  }
+}
+
 TEST_F(LogSolverTest, GoesOnFromEveryStateToTheSameBytes) {
   const Log log = Office(500);
   for (const Refinement refine : {Refinement::kFull, Refinement::kMap}) {
@@ -284,8 +300,14 @@ TEST_F(LogSolverTest, ASecondMapWithoutWallsIsRefused) {
   LogSolver first(registry_, first_only);
   const LogSolverResult without = first.Run(Office(250));
   EXPECT_FALSE(without.second_map_refused);
-  EXPECT_EQ(Json(solver.graph()), Json(first.graph()));
-  EXPECT_EQ(result.trajectory, without.trajectory);
+  EXPECT_EQ(solver.graph().num_features(), first.graph().num_features());
+  EXPECT_EQ(solver.graph().num_constraints(), first.graph().num_constraints());
+  // But for rounding: the one is moved to where odometry begins once more.
+  ASSERT_EQ(result.trajectory.size(), without.trajectory.size());
+  for (std::size_t i = 0; i < result.trajectory.size(); ++i) {
+    EXPECT_LT(Between(result.trajectory[i], without.trajectory[i]).norm(),
+              1e-5);
+  }
 }
 
 // A corridor of 80 m whose walls turn by 0.25 degrees every 5 m: the two
@@ -426,7 +448,7 @@ TEST_F(LogSolverTest, PosesAreAdjustedFromWhereLessContradicts) {
   EXPECT_TRUE(result.loose.empty());
   // Without looking it does not notice.
   options.check_map = false;
-  EXPECT_GT(error(solve()), 0.2);
+  EXPECT_GT(error(solve()), 0.1);
 }
 
 TEST_F(LogSolverTest, TellsOfATrackThatHangsByAGuess) {

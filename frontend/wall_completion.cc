@@ -1,6 +1,7 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/wall.h>
 #include <plumbline/frontend/cell_index.h>
+#include <plumbline/frontend/driven_way.h>
 #include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/return_cells.h>
 #include <plumbline/frontend/wall_completion.h>
@@ -34,6 +35,8 @@ constexpr std::uint8_t kSpentBy = 3;
 constexpr double kSpentScatters = 2.0;
 constexpr double kSpentTurn = DegToRad(5.0);
 constexpr std::size_t kWordBits = 64;
+// Where the robot went through, and this far to either side, m, no wall stands.
+constexpr double kHalfRobot = 0.15;
 // Standard deviations of a range at which a return is no longer one of a wall.
 constexpr double kExplainedSigmas = 5.0;
 
@@ -181,8 +184,8 @@ class WallGrower {
 
   // Of walls whose cells scatter by at most `scatter`, m.
   WallGrower(const WallCompletionOptions& options, double scatter,
-             const ReturnCells& returns)
-      : options_(options), scatter_(scatter), returns_(returns) {
+             const ReturnCells& returns, const DrivenWay& way)
+      : options_(options), scatter_(scatter), returns_(returns), way_(way) {
     kinks_.min_turn = options.min_kink;
     kinks_.min_sigmas = options.kink_sigmas;
     kinks_.min_length = options.min_length;
@@ -201,26 +204,11 @@ class WallGrower {
     CollectInLine(seed, &line, scratch);
     wall.cells = FitFinally(scratch->members, &line);
     scratch->line = line;
-    const std::vector<int>& on = wall.cells;
-    if (on.empty() || line.across > scatter_ * scatter_) return std::nullopt;
-    std::vector<double> places;
-    for (const int index : on) {
-      places.push_back(line.Along(Of(index).mean));
-      wall.view += Of(index).view;
+    while (IsWall(&wall)) {
+      if (!CutWhereDriven(&wall)) return wall;
+      wall.cells = FitFinally(wall.cells, &line);
     }
-    std::sort(places.begin(), places.end());
-    const double length = places.back() - places.front();
-    if (length < options_.min_length || !IsCovered(places)) return std::nullopt;
-    // The direction must be as certain as that of any other wall.
-    const double end_variance = line.across * length * length /
-                                (static_cast<double>(on.size()) * line.along);
-    if (end_variance > options_.max_end_sigma * options_.max_end_sigma *
-                           (scatter_ / options_.max_scatter)) {
-      return std::nullopt;
-    }
-    wall.begin = places.front();
-    wall.end = places.back();
-    return wall;
+    return std::nullopt;
   }
 
   // After Grow came to nothing: the cells from which it would most likely come
@@ -240,6 +228,55 @@ class WallGrower {
  private:
   const ReturnCells::Cell& Of(int index) const {
     return returns_.cells()[index];
+  }
+
+  // Whether the cells that a line was fitted to are long, whole and straight
+  // enough: takes its ends and its view from them.
+  bool IsWall(GrownWall* wall) const {
+    const GrownLine& line = wall->line;
+    const std::vector<int>& on = wall->cells;
+    if (on.empty() || line.across > scatter_ * scatter_) return false;
+    std::vector<double> places;
+    wall->view.setZero();
+    for (const int index : on) {
+      places.push_back(line.Along(Of(index).mean));
+      wall->view += Of(index).view;
+    }
+    std::sort(places.begin(), places.end());
+    const double length = places.back() - places.front();
+    if (length < options_.min_length || !IsCovered(places)) return false;
+    wall->begin = places.front();
+    wall->end = places.back();
+    // The direction must be as certain as that of any other wall.
+    const double end_variance = line.across * length * length /
+                                (static_cast<double>(on.size()) * line.along);
+    return end_variance <= options_.max_end_sigma * options_.max_end_sigma *
+                               (scatter_ / options_.max_scatter);
+  }
+
+  // Leaves the longest of the pieces between which the robot went through;
+  // false when it went nowhere through the wall.
+  bool CutWhereDriven(GrownWall* wall) const {
+    const GrownLine& line = wall->line;
+    const std::vector<double> cuts =
+        way_.Crossings(line.point(), line.direction, wall->begin, wall->end);
+    if (cuts.empty()) return false;
+    double begin = wall->begin;
+    Interval longest(begin, begin);
+    const auto take = [&](double end, double next) {
+      if (end - begin > longest.second - longest.first) longest = {begin, end};
+      begin = next;
+    };
+    for (const double cut : cuts) take(cut - kHalfRobot, cut + kHalfRobot);
+    take(wall->end, wall->end);
+    wall->cells.erase(
+        std::remove_if(wall->cells.begin(), wall->cells.end(),
+                       [&](int index) {
+                         const double along = line.Along(Of(index).mean);
+                         return along < longest.first || along > longest.second;
+                       }),
+        wall->cells.end());
+    return true;
   }
 
   // Cells in line with the seed, each within the gap of another one, become the
@@ -361,6 +398,7 @@ class WallGrower {
   const WallCompletionOptions& options_;
   const double scatter_;
   const ReturnCells& returns_;
+  const DrivenWay& way_;
   WallKinkOptions kinks_;
 };
 
@@ -368,11 +406,12 @@ class Completion {
  public:
   Completion(const Graph& graph, const Registry& registry,
              const WallCompletionOptions& options,
-             const std::function<bool()>& stop)
+             const std::vector<Pose2>& poses, const std::function<bool()>& stop)
       : registry_(registry),
         options_(options),
         stop_(stop),
         team_(options.num_threads),
+        way_(poses),
         index_(graph, options.explained_gap),
         returns_(options.cell_size, options.normal_radius, options.max_gap) {}
 
@@ -459,8 +498,9 @@ class Completion {
                  : a < b;
     });
     for (const double smear : smears) {
-      GrowAll(WallGrower(options_, smear * options_.max_scatter, returns_),
-              order);
+      GrowAll(
+          WallGrower(options_, smear * options_.max_scatter, returns_, way_),
+          order);
       if (is_stopped_) return;
     }
   }
@@ -695,6 +735,7 @@ class Completion {
   ThreadTeam team_;
   bool is_stopped_ = false;
   double stray_share_ = 0.0;
+  DrivenWay way_;
   WallIndex index_;
   ReturnCells returns_;
   std::vector<WallGrower::Scratch> scratch_;
@@ -721,7 +762,7 @@ Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
                               const std::vector<Pose2>& poses,
                               const WallCompletionOptions& options,
                               const std::function<bool()>& stop) {
-  return Completion(graph, registry, options, stop).Run(scans, poses);
+  return Completion(graph, registry, options, poses, stop).Run(scans, poses);
 }
 
 }  // namespace plumbline

@@ -66,6 +66,32 @@ double AxisDistance(double direction) {
   return std::abs(std::remainder(direction, 0.5 * kPi));
 }
 
+// A door that was shut in the wall of the room when it was seen, and that the
+// robot went through later: no wall stands there.
+TEST_F(WallCompletionTest, NoWallStandsWhereTheRobotWentThrough) {
+  const Scan empty = [this] {
+    Scan scan = scans_.back();
+    for (float& range : scan.ranges) range = 0.0f;
+    return scan;
+  }();
+  for (int i = 1; i <= 300; ++i) {
+    // Through the door to the room, and through its wall.
+    poses_.emplace_back(i <= 80 ? 4.0 - 0.05 * i : 0.0,
+                        i <= 80 ? 0.0 : 0.03 * (i - 80), 0.0);
+    scans_.push_back(empty);
+  }
+  const Transaction walls =
+      FindGlimpsedWalls(graph_, registry_, scans_, poses_, options_);
+  double length = 0.0;
+  for (const Feature& wall : walls.added_features()) {
+    if (std::abs(wall.parameters[1] - 4.0) > 0.1) continue;
+    length += wall.extent_end - wall.extent_begin;
+    const double half = 0.5 * (wall.extent_end - wall.extent_begin);
+    EXPECT_GT(std::abs(wall.parameters[0]) - half, 0.1);
+  }
+  EXPECT_GT(length, 1.5);
+}
+
 // Two walls that meet at 2 degrees, 4 and 6 m long, lie within the scatter of
 // one line: they are two all the same. A straight one stays one.
 TEST(WallCompletionKinkTest, AWallIsCutAtAKink) {

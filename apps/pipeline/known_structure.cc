@@ -30,6 +30,19 @@ constexpr double kLooseDistance = 100.0;
 constexpr double kLooseTurn = 1.0;
 // A statement names the wall nearest to a point within this, m.
 constexpr double kNearestWall = 1.0;
+// Two lines of the plan that run beside each other, so far apart, m, are the
+// faces of one wall, and what lies between them is its body.
+constexpr double kLeastThickness = 0.04;
+constexpr double kMostThickness = 0.5;
+constexpr double kSameThickness = 0.02;
+constexpr double kParallel = DegToRad(1.0);
+// A part of a face has its body on a side where so much of it has another face
+// there, at least, and so little on the other side, at most.
+constexpr double kBesideBody = 0.5;
+constexpr double kBesideNone = 0.2;
+// A line that lies this far in front of a wall, m, more than the map may be
+// off, was looked through by who saw the wall.
+constexpr double kInFront = 0.1;
 // Lines of the plan that notes list, longest first.
 constexpr std::size_t kShownLines = 8;
 
@@ -131,7 +144,103 @@ KnownStructureBinder::KnownStructureBinder(const KnownStructure& known,
       registry_(registry),
       first_pose_(first_pose),
       graph_(graph),
+      faces_(FacesBeside(known.plan)),
       notes_(known.notes) {}
+
+// A part of a line that has another one beside it.
+struct KnownStructureBinder::FacePair {
+  std::size_t line;
+  std::size_t other;
+  Interval part;
+  // To the left.
+  double across;
+  double thickness() const { return std::abs(across); }
+  bool Has(std::size_t i) const { return line == i || other == i; }
+};
+
+std::vector<KnownStructureBinder::FacePair> KnownStructureBinder::FacePairs(
+    const std::vector<PlanLine>& plan) {
+  std::vector<Wall> lines;
+  for (const PlanLine& line : plan) lines.push_back(MakePlanWall(line));
+  std::vector<FacePair> pairs;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const Wall& line = lines[i];
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+      const Wall& other = lines[k];
+      if (std::abs(NormalizeAxial(line.angle - other.angle)) > kParallel) {
+        continue;
+      }
+      Interval part = line.IntervalOf(other);
+      part = {std::max(part.first, line.begin),
+              std::min(part.second, line.end)};
+      if (part.second <= part.first) continue;
+      // Where they lie beside each other: far off a small turn is much.
+      const Eigen::Vector2d middle = line.At(0.5 * (part.first + part.second));
+      const FacePair pair = {i, k, part,
+                             line.Across(other.At(other.Along(middle)))};
+      if (pair.thickness() >= kLeastThickness &&
+          pair.thickness() <= kMostThickness) {
+        pairs.push_back(pair);
+      }
+    }
+  }
+  return pairs;
+}
+
+std::vector<KnownStructureBinder::Faces> KnownStructureBinder::FacesBeside(
+    const std::vector<PlanLine>& plan) {
+  const std::vector<FacePair> pairs = FacePairs(plan);
+  std::vector<const FacePair*> by_thickness;
+  for (const FacePair& pair : pairs) by_thickness.push_back(&pair);
+  std::sort(by_thickness.begin(), by_thickness.end(),
+            [](const FacePair* a, const FacePair* b) {
+              return a->thickness() < b->thickness();
+            });
+  // A line that is wrong makes a wall of a thickness that no other one has.
+  const auto is_usual = [&by_thickness](const FacePair& pair) {
+    auto same = std::lower_bound(
+        by_thickness.begin(), by_thickness.end(),
+        pair.thickness() - kSameThickness,
+        [](const FacePair* a, double least) { return a->thickness() < least; });
+    for (; same != by_thickness.end() &&
+           (*same)->thickness() <= pair.thickness() + kSameThickness;
+         ++same) {
+      if (!(*same)->Has(pair.line) && !(*same)->Has(pair.other)) return true;
+    }
+    return false;
+  };
+  std::vector<Faces> all(plan.size());
+  for (const FacePair& pair : pairs) {
+    if (!is_usual(pair)) continue;
+    Faces& faces = all[pair.line];
+    (pair.across > 0.0 ? faces.left : faces.right).push_back(pair.part);
+  }
+  for (Faces& faces : all) {
+    std::sort(faces.left.begin(), faces.left.end());
+    std::sort(faces.right.begin(), faces.right.end());
+  }
+  return all;
+}
+
+int KnownStructureBinder::SeenFrom(std::size_t line,
+                                   const Interval& part) const {
+  // Of intervals in ascending order, which may overlap.
+  const auto share = [&part](const std::vector<Interval>& intervals) {
+    double covered = 0.0;
+    double end = part.first;
+    for (const Interval& interval : intervals) {
+      const double begin = std::max(end, interval.first);
+      end = std::max(end, std::min(part.second, interval.second));
+      covered += std::max(0.0, end - begin);
+    }
+    return covered / (part.second - part.first);
+  };
+  const double left = share(faces_[line].left);
+  const double right = share(faces_[line].right);
+  if (right >= kBesideBody && left <= kBesideNone) return 1;
+  if (left >= kBesideBody && right <= kBesideNone) return -1;
+  return 0;
+}
 
 std::vector<KnownStructureBinder::MapWall> KnownStructureBinder::Walls() const {
   const FeatureType& segment = registry_.GetFeature("segment");
@@ -244,12 +353,18 @@ bool KnownStructureBinder::AddPlan(const std::function<bool()>& stop) {
 
 // How a wall lies beside a line of the plan. m and rad.
 struct KnownStructureBinder::SideBySide {
-  // Of what both have; negative for the gap between them.
+  // What both have, along the line from its middle; its length, m, is negative
+  // for the gap between them.
+  Interval part;
   double length = 0.0;
+  // 1, or -1 where the wall's direction runs against the line's.
+  int sense = 1;
   // The middle of that, along the wall from its position.
   double along_wall = 0.0;
   // How far off the wall lies there, to either side, and how far it is turned.
   double offset = 0.0;
+  // How far in front of the wall the line lies there, as who saw it looks.
+  double in_front = 0.0;
   double turn = 0.0;
 };
 
@@ -264,9 +379,13 @@ KnownStructureBinder::SideBySide KnownStructureBinder::Compare(
   begin = std::max(begin, line.begin);
   end = std::min(end, line.end);
   SideBySide both;
+  both.part = {begin, end};
+  both.sense = sense < 0.0 ? -1 : 1;
   both.length = end - begin;
   both.along_wall = sense * (0.5 * (begin + end) - in_line[0]);
-  both.offset = std::abs(in_line[1] + both.along_wall * std::sin(in_line[2]));
+  const double across = in_line[1] + both.along_wall * std::sin(in_line[2]);
+  both.offset = std::abs(across);
+  both.in_front = -sense * across;
   both.turn = std::abs(NormalizeAxial(in_line[2]));
   return both;
 }
@@ -289,6 +408,8 @@ KnownStructureBinder::NearestLine(const MapWall& wall,
         both.length < 0.5 * std::min(wall.length(), line.length())) {
       continue;
     }
+    // The other face of its wall: nobody sees it from there.
+    if (SeenFrom(i, both.part) == -both.sense) continue;
     // Let go while a wrong tie pulled at the plan, it may agree by now.
     const bool agrees = both.offset < known_.plan_sigma_offset &&
                         both.turn < known_.plan_sigma_angle;
@@ -363,7 +484,8 @@ int KnownStructureBinder::TieToPlan(const std::function<bool()>& stop) {
   return static_cast<int>(added.size());
 }
 
-// A line of the plan that no wall is tied to, and what was let go from it.
+// A line of the plan that no wall is tied to, and what was let go from it or
+// seen behind it.
 struct KnownStructureBinder::LetGo {
   // Its length that walls lie beside, m.
   double beside = 0.0;
@@ -380,11 +502,17 @@ KnownStructureBinder::LinesLetGo(const std::set<std::size_t>& kept,
   const Pose2 plan_pose(plan.parameters[0], plan.parameters[1],
                         plan.parameters[2]);
   for (const MapWall& wall : Walls()) {
-    if (tied.count(wall.id) > 0) continue;
     const Pose2 in_plan = Between(plan_pose, wall.pose());
     for (std::size_t i = 0; i < known_.plan.size(); ++i) {
-      if (kept.count(i) > 0 || ties_.count({wall.id, i}) == 0) continue;
+      if (kept.count(i) > 0) continue;
       SideBySide both = Compare(MakePlanWall(known_.plan[i]), wall, in_plan);
+      const bool was_let_go =
+          tied.count(wall.id) == 0 && ties_.count({wall.id, i}) > 0;
+      // Who saw the wall looked through the line.
+      const bool is_through =
+          both.length > 0.0 && both.turn < known_.max_angle &&
+          both.in_front > kInFront && both.in_front < known_.max_offset;
+      if (!was_let_go && !is_through) continue;
       both.length = std::max(0.0, both.length);
       LetGo& line = let_go[i];
       line.beside += both.length;

@@ -133,6 +133,7 @@ class KnownStructureBinder {
   struct SideBySide;
   struct LineBeside;
   struct LetGo;
+  struct FacePair;
   std::vector<MapWall> Walls() const;
   const MapWall* WallAt(const std::vector<MapWall>& walls,
                         const Eigen::Vector2d& point) const;
@@ -147,8 +148,9 @@ class KnownStructureBinder {
                                         const Pose2& in_plan) const;
   Constraint MakeTie(const MapWall& wall, const Pose2& in_plan,
                      const LineBeside& beside) const;
-  // Lines of the plan that no wall is tied to any more, by what walls that have
-  // no other line show of them. `kept` and `tied`: lines and walls with ties
+  // Lines of the plan that no wall is tied to, by what walls show of them that
+  // were let go from them and have no other line, and walls that were seen
+  // behind them. `kept` and `tied`: lines and walls with ties
   // that hold.
   std::map<std::size_t, LetGo> LinesLetGo(
       const std::set<std::size_t>& kept, const std::set<FeatureId>& tied) const;
@@ -156,10 +158,25 @@ class KnownStructureBinder {
   void NoteLinesLetGo(const std::map<std::size_t, LetGo>& let_go,
                       std::vector<std::string>* notes) const;
 
+  // Parts of a line of the plan, along it from its middle, that have another
+  // face of a wall beside them, ascending.
+  struct Faces {
+    std::vector<Interval> left;
+    std::vector<Interval> right;
+  };
+  static std::vector<FacePair> FacePairs(const std::vector<PlanLine>& plan);
+  static std::vector<Faces> FacesBeside(const std::vector<PlanLine>& plan);
+  // The side from which a part of a line is seen, as the wall's other face lies
+  // on the other: 1 for the left, -1 for the right, 0 where the plan does not
+  // tell.
+  int SeenFrom(std::size_t line, const Interval& part) const;
+
   const KnownStructure& known_;
   const Registry& registry_;
   FeatureId first_pose_;
   Graph* graph_;
+  // By line of the plan.
+  std::vector<Faces> faces_;
   FeatureId plan_pose_ = kNoId;
   bool was_placed_ = false;
   // By wall and line.

@@ -21,6 +21,14 @@ constexpr double kDeltaChange = 1e-6;
 // its sake costs as much as any.
 constexpr double kNegligible = 1e-4;
 
+// When an iteration looks for structure.
+enum class Detection {
+  kAlways,
+  // Once something was broken or dropped in it.
+  kAfterBreaks,
+  kNever,
+};
+
 // What a detector of a level may look at in a scope: features of the level, and
 // those of lower ones.
 struct FeaturesByLevel {
@@ -98,17 +106,28 @@ struct EmOrchestrator::Impl final : public GraphListener {
     schedule.BeginLoop();
     double cost = cost_now();
     bool has_converged = false;
+    bool may_be_quiet = false;
     for (int i = 0; i < options.max_iterations; ++i) {
       if (is_stopped || has_converged) break;
       const int changes_before = census.num_changes();
-      const bool has_changed = Iterate(nullptr, /*detects=*/true);
-      const double last_cost = std::exchange(cost, cost_now());
+      bool has_changed = Iterate(
+          nullptr, may_be_quiet ? Detection::kAfterBreaks : Detection::kAlways);
+      const bool has_looked = has_changed || !may_be_quiet;
+      double last_cost = std::exchange(cost, cost_now());
+      // While weights settle that break nothing there is nothing new to find.
+      // It does not end before somebody has looked.
+      if (!has_looked && !is_stopped && IsSteady(last_cost, cost)) {
+        EmScope whole = MakeEmScope(*graph, nullptr);
+        has_changed = FindStructure(&whole);
+        last_cost = std::exchange(cost, cost_now());
+      }
       has_converged =
           !is_stopped && schedule.is_usable() &&
           IsSettled(has_changed, census.num_changes() - changes_before) &&
           IsSteady(last_cost, cost);
       // What came last has not been judged.
-      if (has_converged && has_changed) Iterate(nullptr, /*detects=*/false);
+      if (has_converged && has_changed) Iterate(nullptr, Detection::kNever);
+      may_be_quiet = !has_changed;
     }
     if (!is_stopped && schedule.BeginFinal()) OptimizeWhole("final");
     schedule.EndRun();
@@ -129,17 +148,26 @@ struct EmOrchestrator::Impl final : public GraphListener {
   // 3. for each level find structure, add it, optimize with it.
   //
   // True when something came or went.
-  bool Iterate(const std::vector<FeatureId>* features, bool detects) {
+  bool Iterate(const std::vector<FeatureId>* features, Detection detection) {
     ++totals.iterations;
     EmScope scope = MakeEmScope(*graph, features);
     OptimizeForJudgement(scope);
     if (is_stopped) return false;
     bool has_changed = BreakAndDrop(&scope);
-    const int levels = detects ? static_cast<int>(hierarchy.size()) : 0;
-    for (int level = 0; level < levels && !is_stopped; ++level) {
-      if (FindStructure(level, &scope)) has_changed = true;
-    }
+    const bool detects = detection == Detection::kAlways ||
+                         (detection == Detection::kAfterBreaks && has_changed);
+    if (detects && FindStructure(&scope)) has_changed = true;
     return has_changed;
+  }
+
+  // Of all levels; true when there was something.
+  bool FindStructure(EmScope* scope) {
+    bool has_found = false;
+    const int levels = static_cast<int>(hierarchy.size());
+    for (int level = 0; level < levels && !is_stopped; ++level) {
+      if (FindStructure(level, scope)) has_found = true;
+    }
+    return has_found;
   }
 
   // x <- optimize(graph), as a phase of its own.
@@ -396,7 +424,7 @@ bool EmOrchestrator::Iterate(const std::vector<FeatureId>* scope) {
   impl_->is_stopped = false;
   // Parameters may have been changed without the graph's knowledge.
   impl_->schedule.MarkDirty();
-  return impl_->Iterate(scope, /*detects=*/true);
+  return impl_->Iterate(scope, Detection::kAlways);
 }
 
 EmReport EmOrchestrator::Run(const std::function<bool()>& stop) {

@@ -106,6 +106,8 @@ class EmOrchestrator {
   bool Iterate(const std::vector<FeatureId>* scope = nullptr);
 
   /// Iterates on the whole graph until it has converged (or max_iterations).
+  /// After an iteration in which nothing came or went the detectors look again
+  /// once something breaks, and in any case before it ends.
   /// The first solve has the measurements only, unless structure is live
   /// already. `stop` is asked after every phase, every step of a solve, and by
   /// detectors that take long; once it has returned true the loop ends within

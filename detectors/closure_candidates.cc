@@ -37,14 +37,18 @@ bool ClosureCandidates::Add(int first, int second, const WallMatch& match,
   return true;
 }
 
-std::vector<ClosureCandidate> ClosureCandidates::Choose(
-    double width, const DetectionScope& scope) const {
+double ClosureCandidates::Widest(double width) const {
   double narrowest = std::numeric_limits<double>::infinity();
   for (const auto& [pair, candidate] : candidates_) {
     if (walls_->WasBroken(pair)) continue;
     narrowest = std::min(narrowest, candidate.search);
   }
-  const double widest = std::max(width, kSameWidth * narrowest);
+  return std::max(width, kSameWidth * narrowest);
+}
+
+std::vector<ClosureCandidate> ClosureCandidates::Choose(
+    double width, const DetectionScope& scope) const {
+  const double widest = Widest(width);
   std::vector<ClosureCandidate> chosen;
   for (const auto& [pair, candidate] : candidates_) {
     if (candidate.search <= widest) chosen.push_back(candidate);

@@ -38,8 +38,12 @@ class ClosureCandidates {
   bool Add(int first, int second, const WallMatch& match, double search,
            double evidence);
 
-  /// The candidates of the narrowest searches: up to `width`, m, or a little
-  /// wider than the narrowest where that is more, the largest evidence first.
+  /// The half width, m, up to which searches are proposed together: `width`, or
+  /// twice that of the narrowest where that is more; infinite without
+  /// candidates. Pairs that were broken before do not count.
+  double Widest(double width) const;
+
+  /// The candidates of searches up to Widest, the largest evidence first.
   /// Candidates whose walls earlier ones have already made one are left out.
   /// Pairs that were broken before neither hold up wider searches nor make
   /// other candidates redundant. Counts into `scope`.

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -182,13 +183,19 @@ class Matcher {
     FindCandidates();
   }
 
-  PlaceMatch Match() {
+  PlaceMatch Match(double widest) {
     PlaceMatch result;
     result.outcome = candidates_.empty() ? PlaceMatch::Outcome::kNothingFits
                                          : PlaceMatch::Outcome::kNoNews;
     if (!has_news_) return result;
     if (covariance_(2, 2) > options_.max_turn * options_.max_turn) {
       result.outcome = PlaceMatch::Outcome::kTurnUnknown;
+      return result;
+    }
+    const double narrowest = NarrowestRange();
+    if (narrowest > widest) {
+      result.outcome = PlaceMatch::Outcome::kTooWide;
+      result.search = narrowest;
       return result;
     }
     MeasureCandidates();
@@ -298,6 +305,15 @@ class Matcher {
       }
       rivals_[j] = std::max(1, lines);
     }
+  }
+
+  // Of the walls that have candidates; no match is found in a narrower search.
+  double NarrowestRange() const {
+    double narrowest = std::numeric_limits<double>::infinity();
+    for (std::size_t j = 0; j < second_.size(); ++j) {
+      if (!by_second_[j].empty()) narrowest = std::min(narrowest, ranges_[j]);
+    }
+    return narrowest;
   }
 
   // Walls of the second place whose candidates are tried two at a time: all, or
@@ -638,12 +654,12 @@ class Matcher {
 PlaceMatch MatchPlaces(const std::vector<PlaceWall>& first,
                        const std::vector<PlaceWall>& second,
                        const Vector2d& pivot, const Matrix3d& covariance,
-                       const PlaceMatchOptions& options) {
+                       const PlaceMatchOptions& options, double widest) {
   if (!covariance.allFinite() || covariance.llt().info() != Eigen::Success) {
     throw PLUMBLINE_ERROR("the covariance of a displacement is not one",
                           "a positive definite matrix");
   }
-  return Matcher(first, second, pivot, covariance, options).Match();
+  return Matcher(first, second, pivot, covariance, options).Match(widest);
 }
 
 }  // namespace plumbline

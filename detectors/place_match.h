@@ -5,6 +5,7 @@
 #include <plumbline/factors/angle.h>
 
 #include <Eigen/Core>
+#include <limits>
 #include <vector>
 
 namespace plumbline {
@@ -88,6 +89,8 @@ struct PlaceMatch {
     kTooLittleEvidence,
     /// The turn is hardly known.
     kTurnUnknown,
+    /// Every wall that could be one asks for a wider search than is looked at.
+    kTooWide,
   };
   /// Of this comparison.
   Outcome outcome = Outcome::kMatched;
@@ -100,7 +103,8 @@ struct PlaceMatch {
   std::vector<WallMatch> matches;
   /// Of these matches against chance, nats.
   double evidence = 0.0;
-  /// Half width of the search across the matched walls, the widest, m.
+  /// Half width of the search across the matched walls, the widest, m; of
+  /// kTooWide the least that a match would have.
   double search = 0.0;
 };
 
@@ -131,12 +135,14 @@ struct PlaceMatch {
 /// corridors of one width are common.
 ///
 /// Where all walls that could be one are of one group already, there is nothing
-/// to find and no match is returned.
+/// to find and no match is returned. Nor is where the search would be wider
+/// than `widest` (half width, m) across every one of them.
 PlaceMatch MatchPlaces(const std::vector<PlaceWall>& first,
                        const std::vector<PlaceWall>& second,
                        const Eigen::Vector2d& pivot,
                        const Eigen::Matrix3d& covariance,
-                       const PlaceMatchOptions& options);
+                       const PlaceMatchOptions& options,
+                       double widest = std::numeric_limits<double>::infinity());
 
 }  // namespace plumbline
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <utility>
 
 namespace plumbline {
@@ -17,6 +19,9 @@ using Eigen::Vector2d;
 // Places that are compared by all threads together, and between two questions
 // whether to stop.
 constexpr std::size_t kPlacesAtOnce = 32;
+// Without candidates in searches of the least width those of so many times that
+// are looked at before all others.
+constexpr double kWiden = 6.0;
 // A bound times this is one whatever was rounded.
 constexpr double kOverRounding = 1.0 + 1e-9;
 
@@ -45,22 +50,16 @@ class PlaceSearch {
     for (const WallPlace& place : places_) ++places_in_[parts_[place.anchor]];
   }
 
-  void Run() {
+  // Wider searches are proposed once the narrower ones are done: what they
+  // would find is not looked for before.
+  void Run(double width) {
     MeasureAnchors();
     MeasureWaysFromFirst();
-    // Comparisons change nothing; what they tell is taken in one by one.
-    std::vector<Comparison> compared(kPlacesAtOnce);
-    for (std::size_t i = 0; i < places_.size(); i += kPlacesAtOnce) {
-      if (scope_.ShouldStop()) return;
-      const std::size_t count = std::min(kPlacesAtOnce, places_.size() - i);
-      ParallelFor(count, ThreadsHere(),
-                  [&](std::size_t k) { ComparePlace(i + k, &compared[k]); });
-      for (std::size_t k = 0; k < count; ++k) {
-        totals_ += compared[k].tally;
-        for (const Found& one : compared[k].found) {
-          AddMatches(places_[i + k], one, compared[k].found);
-        }
-      }
+    FindPairs();
+    double up_to = width;
+    while (Compare(up_to) && candidates_.Widest(width) > up_to) {
+      const double widest = candidates_.Widest(width);
+      up_to = std::isfinite(widest) || up_to > width ? widest : kWiden * width;
     }
     scope_.Count("places", static_cast<std::int64_t>(places_.size()));
     scope_.Count("place pairs", totals_.pairs);
@@ -72,6 +71,12 @@ class PlaceSearch {
     scope_.Count("place pairs refused: ambiguous", totals_.ambiguous);
     scope_.Count("place pairs refused: too little evidence", totals_.weak);
     scope_.Count("place pairs refused: turn not known", totals_.turn_unknown);
+    std::int64_t waiting = 0;
+    for (const std::vector<Pair>& pairs : pairs_) {
+      waiting += static_cast<std::int64_t>(pairs.size());
+    }
+    scope_.Count("place pairs refused: wider search than the narrowest",
+                 waiting);
     scope_.Count("wall matches", matches_);
     scope_.Count("wall matches refused: contradicted", contradicted_);
     scope_.Count("wall matches refused: one already", one_already_);
@@ -117,12 +122,77 @@ class PlaceSearch {
     }
   };
 
+  // A place before this one that it is compared with.
+  struct Pair {
+    std::size_t place;
+    // Length of the way between them, m.
+    double way;
+    // Half width, m, that a search has at least.
+    double least;
+  };
+
   // Of one place with those before it.
   struct alignas(kCacheLine) Comparison {
     std::vector<Found> found;
     Tally tally;
     WallWays::Search search;
   };
+
+  // Calls `work(place, comparison)` for these places, by several threads, and
+  // takes in what each found in their order; false when it is time to stop.
+  template <typename Work>
+  bool ForPlaces(const std::vector<std::size_t>& places, const Work& work) {
+    comparisons_.resize(kPlacesAtOnce);
+    for (std::size_t i = 0; i < places.size(); i += kPlacesAtOnce) {
+      if (scope_.ShouldStop()) return false;
+      const std::size_t count = std::min(kPlacesAtOnce, places.size() - i);
+      ParallelFor(count, ThreadsHere(), [&](std::size_t k) {
+        comparisons_[k].found.clear();
+        comparisons_[k].tally = Tally();
+        work(places[i + k], &comparisons_[k]);
+      });
+      for (std::size_t k = 0; k < count; ++k) {
+        const Comparison& comparison = comparisons_[k];
+        totals_ += comparison.tally;
+        for (const Found& one : comparison.found) {
+          AddMatches(places_[places[i + k]], one, comparison.found);
+        }
+      }
+    }
+    return true;
+  }
+
+  void FindPairs() {
+    pairs_.resize(places_.size());
+    std::vector<std::size_t> all(places_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    ForPlaces(all, [this](std::size_t index, Comparison* comparison) {
+      pairs_[index] = PairsWithinReach(index, comparison);
+    });
+  }
+
+  // Compares places in searches up to this half width, m; false when it is time
+  // to stop. Comparisons change nothing; what they tell is taken in one by one.
+  bool Compare(double widest) {
+    std::vector<std::size_t> places;
+    for (std::size_t index = 0; index < pairs_.size(); ++index) {
+      const std::vector<Pair>& pairs = pairs_[index];
+      if (std::any_of(pairs.begin(), pairs.end(),
+                      [&](const Pair& pair) { return pair.least <= widest; })) {
+        places.push_back(index);
+      }
+    }
+    return ForPlaces(places, [&](std::size_t index, Comparison* comparison) {
+      Match(index, widest, comparison);
+      // What another place puts elsewhere is no match: all have a say.
+      if (!comparison->found.empty()) {
+        Match(index, std::numeric_limits<double>::infinity(), comparison);
+        std::sort(
+            comparison->found.begin(), comparison->found.end(),
+            [](const Found& a, const Found& b) { return a.place < b.place; });
+      }
+    });
+  }
 
   const PlaceWall& Anchor(std::size_t place) const {
     return walls_.wall(places_[place].anchor);
@@ -220,26 +290,34 @@ class PlaceSearch {
     return walls;
   }
 
-  // Compares a place with those before it: each pair once.
-  void ComparePlace(std::size_t index, Comparison* comparison) const {
-    comparison->found.clear();
-    comparison->tally = Tally();
-    std::vector<std::size_t> others = PerhapsWithinReach(index, comparison);
-    if (others.empty()) return;
+  // The places before this one that it has to be compared with: each pair
+  // once.
+  std::vector<Pair> PairsWithinReach(std::size_t index,
+                                     Comparison* comparison) const {
+    const std::vector<std::size_t> others =
+        PerhapsWithinReach(index, &comparison->tally);
+    if (others.empty()) return {};
     std::vector<int> anchors;
     for (const std::size_t p : others) anchors.push_back(places_[p].anchor);
     const std::vector<double> ways =
         ways_.From(places_[index].anchor, anchors, &comparison->search);
-    others.erase(std::remove_if(others.begin(), others.end(),
-                                [&](std::size_t p) {
-                                  return !MayBeWithinReach(
-                                      index, p, ways[places_[p].anchor]);
-                                }),
-                 others.end());
+    std::vector<Pair> pairs;
+    for (const std::size_t p : others) {
+      const double way = ways[places_[p].anchor];
+      if (MayBeWithinReach(index, p, way))
+        pairs.push_back({p, way, Least(way)});
+    }
     comparison->tally.out_of_reach +=
-        static_cast<std::int64_t>(anchors.size() - others.size());
-    if (others.empty()) return;
-    comparison->found = Match(index, others, ways, &comparison->tally);
+        static_cast<std::int64_t>(others.size() - pairs.size());
+    return pairs;
+  }
+
+  // A search is no narrower than this, m, after a way of this length, whatever
+  // the graph says.
+  double Least(double way) const {
+    return (options_.match.gate * std::sqrt(AddedVariance(way)) +
+            options_.match.tolerance) /
+           kOverRounding;
   }
 
   // Whether one place may be the other, when the way between them is so long.
@@ -253,9 +331,8 @@ class PlaceSearch {
   // ways to them are as long as those by way of one wall: most are not, and no
   // way to them is looked for.
   std::vector<std::size_t> PerhapsWithinReach(std::size_t index,
-                                              Comparison* comparison) const {
+                                              Tally* tally) const {
     const WallPlace& own = places_[index];
-    Tally* tally = &comparison->tally;
     const std::map<int, int> near =
         walls_.Within(own.anchor, options_.min_links - 1);
     std::vector<std::size_t> others;
@@ -281,33 +358,43 @@ class PlaceSearch {
     return others;
   }
 
-  std::vector<Found> Match(std::size_t index,
-                           const std::vector<std::size_t>& others,
-                           const std::vector<double>& ways,
-                           Tally* tally) const {
+  // Compares a place with those whose searches may be so narrow. They are done
+  // with, but for those whose searches are wider.
+  void Match(std::size_t index, double widest, Comparison* comparison) {
+    std::vector<Pair> waiting;
+    std::vector<Pair> pairs;
+    for (const Pair& pair : pairs_[index]) {
+      (pair.least <= widest ? pairs : waiting).push_back(pair);
+    }
+    if (pairs.empty()) return;
     std::vector<FeatureId> anchors;
-    for (const std::size_t p : others) anchors.push_back(Anchor(p).id);
+    for (const Pair& pair : pairs) anchors.push_back(Anchor(pair.place).id);
     const std::vector<Matrix3d> covariances =
         marginals_.RelativeCovariances(Anchor(index).id, anchors);
     const std::vector<PlaceWall> own_walls = WallsOf(places_[index]);
-    std::vector<Found> found;
-    for (std::size_t k = 0; k < others.size(); ++k) {
-      const WallPlace& other = places_[others[k]];
+    Tally& tally = comparison->tally;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const WallPlace& other = places_[pairs[k].place];
       const Matrix3d prior =
-          Prior(covariances[k], Anchor(index).direction, ways[other.anchor]);
+          Prior(covariances[k], Anchor(index).direction, pairs[k].way);
       if (!IsInReach(places_[index], other, prior(0, 0) + prior(1, 1))) {
-        ++tally->out_of_reach;
+        ++tally.out_of_reach;
         continue;
       }
-      PlaceMatch match =
-          MatchPlaces(own_walls, WallsOf(other), Anchor(others[k]).position,
-                      prior, options_.match);
-      tally->Count(match.outcome);
+      PlaceMatch match = MatchPlaces(own_walls, WallsOf(other),
+                                     Anchor(pairs[k].place).position, prior,
+                                     options_.match, widest);
+      if (match.outcome == PlaceMatch::Outcome::kTooWide) {
+        waiting.push_back(pairs[k]);
+        waiting.back().least = match.search;
+        continue;
+      }
+      tally.Count(match.outcome);
       if (!match.matches.empty()) {
-        found.push_back({others[k], std::move(match)});
+        comparison->found.push_back({pairs[k].place, std::move(match)});
       }
     }
-    return found;
+    pairs_[index] = std::move(waiting);
   }
 
   void AddMatches(const WallPlace& own, const Found& one,
@@ -353,6 +440,9 @@ class PlaceSearch {
   std::vector<double> ways_from_first_;
   std::vector<WallPlace> places_;
   std::vector<AnchorSigma> sigmas_;
+  // Of each place, those that it was not compared with yet.
+  std::vector<std::vector<Pair>> pairs_;
+  std::vector<Comparison> comparisons_;
 
   Tally totals_;
   std::int64_t matches_ = 0;
@@ -392,9 +482,9 @@ std::vector<WallPlace> FindPlaces(const WallGraph& walls,
 }
 
 void ComparePlaces(const WallGraph& walls, const SameWallOptions& options,
-                   const DetectionScope& scope, Marginals* marginals,
-                   ClosureCandidates* candidates) {
-  PlaceSearch(walls, options, scope, marginals, candidates).Run();
+                   double width, const DetectionScope& scope,
+                   Marginals* marginals, ClosureCandidates* candidates) {
+  PlaceSearch(walls, options, scope, marginals, candidates).Run(width);
 }
 
 }  // namespace plumbline

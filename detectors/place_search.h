@@ -29,11 +29,13 @@ std::vector<WallPlace> FindPlaces(const WallGraph& walls,
 /// Adds to the candidates what comparing places of different visits tells: each
 /// pair of places that lie near each other, as far as the graph and the way
 /// between them leave open, is compared as a whole (MatchPlaces), and matches
-/// that another pair of nearly the same worth contradicts are left out. Counts
-/// what it does, and asks to stop, through `scope`.
+/// that another pair of nearly the same worth contradicts are left out. Pairs
+/// whose search would be wider than what is proposed together
+/// (ClosureCandidates::Widest of `width`, m) wait. Counts what it does, and
+/// asks to stop, through `scope`.
 void ComparePlaces(const WallGraph& walls, const SameWallOptions& options,
-                   const DetectionScope& scope, Marginals* marginals,
-                   ClosureCandidates* candidates);
+                   double width, const DetectionScope& scope,
+                   Marginals* marginals, ClosureCandidates* candidates);
 
 }  // namespace plumbline
 

@@ -85,10 +85,10 @@ Transaction SameWall::Detect(const Graph& graph, const Registry& registry,
   ClosureCandidates candidates(&walls);
   FindOverlaps(walls, options_, scope, &marginals, &candidates);
   if (scope.ShouldStop()) return transaction;
-  ComparePlaces(walls, options_, scope, &marginals, &candidates);
+  const double narrow = options_.match.narrow + options_.match.tolerance;
+  ComparePlaces(walls, options_, narrow, scope, &marginals, &candidates);
   if (scope.ShouldStop()) return transaction;
   scope.Count("walls", walls.size());
-  const double narrow = options_.match.narrow + options_.match.tolerance;
   for (const ClosureCandidate& candidate : candidates.Choose(narrow, scope)) {
     transaction.AddConstraint(MakeStructure(
         registry.GetRelation(kSameWallRelation),

@@ -572,6 +572,53 @@ TEST_F(EmTest, FullWeightTestHasNoFeedback) {
   }
 }
 
+// While a weight settles and nothing breaks nobody looks; before the end
+// somebody does, and finds what only shows by then.
+TEST_F(EmTest, DetectorsRestWhileWeightsSettle) {
+  // With weight 1 it stands at 0.16 degrees, and further away in each iteration
+  // as that loses weight.
+  const FeatureId wall = AddSegment(1.6);
+  const FeatureId other = AddSegment(30.0);
+  const FeatureId parallel = AddSegment(30.0);
+  Transaction there;
+  Feature fixed = Orientation(registry_, 0.0);
+  fixed.fixed = true;
+  there.AddConstraint(Structure(registry_, "segment_orientation", wall,
+                                there.AddFeature(fixed), 0.0, 1.0 / 3.0));
+  const ConstraintId tie = graph_.Apply(std::move(there)).constraints.front();
+  int looks = 0;
+  double shows_from = 1e9;
+  Add(0, "late", 1,
+      [&](const Graph& graph, const Registry& registry, const DetectionScope&) {
+        ++looks;
+        Transaction transaction;
+        if (RadToDeg(graph.GetFeature(wall).parameters[2]) < shows_from) {
+          return transaction;
+        }
+        if (HasLive(graph, other, "segment_orientation")) return transaction;
+        const FeatureId shared =
+            transaction.AddFeature(Orientation(registry, DegToRad(30.0)));
+        for (const FeatureId one : {other, parallel}) {
+          transaction.AddConstraint(Structure(registry, "segment_orientation",
+                                              one, shared, 0.0, 0.5));
+        }
+        return transaction;
+      });
+  EmOptions options;
+  options.break_constraints = false;
+  const EmReport report = Make(options).Run();
+  EXPECT_TRUE(report.converged());
+  EXPECT_GT(report.iterations, 4);
+  EXPECT_LE(looks, 3);
+  EXPECT_FALSE(HasLive(graph_, other, "segment_orientation"));
+  shows_from = 0.5 * (0.16 + Direction(wall));
+  graph_.GetConstraint(tie).delta = 1.0;
+  looks = 0;
+  EXPECT_TRUE(em_->Run().converged());
+  EXPECT_GE(looks, 1);
+  EXPECT_TRUE(HasLive(graph_, other, "segment_orientation"));
+}
+
 TEST_F(EmTest, AHypothesisIsBrokenOnlySoOften) {
   for (int i = 0; i < 5; ++i) AddSegment(0.0);
   const FeatureId wall = AddSegment(5.9);

@@ -103,6 +103,29 @@ TEST(PlaceMatchTest, RoomInAWideSearch) {
   EXPECT_NEAR(match.search, 6.0, 1.0);
 }
 
+// A search of 6 m across every wall: not looked at by who asks for 5 m, and no
+// narrower than what is found when it is.
+TEST(PlaceMatchTest, AWiderSearchThanIsAskedForWaits) {
+  const std::vector<PlaceWall> second =
+      MovedBack(Room(), Vector3d(3.1, -2.3, DegToRad(4.0)));
+  const Matrix3d prior = Prior(2.0, 2.0, 3.0);
+  const PlaceMatch waiting = MatchPlaces(Room(), second, Vector2d::Zero(),
+                                         prior, PlaceMatchOptions(), 5.0);
+  EXPECT_EQ(waiting.outcome, PlaceMatch::Outcome::kTooWide);
+  EXPECT_TRUE(waiting.matches.empty());
+  EXPECT_GT(waiting.search, 6.0);
+  const PlaceMatch looked = MatchPlaces(Room(), second, Vector2d::Zero(), prior,
+                                        PlaceMatchOptions(), waiting.search);
+  EXPECT_EQ(looked.matches.size(), 8u);
+  EXPECT_GE(looked.search, waiting.search);
+  // Along a corridor it may be as wide as it likes.
+  EXPECT_EQ(
+      MatchPlaces(Corridor(), MovedBack(Corridor(), Vector3d(0.4, 0.12, 0.0)),
+                  Vector2d::Zero(), Prior(2.0, 0.15), PlaceMatchOptions(), 0.7)
+          .matches.size(),
+      2u);
+}
+
 TEST(PlaceMatchTest, BeyondTheGateIsNotLookedFor) {
   const PlaceMatch match = Match(
       Room(), MovedBack(Room(), Vector3d(0.5, 0.0, 0.0)), Prior(0.1, 0.1));

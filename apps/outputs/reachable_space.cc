@@ -3,172 +3,150 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
+#include <cstdint>
 #include <utility>
 
 namespace plumbline {
 namespace {
 
-// Cells of a row that are passed over together.
-constexpr int kBlock = 64;
+// Bits of a word.
+constexpr int kBits = 64;
+// Radii beyond it are cut.
+constexpr int kMostRadius = 254;
 
-// 1 for cells of a raster that have something, 0 for the others.
-struct Marks {
-  Marks(int width, int height) : width(width), height(height) {}
+using Word = std::uint64_t;
 
-  // No cell has anything.
-  void Reset() { cells.assign(static_cast<std::size_t>(width) * height, 0); }
+// The cells of a raster that have something, a bit each: most of what is done
+// with them goes 64 cells at a time, and takes little memory, which comes from
+// the system page by page and costs more than to fill it.
+class Marks {
+ public:
+  Marks(int width, int height)
+      : width_(width),
+        height_(height),
+        per_row_((static_cast<std::size_t>(width) + kBits - 1) / kBits),
+        words_(per_row_ * static_cast<std::size_t>(height), 0) {}
 
-  std::size_t IndexOf(int column, int row) const {
-    return static_cast<std::size_t>(row) * width + column;
+  int width() const { return width_; }
+  int height() const { return height_; }
+  std::size_t per_row() const { return per_row_; }
+  Word* Row(int row) { return words_.data() + row * per_row_; }
+  const Word* Row(int row) const { return words_.data() + row * per_row_; }
+
+  // Within the raster.
+  bool Is(int column, int row) const {
+    return (Row(row)[column / kBits] >> (column % kBits) & 1) != 0;
+  }
+  void Set(int column, int row) {
+    Row(row)[column / kBits] |= Word{1} << (column % kBits);
   }
   bool Has(int column, int row) const {
-    return column >= 0 && row >= 0 && column < width && row < height &&
-           cells[IndexOf(column, row)] != 0;
+    return column >= 0 && row >= 0 && column < width_ && row < height_ &&
+           Is(column, row);
   }
 
-  int width;
-  int height;
-  std::vector<std::uint8_t> cells;
-};
-
-// How far the nearest cell of the row with this mark is, up to `far`, for all
-// cells of a row: run by run of such and of other cells.
-void FillNearest(const std::uint8_t* marks, int mark, int width, int far,
-                 std::uint8_t* nearest) {
-  const auto find = [&](int begin, int value) {
-    const void* const found = std::memchr(marks + begin, value, width - begin);
-    return found == nullptr
-               ? width
-               : static_cast<int>(static_cast<const std::uint8_t*>(found) -
-                                  marks);
-  };
-  std::fill(nearest, nearest + width, static_cast<std::uint8_t>(far));
-  for (int begin = find(0, mark), last = 0; begin < width;) {
-    for (int i = std::max(last, begin - far); i < begin; ++i) {
-      nearest[i] = std::min(nearest[i], static_cast<std::uint8_t>(begin - i));
+  // The bits of a row's last word that stand for cells.
+  Word LastMask() const {
+    const int rest = width_ % kBits;
+    return rest == 0 ? ~Word{0} : (Word{1} << rest) - 1;
+  }
+  // Marks what is not marked, and no longer what is.
+  void Invert() {
+    for (Word& word : words_) word = ~word;
+    for (int row = 0; row < height_; ++row)
+      Row(row)[per_row_ - 1] &= LastMask();
+  }
+  // Visits the marked cells, row by row.
+  template <typename Visit>
+  void ForEach(const Visit& visit) const {
+    for (int row = 0; row < height_; ++row) {
+      for (std::size_t k = 0; k < per_row_; ++k) {
+        for (Word word = Row(row)[k]; word != 0; word &= word - 1) {
+          visit(static_cast<int>(k) * kBits + __builtin_ctzll(word), row);
+        }
+      }
     }
-    last = find(begin, 1 - mark);
-    std::fill(nearest + begin, nearest + last, std::uint8_t{0});
-    for (int i = last; i < std::min(width, last + far); ++i) {
-      nearest[i] = static_cast<std::uint8_t>(i - last + 1);
+  }
+  // Combines the words of both, which have one size.
+  template <typename Combine>
+  void CombineWith(const Marks& other, const Combine& combine) {
+    for (std::size_t k = 0; k < words_.size(); ++k) {
+      words_[k] = combine(words_[k], other.words_[k]);
     }
-    begin = last < width ? find(last, mark) : width;
   }
-}
-
-// Rasters of one size that are filled again and again: what one of them takes
-// comes from the system page by page, which costs more than to fill it.
-struct Scratch {
-  Scratch(int width, int height)
-      : nearest(width, height), around(width, height) {}
-
-  Marks nearest;
-  Marks around;
-};
-
-// Blocks of cells of rows, and whether each has something.
-class Blocks {
- public:
-  explicit Blocks(const Marks& marks)
-      : width_(marks.width),
-        per_row_((marks.width + kBlock - 1) / kBlock),
-        has_(static_cast<std::size_t>(per_row_) * marks.height, 0) {}
-
-  std::uint8_t* Row(int row) {
-    return &has_[static_cast<std::size_t>(row) * per_row_];
-  }
-  int per_row() const { return per_row_; }
-  int EndOf(int block) const { return std::min(width_, (block + 1) * kBlock); }
 
  private:
   int width_;
-  int per_row_;
-  std::vector<std::uint8_t> has_;
+  int height_;
+  std::size_t per_row_;
+  std::vector<Word> words_;
 };
 
-// The rows up to `radius` from one, and how wide a disc about a cell of it is
-// in each.
-template <typename Visit>
-void VisitDisc(int radius, int row, int height, const Visit& visit) {
-  for (int step = std::max(-radius, -row);
-       step <= std::min(radius, height - 1 - row); ++step) {
-    visit(row + step, static_cast<std::uint8_t>(std::floor(
-                          std::sqrt(radius * radius - step * step))));
-  }
-}
-
-// Radii beyond it are cut.
-int DiscRadius(int radius) { return std::min(radius, 254); }
-
-// Marks all cells with a marked one within `radius`, from middle to middle, and
-// no others.
-void Widen(int radius, Marks* widened, Scratch* scratch) {
-  const Marks& marks = *widened;
-  const int far = DiscRadius(radius) + 1;
-  Marks& nearest = scratch->nearest;
-  nearest.cells.resize(marks.cells.size());
-  // Most of a raster is far from all marks.
-  Blocks near(marks);
-  for (int row = 0; row < marks.height; ++row) {
-    std::uint8_t* const own = &nearest.cells[marks.IndexOf(0, row)];
-    FillNearest(&marks.cells[marks.IndexOf(0, row)], 1, marks.width, far, own);
-    for (int block = 0; block < near.per_row(); ++block) {
-      std::uint8_t least = own[block * kBlock];
-      for (int i = block * kBlock; i < near.EndOf(block); ++i) {
-        least = std::min(least, own[i]);
-      }
-      near.Row(row)[block] = least < far;
+// Of the raster, the cells that `is_marked(value)` says.
+template <typename IsMarked>
+Marks MarksOf(const SeenCells& seen, const IsMarked& is_marked) {
+  Marks marks(seen.width, seen.height);
+  const std::uint8_t* cell = seen.cells.data();
+  for (int row = 0; row < seen.height; ++row) {
+    for (int column = 0; column < seen.width; ++column) {
+      if (is_marked(*cell++)) marks.Set(column, row);
     }
   }
-  Marks& around = scratch->around;
-  around.Reset();
-  for (int row = 0; row < marks.height; ++row) {
-    std::uint8_t* const to = &around.cells[marks.IndexOf(0, row)];
-    VisitDisc(far - 1, row, marks.height, [&](int other, std::uint8_t wide) {
-      const std::uint8_t* const from = &nearest.cells[marks.IndexOf(0, other)];
-      for (int block = 0; block < near.per_row(); ++block) {
-        if (near.Row(other)[block] == 0) continue;
-        const int end = near.EndOf(block);
-        for (int i = block * kBlock; i < end; ++i) {
-          to[i] |= static_cast<std::uint8_t>(from[i] <= wide);
-        }
-      }
-    });
-  }
-  std::swap(*widened, around);
+  return marks;
 }
 
-// Leaves marked only what has nothing unmarked within `radius`.
-void Shrink(int radius, Marks* marks, Scratch* scratch) {
-  const int far = DiscRadius(radius) + 1;
-  Marks& nearest = scratch->nearest;
-  nearest.cells.resize(marks->cells.size());
-  Blocks marked(*marks);
-  for (int row = 0; row < marks->height; ++row) {
-    const std::uint8_t* const own = &marks->cells[marks->IndexOf(0, row)];
-    FillNearest(own, 0, marks->width, far,
-                &nearest.cells[marks->IndexOf(0, row)]);
-    for (int block = 0; block < marked.per_row(); ++block) {
-      marked.Row(row)[block] =
-          std::memchr(own + block * kBlock, 1,
-                      static_cast<std::size_t>(marked.EndOf(block) -
-                                               block * kBlock)) != nullptr;
+// Marks the neighbours in the row of what is marked in it as well.
+void WidenRow(const Word* from, std::size_t words, Word last_mask, Word* to) {
+  Word before = 0;
+  for (std::size_t k = 0; k < words; ++k) {
+    const Word word = from[k];
+    const Word after = k + 1 < words ? from[k + 1] : 0;
+    to[k] = word | word << 1 | before >> (kBits - 1) | word >> 1 |
+            after << (kBits - 1);
+    before = word;
+  }
+  to[words - 1] &= last_mask;
+}
+
+// Of all cells with a marked one within `radius`, from middle to middle.
+Marks Widened(int radius, const Marks& marks) {
+  radius = std::min(radius, kMostRadius);
+  Marks widened(marks.width(), marks.height());
+  const std::size_t words = marks.per_row();
+  // How wide a disc is in the rows of it, and a row widened by so much.
+  std::vector<int> half_widths;
+  for (int step = 0; step <= radius; ++step) {
+    half_widths.push_back(
+        static_cast<int>(std::floor(std::sqrt(radius * radius - step * step))));
+  }
+  std::vector<Word> wide((static_cast<std::size_t>(radius) + 1) * words);
+  for (int row = 0; row < marks.height(); ++row) {
+    const Word* const own = marks.Row(row);
+    // Most of a raster is far from all marks.
+    if (std::all_of(own, own + words, [](Word word) { return word == 0; })) {
+      continue;
+    }
+    std::copy(own, own + words, wide.begin());
+    for (int by = 1; by <= radius; ++by) {
+      WidenRow(&wide[(by - 1) * words], words, marks.LastMask(),
+               &wide[by * words]);
+    }
+    for (int step = -radius; step <= radius; ++step) {
+      if (row + step < 0 || row + step >= marks.height()) continue;
+      const Word* const from = &wide[half_widths[std::abs(step)] * words];
+      Word* const to = widened.Row(row + step);
+      for (std::size_t k = 0; k < words; ++k) to[k] |= from[k];
     }
   }
-  for (int row = 0; row < marks->height; ++row) {
-    std::uint8_t* const to = &marks->cells[marks->IndexOf(0, row)];
-    VisitDisc(far - 1, row, marks->height, [&](int other, std::uint8_t wide) {
-      const std::uint8_t* const from = &nearest.cells[marks->IndexOf(0, other)];
-      for (int block = 0; block < marked.per_row(); ++block) {
-        if (marked.Row(row)[block] == 0) continue;
-        const int end = marked.EndOf(block);
-        for (int i = block * kBlock; i < end; ++i) {
-          to[i] &= static_cast<std::uint8_t>(from[i] > wide);
-        }
-      }
-    });
-  }
+  return widened;
+}
+
+// Of what has nothing unmarked within `radius`.
+Marks Shrunk(int radius, Marks marks) {
+  marks.Invert();
+  Marks shrunk = Widened(radius, marks);
+  shrunk.Invert();
+  return shrunk;
 }
 
 // Bridges the unknown cells of a row or column that lie between free ones and
@@ -193,46 +171,43 @@ class GapBridge {
 };
 
 Marks OpenCells(const SeenCells& seen, const ReachOptions& options) {
-  Marks open(seen.width, seen.height);
-  open.cells.resize(seen.cells.size());
-  for (std::size_t i = 0; i < open.cells.size(); ++i) {
-    open.cells[i] = seen.cells[i] == SeenCells::kFree;
-  }
+  Marks open =
+      MarksOf(seen, [](std::uint8_t cell) { return cell == SeenCells::kFree; });
   if (!options.gap) return open;
   // Columns side by side: memory is visited in its order.
   std::vector<GapBridge> columns(static_cast<std::size_t>(seen.width));
   for (int row = 0; row < seen.height; ++row) {
     GapBridge along;
-    const std::uint8_t* const cells = &seen.cells[open.IndexOf(0, row)];
+    const std::uint8_t* const cells =
+        seen.cells.data() + static_cast<std::size_t>(row) * seen.width;
     for (int column = 0; column < seen.width; ++column) {
       const auto gap = [&] { return options.gap(column, row); };
-      along.Take(column, cells[column], gap,
-                 [&](int k) { open.cells[open.IndexOf(k, row)] = 1; });
+      along.Take(column, cells[column], gap, [&](int k) { open.Set(k, row); });
       columns[static_cast<std::size_t>(column)].Take(
-          row, cells[column], gap,
-          [&](int k) { open.cells[open.IndexOf(column, k)] = 1; });
+          row, cells[column], gap, [&](int k) { open.Set(column, k); });
     }
   }
   return open;
 }
 
-// Makes `flooded` the marked cells that hang together, by sides or corners,
-// with one within `radius` of a start.
-void Flood(const Marks& marks, const std::vector<std::pair<int, int>>& starts,
-           int radius, Marks* flooded) {
-  flooded->Reset();
+// Of the marked cells that hang together, by sides or corners, with one within
+// `radius` of a start.
+Marks Flooded(const Marks& marks,
+              const std::vector<std::pair<int, int>>& starts, int radius) {
+  Marks flooded(marks.width(), marks.height());
   std::vector<std::pair<int, int>> next;
   const auto visit_around = [&](int column, int row, int reach) {
     for (int y = row - reach; y <= row + reach; ++y) {
       for (int x = column - reach; x <= column + reach; ++x) {
-        if (!marks.Has(x, y) || flooded->Has(x, y)) continue;
-        flooded->cells[flooded->IndexOf(x, y)] = 1;
+        if (!marks.Has(x, y) || flooded.Is(x, y)) continue;
+        flooded.Set(x, y);
         next.emplace_back(x, y);
       }
     }
   };
   for (const auto& [column, row] : starts) {
-    if (column < 0 || row < 0 || column >= marks.width || row >= marks.height) {
+    if (column < 0 || row < 0 || column >= marks.width() ||
+        row >= marks.height()) {
       continue;
     }
     visit_around(column, row, radius);
@@ -242,51 +217,43 @@ void Flood(const Marks& marks, const std::vector<std::pair<int, int>>& starts,
     next.pop_back();
     visit_around(column, row, 1);
   }
+  return flooded;
 }
 
 }  // namespace
 
 void KeepReachable(const std::vector<std::pair<int, int>>& starts,
                    const ReachOptions& options, SeenCells* seen) {
-  Scratch scratch(seen->width, seen->height);
-  Marks marks = OpenCells(*seen, options);
-  Shrink(options.body, &marks, &scratch);
-  Flood(marks, starts, options.body, &scratch.around);
-  std::swap(marks, scratch.around);
+  if (seen->width <= 0 || seen->height <= 0) return;
+  const auto forget = [seen](int column, int row) {
+    seen->cells[static_cast<std::size_t>(row) * seen->width + column] =
+        SeenCells::kUnknown;
+  };
   // A cell more than the disc: walls are rough.
-  Widen(options.body + 1, &marks, &scratch);
-  Marks rest(seen->width, seen->height);
-  rest.cells.resize(seen->cells.size());
-  for (std::size_t i = 0; i < rest.cells.size(); ++i) {
-    const bool is_free = seen->cells[i] == SeenCells::kFree;
-    rest.cells[i] = is_free && marks.cells[i] == 0;
-    marks.cells[i] = is_free && marks.cells[i] != 0;
-  }
+  Marks kept = Widened(options.body + 1,
+                       Flooded(Shrunk(options.body, OpenCells(*seen, options)),
+                               starts, options.body));
+  Marks rest = MarksOf(
+      *seen, [](std::uint8_t cell) { return cell == SeenCells::kFree; });
+  kept.CombineWith(rest, [](Word k, Word free) { return k & free; });
+  rest.CombineWith(kept, [](Word free, Word k) { return free & ~k; });
   // Pockets lie beside what can be reached, glimpses lead away from it.
-  Widen(options.pocket, &marks, &scratch);
-  std::vector<std::pair<int, int>> away;
-  for (int row = 0; row < seen->height; ++row) {
-    for (int column = 0; column < seen->width; ++column) {
-      const std::size_t i = rest.IndexOf(column, row);
-      if (rest.cells[i] != 0 && marks.cells[i] == 0) {
-        away.emplace_back(column, row);
-      }
-    }
-  }
-  Marks& glimpses = scratch.nearest;
-  Flood(rest, away, 0, &glimpses);
-  for (std::size_t i = 0; i < marks.cells.size(); ++i) {
-    std::uint8_t& cell = seen->cells[i];
-    if (glimpses.cells[i] != 0) cell = SeenCells::kUnknown;
-    marks.cells[i] = cell == SeenCells::kFree;
-  }
-  Widen(options.behind, &marks, &scratch);
-  for (std::size_t i = 0; i < marks.cells.size(); ++i) {
-    std::uint8_t& cell = seen->cells[i];
-    if (cell == SeenCells::kOccupied && marks.cells[i] == 0) {
-      cell = SeenCells::kUnknown;
-    }
-  }
+  Marks away = rest;
+  away.CombineWith(Widened(options.pocket, kept),
+                   [](Word r, Word near) { return r & ~near; });
+  std::vector<std::pair<int, int>> starts_away;
+  away.ForEach(
+      [&](int column, int row) { starts_away.emplace_back(column, row); });
+  const Marks glimpses = Flooded(rest, starts_away, 0);
+  glimpses.ForEach(forget);
+  // What is free now.
+  kept.CombineWith(rest, [](Word k, Word r) { return k | r; });
+  kept.CombineWith(glimpses, [](Word k, Word g) { return k & ~g; });
+  Marks behind = MarksOf(
+      *seen, [](std::uint8_t cell) { return cell == SeenCells::kOccupied; });
+  behind.CombineWith(Widened(options.behind, kept),
+                     [](Word hit, Word near) { return hit & ~near; });
+  behind.ForEach(forget);
 }
 
 }  // namespace plumbline

@@ -34,9 +34,11 @@ class WallVotesTest : public ::testing::Test {
     return graph_.Apply(std::move(transaction)).features[0];
   }
 
+  // Kept in single precision: figures below hold to that.
   static SurfaceReturn Return(double x, double y, double normal_x,
                               double normal_y) {
-    return {{x, y}, {normal_x, normal_y}};
+    return {Eigen::Vector2d(x, y).cast<float>(),
+            Eigen::Vector2d(normal_x, normal_y).cast<float>()};
   }
 
   std::vector<std::vector<WallVote>> Collect(const Place& place,
@@ -64,12 +66,12 @@ TEST_F(WallVotesTest, InformationByHand) {
   // the returns: 2, 0.1, 0, 2.81, -2.9, 3.
   Eigen::Matrix3d expected;
   expected << 100.0, 5.0, 0.0, 5.0, 140.5, -145.0, 0.0, -145.0, 150.0;
-  EXPECT_LT((votes[0][0].information - expected).norm(), 1e-9);
+  EXPECT_LT((votes[0][0].information - expected).norm(), 1e-4);
 
   // As many scans count as one; seen from elsewhere, in that frame.
   place.num_scans = 2;
   const auto half = Collect(place, Pose2::Zero());
-  EXPECT_LT((half[0][0].information - 0.5 * expected).norm(), 1e-9);
+  EXPECT_LT((half[0][0].information - 0.5 * expected).norm(), 1e-4);
   Place moved = place;
   moved.num_scans = 1;
   for (SurfaceReturn& point : moved.returns) {
@@ -81,7 +83,7 @@ TEST_F(WallVotesTest, InformationByHand) {
   // x and y of these returns in that frame: (-4, 1), (-4, 0), (-3.9, -1).
   Eigen::Matrix3d there;
   there << 2360.5, -5.0, -595.0, -5.0, 100.0, 0.0, -595.0, 0.0, 150.0;
-  EXPECT_LT((from_elsewhere[0][0].information - there).norm(), 1e-8);
+  EXPECT_LT((from_elsewhere[0][0].information - there).norm(), 1e-3);
 }
 
 TEST_F(WallVotesTest, WeightsAreRobust) {
@@ -93,7 +95,7 @@ TEST_F(WallVotesTest, WeightsAreRobust) {
                    Return(0.0, -0.9, 0.0, 1.0)};
   const auto votes = Collect(place, Pose2::Zero());
   ASSERT_EQ(votes[0].size(), 1u);
-  EXPECT_NEAR(votes[0][0].information(2, 2), 75.0, 1e-9);
+  EXPECT_NEAR(votes[0][0].information(2, 2), 75.0, 1e-4);
 }
 
 TEST_F(WallVotesTest, OnlyWhatLiesOnTheWallAndIsSeenFromItsSide) {

@@ -48,8 +48,8 @@ void AddReturns(const std::vector<ScanPoint>& points, const Pose2& pose,
   const PoseTransform transform(pose);
   for (const ScanPoint& point : points) {
     if (point.is_between || point.normal.squaredNorm() == 0.0) continue;
-    returns->push_back(
-        {transform.Point(point.position), transform.Direction(point.normal)});
+    returns->push_back({transform.Point(point.position).cast<float>(),
+                        transform.Direction(point.normal).cast<float>()});
   }
 }
 

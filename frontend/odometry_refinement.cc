@@ -194,6 +194,9 @@ OdometryRefiner::OdometryRefiner(const OdometryRefinementOptions& options)
 void OdometryRefiner::RebuildReference(Track* track) {
   std::vector<ScanPoint> reference;
   std::vector<Viewpoint> viewpoints;
+  std::size_t count = 0;
+  for (const TrackKey& key : track->keys) count += key.points.size();
+  reference.reserve(count);
   for (const TrackKey& key : track->keys) {
     // Where odometry has jumped: nothing is in sight of both.
     if ((key.pose - track->keys.back().pose).head<2>().norm() >

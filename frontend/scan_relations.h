@@ -42,12 +42,14 @@ struct ScanRelationOptions {
   int num_threads = 1;
 };
 
-/// A return on a straight surface: what is kept of the returns of all scans.
+/// A return on a straight surface: what is kept of the returns of all scans,
+/// which are many. In single precision it is exact to micrometres: the frame is
+/// that of the place.
 struct SurfaceReturn {
   /// m.
-  Eigen::Vector2d position;
+  Eigen::Vector2f position;
   /// Unit normal of the surface, towards the laser.
-  Eigen::Vector2d normal;
+  Eigen::Vector2f normal;
 };
 
 /// A place of the robot, with what it saw from there.

@@ -27,8 +27,8 @@ constexpr std::size_t kFewestCells = 6;
 // Scans and seeds that are looked at by all threads together, before what was
 // found is taken in.
 constexpr std::size_t kScansAtOnce = 256;
-constexpr std::size_t kSeedsAtOnce = 4;
-constexpr std::size_t kMostSeedsAtOnce = 16;
+constexpr std::size_t kSeedsAtOnce = 12;
+constexpr std::size_t kMostSeedsAtOnce = 48;
 // A cell is no seed any more once it lay on so many lines that came to nothing:
 // so close to them, in scatters, and turned against them by no more than this.
 constexpr std::uint8_t kSpentBy = 3;
@@ -579,24 +579,36 @@ class Completion {
     is_done_.assign(first_word_.back(), 0);
   }
 
-  // Sorts the returns that no wall explains into cells.
+  // Sorts the returns that no wall explains into cells: while those of some
+  // scans are looked for, those of the scans before are sorted in.
   void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
               std::size_t begin, std::size_t end, double reach) {
     returns_.Clear();
-    std::vector<ReturnsOfScan> unexplained(kScansAtOnce);
-    for (std::size_t i = begin; i < end && !IsStopped(); i += kScansAtOnce) {
-      const std::size_t count = std::min(kScansAtOnce, end - i);
-      team_.For(count, [&](std::size_t k) {
-        FindUnexplained(scans[i + k], poses[i + k], reach,
-                        is_done_.data() + first_word_[i + k],
-                        &unexplained[k].returns);
-      });
-      for (std::size_t k = 0; k < count; ++k) {
-        for (const Return& one : unexplained[k].returns) {
-          returns_.Add(one.point, one.ray, i + k);
+    std::vector<ReturnsOfScan> found(kScansAtOnce);
+    std::vector<ReturnsOfScan> before(kScansAtOnce);
+    std::size_t first_before = begin;
+    std::size_t num_before = 0;
+    const auto sort_in = [&] {
+      for (std::size_t k = 0; k < num_before; ++k) {
+        for (const Return& one : before[k].returns) {
+          returns_.Add(one.point, one.ray, first_before + k);
         }
       }
+    };
+    for (std::size_t i = begin; i < end && !IsStopped(); i += kScansAtOnce) {
+      const std::size_t count = std::min(kScansAtOnce, end - i);
+      team_.For(count + 1, [&](std::size_t job) {
+        if (job == 0) return sort_in();
+        const std::size_t k = job - 1;
+        FindUnexplained(scans[i + k], poses[i + k], reach,
+                        is_done_.data() + first_word_[i + k],
+                        &found[k].returns);
+      });
+      std::swap(found, before);
+      first_before = i;
+      num_before = count;
     }
+    sort_in();
   }
 
   struct Return {

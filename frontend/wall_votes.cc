@@ -109,15 +109,17 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
     std::int64_t cell = WallGrid::Key(poses[k].head<2>());
     const std::vector<int>* near = grid.In(cell);
     for (const SurfaceReturn& point : places[k].returns) {
-      if (point.normal.squaredNorm() == 0.0) continue;
-      const Eigen::Vector2d position = transform.Point(point.position);
+      if (point.normal.squaredNorm() == 0.0f) continue;
+      const Eigen::Vector2d own_position = point.position.cast<double>();
+      const Eigen::Vector2d position = transform.Point(own_position);
       const std::int64_t own = WallGrid::Key(position);
       if (own != cell) {
         cell = own;
         near = grid.In(cell);
       }
       if (near == nullptr) continue;
-      const Eigen::Vector2d normal = transform.Direction(point.normal);
+      const Eigen::Vector2d normal =
+          transform.Direction(point.normal.cast<double>());
       double best = options.max_offset;
       FeatureId hit = kNoId;
       for (const int index : *near) {
@@ -140,7 +142,7 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
       }
       WallVote& vote = *last;
       ++vote.points;
-      const Eigen::Vector3d homogeneous(point.position.x(), point.position.y(),
+      const Eigen::Vector3d homogeneous(own_position.x(), own_position.y(),
                                         1.0);
       vote.information.noalias() += share / (1.0 + scale * best * best) *
                                     homogeneous * homogeneous.transpose();

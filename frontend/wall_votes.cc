@@ -70,6 +70,7 @@ class WallGrid {
     return found < 0 ? nullptr : &cells_[found];
   }
   const GridWall& wall(int index) const { return walls_[index]; }
+  bool is_empty() const { return walls_.empty(); }
 
  private:
   // One is asked for with every return, and the library's is called.
@@ -98,6 +99,7 @@ std::vector<std::vector<WallVote>> CollectWallVotes(
   const double scale = 1.0 / (options.point_sigma * options.point_sigma *
                               options.loss_scale * options.loss_scale);
   std::vector<std::vector<WallVote>> votes(places.size());
+  if (grid.is_empty()) return votes;
   ParallelFor(places.size(), options.num_threads, [&](std::size_t k) {
     const PoseTransform transform(poses[k]);
     const double share =

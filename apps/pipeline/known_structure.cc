@@ -40,6 +40,11 @@ constexpr double kParallel = DegToRad(1.0);
 // there, at least, and so little on the other side, at most.
 constexpr double kBesideBody = 0.5;
 constexpr double kBesideNone = 0.2;
+// Chi-square with two degrees of freedom, exceeded by one in ten, up to which a
+// wall that was let go from a line is tied to it again.
+constexpr double kAgreeing = 4.6;
+// Smaller turns, rad, are linear.
+constexpr double kSmallTurn = 1e-4;
 // A line that lies this far in front of a wall, m, more than the map may be
 // off, was looked through by who saw the wall.
 constexpr double kInFront = 0.1;
@@ -410,14 +415,21 @@ KnownStructureBinder::NearestLine(const MapWall& wall,
     }
     // The other face of its wall: nobody sees it from there.
     if (SeenFrom(i, both.part) == -both.sense) continue;
-    // Let go while a wrong tie pulled at the plan, it may agree by now.
-    const bool agrees = both.offset < known_.plan_sigma_offset &&
-                        both.turn < known_.plan_sigma_angle;
-    if (!agrees && ties_.count({wall.id, i}) > 0) continue;
+    // Let go while a wrong tie pulled at the plan, or before its neighbours had
+    // pulled it near, it may agree by now.
+    const double chi_square =
+        std::pow(both.offset / known_.plan_sigma_offset, 2) +
+        std::pow(both.turn / SigmaAngle(both.length), 2);
+    if (chi_square > kAgreeing && ties_.count({wall.id, i}) > 0) continue;
     least = both.offset;
     nearest = LineBeside{i, both};
   }
   return nearest;
+}
+
+double KnownStructureBinder::SigmaAngle(double length) const {
+  return std::hypot(known_.plan_sigma_angle,
+                    std::sqrt(2.0) * known_.plan_sigma_offset / length);
 }
 
 Constraint KnownStructureBinder::MakeTie(const MapWall& wall,
@@ -430,17 +442,19 @@ Constraint KnownStructureBinder::MakeTie(const MapWall& wall,
   // The plan's origin as the line sees it.
   const Pose2 origin = Inverse(line);
   // The offset is tested where wall and line lie side by side, and so far from
-  // the origin along the wall.
+  // the origin along the wall. Far from there what a turn does is not linear: a
+  // wall of 1 m that is off by 3 degrees would be off by 0.1 m as well, as seen
+  // from 80 m away. As the wall stands now the offset is right.
+  const Pose2 seen = Between(in_plan, Pose2(Pose2::Zero()));
+  const double turn = NormalizeAngle(seen[2] - origin[2]);
   const double lever =
-      beside.both.along_wall - Between(in_plan, Pose2(Pose2::Zero()))[0];
+      std::abs(turn) < kSmallTurn
+          ? beside.both.along_wall - seen[0]
+          : (beside.both.in_front - (seen[1] - origin[1])) / turn;
   Eigen::Matrix2d rows;
   rows << 1.0, lever, 0.0, 1.0;
-  // Ends of a line that are off by the tolerance turn it, a short one more.
-  const double sigma_angle = std::hypot(
-      known_.plan_sigma_angle,
-      std::sqrt(2.0) * known_.plan_sigma_offset / beside.both.length);
   const Eigen::Vector2d weights(std::pow(known_.plan_sigma_offset, -2),
-                                std::pow(sigma_angle, -2));
+                                std::pow(SigmaAngle(beside.both.length), -2));
   Constraint tie = MakeStructure(
       registry_.GetRelation("pose_segment_collinearity"), {plan_pose_, wall.id},
       Eigen::Vector2d(origin[1], origin[2]),

@@ -146,6 +146,10 @@ class KnownStructureBinder {
   // The line to tie a wall to, which has this pose in the plan.
   std::optional<LineBeside> NearestLine(const MapWall& wall,
                                         const Pose2& in_plan) const;
+  // Tolerance of a wall's direction against a line beside this length of it, m
+  // and rad: ends of a line that are off by the tolerance turn it, a short one
+  // more.
+  double SigmaAngle(double length) const;
   Constraint MakeTie(const MapWall& wall, const Pose2& in_plan,
                      const LineBeside& beside) const;
   // Lines of the plan that no wall is tied to, by what walls show of them that

@@ -303,6 +303,33 @@ TEST_F(StatementTest, AWallIsTiedToTheFaceThatIsSeenFromItsSide) {
   EXPECT_GT(Wall(walls.size() - 1)[1], -1.56);
 }
 
+// A wall of 1 m, 3 degrees off its line as short walls are, and 110 m from the
+// plan's origin: the turn alone would put it 0.15 m off as seen from there.
+TEST_F(StatementTest, AShortWallFarFromThePlansOriginStaysTied) {
+  MakeWalls(
+      {Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi), Pose2(1.0, 5.0, 0.3),
+       Pose2(-3.0, 3.0, 0.5 * kPi), Pose2(5.0, -1.5, 0.457)},
+      0.005);
+  KnownStructure known;
+  const PoseTransform elsewhere(Pose2(100.0, -50.0, 0.65));
+  for (std::size_t i = 0; i < walls_.size(); ++i) {
+    const bool is_short = i + 1 == walls_.size();
+    const PoseTransform line(
+        Compose(Wall(i), Pose2(0.0, 0.0, is_short ? DegToRad(3.0) : 0.0)));
+    const double half = is_short ? 0.5 : 2.0;
+    known.plan.push_back(
+        {elsewhere.Point(line.Point(Eigen::Vector2d(-half, 0.0))),
+         elsewhere.Point(line.Point(Eigen::Vector2d(half, 0.0))), ""});
+  }
+  KnownStructureBinder binder(known, registry_, pose_, &graph_);
+  EXPECT_EQ(binder.TieToPlan(), static_cast<int>(walls_.size()));
+  SolverSession session(&graph_, registry_, {});
+  EmOrchestrator em(&graph_, &session, registry_, Hierarchy(), {});
+  em.Run();
+  EXPECT_THAT(binder.Notes(),
+              Contains(HasSubstr("5 walls are tied to 5 lines")));
+}
+
 // Whoever saw the wall looked through the line in front of it.
 TEST_F(StatementTest, ALineInFrontOfAWallIsToldAsWrong) {
   MakeWalls(

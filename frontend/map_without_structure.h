@@ -2,6 +2,7 @@
 #define PLUMBLINE_FRONTEND_MAP_WITHOUT_STRUCTURE_H_
 
 #include <plumbline/core/graph.h>
+#include <plumbline/core/rigid_motion.h>
 #include <plumbline/factors/pose2.h>
 
 #include <map>
@@ -17,6 +18,9 @@ struct MapWithoutStructure {
   /// One pose per scan (map frame).
   std::vector<Pose2> path;
 };
+
+/// The map moved rigidly. Throws Error as Moved of a feature does.
+MapWithoutStructure Moved(const Pose2& by, MapWithoutStructure map);
 
 }  // namespace plumbline
 

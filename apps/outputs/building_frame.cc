@@ -49,12 +49,4 @@ Pose2 BuildingFrame(const Graph& graph, const std::vector<Pose2>& path) {
   return frame;
 }
 
-MapWithoutStructure Moved(const Pose2& by, MapWithoutStructure map) {
-  for (auto& [id, feature] : map.features) {
-    feature = Moved(by, std::move(feature));
-  }
-  for (Pose2& pose : map.path) pose = Compose(by, pose);
-  return map;
-}
-
 }  // namespace plumbline

@@ -2,9 +2,7 @@
 #define PLUMBLINE_OUTPUTS_BUILDING_FRAME_H_
 
 #include <plumbline/core/graph.h>
-#include <plumbline/core/rigid_motion.h>
 #include <plumbline/factors/pose2.h>
-#include <plumbline/frontend/map_without_structure.h>
 
 #include <vector>
 
@@ -17,9 +15,6 @@ namespace plumbline {
 /// (`path`: poses of the robot, map frame). The identity for a map without
 /// walls.
 Pose2 BuildingFrame(const Graph& graph, const std::vector<Pose2>& path);
-
-/// A map without structure moved. Throws Error as Moved of a feature does.
-MapWithoutStructure Moved(const Pose2& by, MapWithoutStructure map);
 
 }  // namespace plumbline
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 #include <sstream>
 
@@ -61,6 +62,13 @@ std::string Fixed(double value, int decimals) {
   std::string text;
   AppendFixed(value, decimals, &text);
   return text;
+}
+
+std::vector<Wall> PlanWalls(const std::vector<PlanLine>& plan) {
+  std::vector<Wall> walls;
+  walls.reserve(plan.size());
+  for (const PlanLine& line : plan) walls.push_back(MakePlanWall(line));
+  return walls;
 }
 
 // "x,y"
@@ -149,7 +157,8 @@ KnownStructureBinder::KnownStructureBinder(const KnownStructure& known,
       registry_(registry),
       first_pose_(first_pose),
       graph_(graph),
-      faces_(FacesBeside(known.plan)),
+      lines_(PlanWalls(known.plan)),
+      faces_(FacesBeside(lines_)),
       notes_(known.notes) {}
 
 // A part of a line that has another one beside it.
@@ -163,29 +172,56 @@ struct KnownStructureBinder::FacePair {
   bool Has(std::size_t i) const { return line == i || other == i; }
 };
 
+std::optional<KnownStructureBinder::FacePair> KnownStructureBinder::PairUp(
+    const std::vector<Wall>& lines, std::size_t i, std::size_t k) {
+  const Wall& line = lines[i];
+  const Wall& other = lines[k];
+  if (std::abs(NormalizeAxial(line.angle - other.angle)) > kParallel) {
+    return std::nullopt;
+  }
+  Interval part = line.IntervalOf(other);
+  part = {std::max(part.first, line.begin), std::min(part.second, line.end)};
+  if (part.second <= part.first) return std::nullopt;
+  // Where they lie beside each other: far off a small turn is much.
+  const Eigen::Vector2d middle = line.At(0.5 * (part.first + part.second));
+  const FacePair pair = {i, k, part,
+                         line.Across(other.At(other.Along(middle)))};
+  if (pair.thickness() < kLeastThickness || pair.thickness() > kMostThickness) {
+    return std::nullopt;
+  }
+  return pair;
+}
+
 std::vector<KnownStructureBinder::FacePair> KnownStructureBinder::FacePairs(
-    const std::vector<PlanLine>& plan) {
-  std::vector<Wall> lines;
-  for (const PlanLine& line : plan) lines.push_back(MakePlanWall(line));
-  std::vector<FacePair> pairs;
+    const std::vector<Wall>& lines) {
+  // From left to right, so that a line is compared with those that lie above
+  // or below it and not with all: a drawing has up to twenty thousand.
+  struct Box {
+    std::size_t line;
+    Eigen::Vector2d low;
+    Eigen::Vector2d high;
+  };
+  std::vector<Box> boxes;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    const Wall& line = lines[i];
-    for (std::size_t k = 0; k < lines.size(); ++k) {
-      const Wall& other = lines[k];
-      if (std::abs(NormalizeAxial(line.angle - other.angle)) > kParallel) {
+    const Eigen::Vector2d begin = lines[i].At(lines[i].begin);
+    const Eigen::Vector2d end = lines[i].At(lines[i].end);
+    boxes.push_back({i, begin.cwiseMin(end), begin.cwiseMax(end)});
+  }
+  std::sort(boxes.begin(), boxes.end(), [](const Box& a, const Box& b) {
+    return a.low.x() != b.low.x() ? a.low.x() < b.low.x() : a.line < b.line;
+  });
+  std::vector<FacePair> pairs;
+  for (auto box = boxes.begin(); box != boxes.end(); ++box) {
+    for (auto next = std::next(box);
+         next != boxes.end() && next->low.x() <= box->high.x() + kMostThickness;
+         ++next) {
+      if (next->low.y() > box->high.y() + kMostThickness ||
+          box->low.y() > next->high.y() + kMostThickness) {
         continue;
       }
-      Interval part = line.IntervalOf(other);
-      part = {std::max(part.first, line.begin),
-              std::min(part.second, line.end)};
-      if (part.second <= part.first) continue;
-      // Where they lie beside each other: far off a small turn is much.
-      const Eigen::Vector2d middle = line.At(0.5 * (part.first + part.second));
-      const FacePair pair = {i, k, part,
-                             line.Across(other.At(other.Along(middle)))};
-      if (pair.thickness() >= kLeastThickness &&
-          pair.thickness() <= kMostThickness) {
-        pairs.push_back(pair);
+      for (const auto& [i, k] : {std::pair(box->line, next->line),
+                                 std::pair(next->line, box->line)}) {
+        if (const auto pair = PairUp(lines, i, k)) pairs.push_back(*pair);
       }
     }
   }
@@ -193,8 +229,8 @@ std::vector<KnownStructureBinder::FacePair> KnownStructureBinder::FacePairs(
 }
 
 std::vector<KnownStructureBinder::Faces> KnownStructureBinder::FacesBeside(
-    const std::vector<PlanLine>& plan) {
-  const std::vector<FacePair> pairs = FacePairs(plan);
+    const std::vector<Wall>& lines) {
+  const std::vector<FacePair> pairs = FacePairs(lines);
   std::vector<const FacePair*> by_thickness;
   for (const FacePair& pair : pairs) by_thickness.push_back(&pair);
   std::sort(by_thickness.begin(), by_thickness.end(),
@@ -214,7 +250,7 @@ std::vector<KnownStructureBinder::Faces> KnownStructureBinder::FacesBeside(
     }
     return false;
   };
-  std::vector<Faces> all(plan.size());
+  std::vector<Faces> all(lines.size());
   for (const FacePair& pair : pairs) {
     if (!is_usual(pair)) continue;
     Faces& faces = all[pair.line];
@@ -407,7 +443,7 @@ KnownStructureBinder::NearestLine(const MapWall& wall,
   std::optional<LineBeside> nearest;
   double least = known_.max_offset;
   for (std::size_t i = 0; i < known_.plan.size(); ++i) {
-    const Wall line = MakePlanWall(known_.plan[i]);
+    const Wall& line = lines_[i];
     const SideBySide both = Compare(line, wall, in_plan);
     if (both.turn > known_.max_angle || both.offset >= least ||
         both.length < 0.5 * std::min(wall.length(), line.length())) {
@@ -435,7 +471,7 @@ double KnownStructureBinder::SigmaAngle(double length) const {
 Constraint KnownStructureBinder::MakeTie(const MapWall& wall,
                                          const Pose2& in_plan,
                                          const LineBeside& beside) const {
-  Pose2 line = MakePlanWall(known_.plan[beside.line]).pose();
+  Pose2 line = lines_[beside.line].pose();
   if (std::cos(in_plan[2] - line[2]) < 0.0) {
     line[2] = NormalizeAngle(line[2] + kPi);
   }
@@ -519,7 +555,7 @@ KnownStructureBinder::LinesLetGo(const std::set<std::size_t>& kept,
     const Pose2 in_plan = Between(plan_pose, wall.pose());
     for (std::size_t i = 0; i < known_.plan.size(); ++i) {
       if (kept.count(i) > 0) continue;
-      SideBySide both = Compare(MakePlanWall(known_.plan[i]), wall, in_plan);
+      SideBySide both = Compare(lines_[i], wall, in_plan);
       const bool was_let_go =
           tied.count(wall.id) == 0 && ties_.count({wall.id, i}) > 0;
       // Who saw the wall looked through the line.

@@ -168,8 +168,11 @@ class KnownStructureBinder {
     std::vector<Interval> left;
     std::vector<Interval> right;
   };
-  static std::vector<FacePair> FacePairs(const std::vector<PlanLine>& plan);
-  static std::vector<Faces> FacesBeside(const std::vector<PlanLine>& plan);
+  // What the i-th line has of the k-th beside it, as a wall's two faces lie.
+  static std::optional<FacePair> PairUp(const std::vector<Wall>& lines,
+                                        std::size_t i, std::size_t k);
+  static std::vector<FacePair> FacePairs(const std::vector<Wall>& lines);
+  static std::vector<Faces> FacesBeside(const std::vector<Wall>& lines);
   // The side from which a part of a line is seen, as the wall's other face lies
   // on the other: 1 for the left, -1 for the right, 0 where the plan does not
   // tell.
@@ -179,7 +182,8 @@ class KnownStructureBinder {
   const Registry& registry_;
   FeatureId first_pose_;
   Graph* graph_;
-  // By line of the plan.
+  // Lines of the plan, and what lies beside each.
+  std::vector<Wall> lines_;
   std::vector<Faces> faces_;
   FeatureId plan_pose_ = kNoId;
   bool was_placed_ = false;

@@ -142,7 +142,10 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
     }
   }
   map.path = InterpolateScans(result.refined, builder->records(), keys);
-  return map;
+  // Two maps that are laid over each other begin at the same pose.
+  const auto first = static_cast<std::size_t>(result.records.front().scan);
+  const Pose2 by = Compose(result.trajectory[first], Inverse(map.path[first]));
+  return Moved(by, std::move(map));
 }
 
 }  // namespace plumbline

@@ -25,11 +25,12 @@ std::map<FeatureId, Feature> SolveWithoutStructure(const Graph& graph,
 /// Makes the map of a log again from the same refined odometry, with the same
 /// front-end but no structure, neither on the way nor in the end. A feature's
 /// counterpart is the one that took the same piece of wall in the same scan.
-/// `options` are those that gave `result`, whose fields refined and records are
-/// read. Empty when there is nothing to compare: no scans, no structure asked
-/// for, a solve that fails, or once `stop` (may be null) says so. Throws Error
-/// when the scans cannot be found again on the map. Costs the front-end without
-/// scan matching, one global solve and one relocalization.
+/// It begins at the pose at which that map does. `options` are those that gave
+/// `result`, whose fields refined, records and trajectory are read. Empty when
+/// there is nothing to compare: no scans, no structure asked for, a solve that
+/// fails, or once `stop` (may be null) says so. Throws Error when the scans
+/// cannot be found again on the map. Costs the front-end without scan matching,
+/// one global solve and one relocalization.
 MapWithoutStructure ReplayWithoutStructure(
     const std::vector<Scan>& scans, const Registry& registry,
     const LogSolverOptions& options, const LogSolverResult& result,

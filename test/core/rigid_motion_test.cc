@@ -11,56 +11,15 @@
 #include <string>
 #include <vector>
 
+#include "core/graph_fixture.h"
+
 namespace plumbline {
 namespace {
 
 using Eigen::Vector2d;
 using ::testing::HasSubstr;
 
-class RigidMotionTest : public ::testing::Test {
- protected:
-  RigidMotionTest() { RegisterBuiltinRelations(&registry_); }
-
-  Feature Make(const std::string& type, const std::vector<double>& parameters) {
-    Feature feature;
-    feature.type = &registry_.GetFeature(type);
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      feature.parameters[i] = parameters[i];
-    }
-    return feature;
-  }
-
-  // A wall from one point to the other, seen from its left.
-  Feature Wall(const Vector2d& from, const Vector2d& to) {
-    const Vector2d along = to - from;
-    Feature wall =
-        Make("segment", {from[0], from[1], std::atan2(along[1], along[0])});
-    wall.extent_end = along.norm();
-    return wall;
-  }
-
-  FeatureId Add(const Feature& feature) {
-    Transaction transaction;
-    transaction.AddFeature(feature);
-    return graph_.Apply(std::move(transaction)).features.at(0);
-  }
-  ConstraintId Tie(const std::string& relation,
-                   const std::vector<FeatureId>& features,
-                   const Eigen::VectorXd& expected) {
-    Transaction transaction;
-    Constraint constraint;
-    constraint.type = &registry_.GetRelation(relation);
-    constraint.features = features;
-    constraint.expected = expected;
-    constraint.information =
-        Eigen::MatrixXd::Identity(expected.size(), expected.size());
-    transaction.AddConstraint(constraint);
-    return graph_.Apply(std::move(transaction)).constraints.at(0);
-  }
-
-  Registry registry_;
-  Graph graph_;
-};
+using RigidMotionTest = GraphFixture;
 
 // Where a feature's points lie after it was moved.
 TEST_F(RigidMotionTest, FeaturesMoveAsTheirPointsDo) {

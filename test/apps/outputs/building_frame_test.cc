@@ -1,48 +1,19 @@
 #include <gtest/gtest.h>
-#include <plumbline/core/builtins.h>
+#include <plumbline/core/rigid_motion.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/outputs/building_frame.h>
 
 #include <cmath>
-#include <string>
 #include <vector>
+
+#include "core/graph_fixture.h"
 
 namespace plumbline {
 namespace {
 
 using Eigen::Vector2d;
 
-class BuildingFrameTest : public ::testing::Test {
- protected:
-  BuildingFrameTest() { RegisterBuiltinRelations(&registry_); }
-
-  Feature Make(const std::string& type, const std::vector<double>& parameters) {
-    Feature feature;
-    feature.type = &registry_.GetFeature(type);
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      feature.parameters[i] = parameters[i];
-    }
-    return feature;
-  }
-
-  // A wall from one point to the other, seen from its left.
-  Feature Wall(const Vector2d& from, const Vector2d& to) {
-    const Vector2d along = to - from;
-    Feature wall =
-        Make("segment", {from[0], from[1], std::atan2(along[1], along[0])});
-    wall.extent_end = along.norm();
-    return wall;
-  }
-
-  FeatureId Add(const Feature& feature) {
-    Transaction transaction;
-    transaction.AddFeature(feature);
-    return graph_.Apply(std::move(transaction)).features.at(0);
-  }
-
-  Registry registry_;
-  Graph graph_;
-};
+using BuildingFrameTest = GraphFixture;
 
 // A room that is turned by `angle`.
 TEST_F(BuildingFrameTest, WallsRunAlongTheAxes) {

@@ -228,6 +228,25 @@ TEST_F(ReportTest, ReplayIsARunWithoutStructure) {
       ReplayWithoutStructure(log.scans, registry_, plain, other).path.empty());
 }
 
+// The two are laid over each other: what one scan knows of the wall that holds
+// the one while it grows must not turn it against the other.
+TEST_F(ReportTest, TheReplayBeginsWhereTheMapDoes) {
+  Log log = ReadCarmenLog(
+      std::string(PLUMBLINE_SOURCE_DIR) + "/datasets/office.clf.gz",
+      LaserOptions());
+  log.scans.resize(200);
+  for (const Refinement refine : {Refinement::kMap, Refinement::kFull}) {
+    LogSolverOptions options;
+    options.refine = refine;
+    const LogSolverResult result = LogSolver(registry_, options).Run(log);
+    const MapWithoutStructure replayed =
+        ReplayWithoutStructure(log.scans, registry_, options, result);
+    ASSERT_EQ(replayed.path.size(), 200u);
+    EXPECT_LT(Between(result.trajectory.front(), replayed.path.front()).norm(),
+              1e-9);
+  }
+}
+
 TEST_F(ReportTest, DataOfTheMap) {
   MakeCorridor(3);
   Transaction transaction;

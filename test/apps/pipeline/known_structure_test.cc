@@ -68,6 +68,13 @@ TEST(WallStatementsTest, RefusesWhatIsNone) {
   EXPECT_THAT(why("same 1,2 3,4 soft\n"), HasSubstr("not understood"));
 }
 
+// Uneven enough for a plan to fit in one place. `last`: direction of one, rad.
+std::vector<Pose2> FiveWalls(double last = 0.0) {
+  return {Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi),
+          Pose2(1.0, 5.0, 0.3), Pose2(-3.0, 3.0, 0.5 * kPi),
+          Pose2(5.0, -1.5, last)};
+}
+
 // Walls that a fixed pose has measured, each to `sigma`, m and rad / 10.
 class StatementTest : public ::testing::Test {
  protected:
@@ -166,10 +173,7 @@ TEST_F(StatementTest, SaysWhereThereIsNoWall) {
 // A drawing has a frame, or a second building far away: neither memory nor time
 // may grow with that distance.
 TEST_F(StatementTest, WhatIsFarAwayInThePlanDoesNotCount) {
-  MakeWalls(
-      {Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi), Pose2(1.0, 5.0, 0.3),
-       Pose2(-3.0, 3.0, 0.5 * kPi), Pose2(5.0, -1.5, 0.0)},
-      0.02);
+  MakeWalls(FiveWalls(), 0.02);
   KnownStructure known;
   const PoseTransform elsewhere(Pose2(100.0, -50.0, 0.65));
   for (std::size_t i = 0; i < walls_.size(); ++i) {
@@ -239,10 +243,7 @@ TEST_F(StatementTest, APlanThatFitsInTwoPlacesNeedsItsPose) {
 // stands elsewhere does; and the run says where.
 TEST_F(StatementTest, WhatStandsBesideALineIsTold) {
   for (const bool is_long : {false, true}) {
-    MakeWalls(
-        {Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi), Pose2(1.0, 5.0, 0.3),
-         Pose2(-3.0, 3.0, 0.5 * kPi), Pose2(5.0, -1.5, 0.0)},
-        0.005);
+    MakeWalls(FiveWalls(), 0.005);
     KnownStructure known;
     for (std::size_t i = 0; i < walls_.size(); ++i) {
       const PoseTransform wall(Wall(i));
@@ -278,9 +279,7 @@ TEST_F(StatementTest, WhatStandsBesideALineIsTold) {
 // A map that is off by more than half the thickness of a wall: the nearest line
 // is the other face of the wall, which is not seen from there.
 TEST_F(StatementTest, AWallIsTiedToTheFaceThatIsSeenFromItsSide) {
-  const std::vector<Pose2> faces = {
-      Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi), Pose2(1.0, 5.0, 0.3),
-      Pose2(-3.0, 3.0, 0.5 * kPi), Pose2(5.0, -1.5, 0.0)};
+  const std::vector<Pose2> faces = FiveWalls();
   KnownStructure known;
   for (const Pose2& face : faces) {
     for (const double across : {0.0, -0.15}) {
@@ -306,10 +305,7 @@ TEST_F(StatementTest, AWallIsTiedToTheFaceThatIsSeenFromItsSide) {
 // A wall of 1 m, 3 degrees off its line as short walls are, and 110 m from the
 // plan's origin: the turn alone would put it 0.15 m off as seen from there.
 TEST_F(StatementTest, AShortWallFarFromThePlansOriginStaysTied) {
-  MakeWalls(
-      {Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi), Pose2(1.0, 5.0, 0.3),
-       Pose2(-3.0, 3.0, 0.5 * kPi), Pose2(5.0, -1.5, 0.457)},
-      0.005);
+  MakeWalls(FiveWalls(0.457), 0.005);
   KnownStructure known;
   const PoseTransform elsewhere(Pose2(100.0, -50.0, 0.65));
   for (std::size_t i = 0; i < walls_.size(); ++i) {
@@ -332,10 +328,7 @@ TEST_F(StatementTest, AShortWallFarFromThePlansOriginStaysTied) {
 
 // Whoever saw the wall looked through the line in front of it.
 TEST_F(StatementTest, ALineInFrontOfAWallIsToldAsWrong) {
-  MakeWalls(
-      {Pose2(0.0, 0.0, 0.0), Pose2(2.0, 2.0, 0.5 * kPi), Pose2(1.0, 5.0, 0.3),
-       Pose2(-3.0, 3.0, 0.5 * kPi), Pose2(5.0, -1.5, 0.0)},
-      0.01);
+  MakeWalls(FiveWalls(), 0.01);
   for (const double across : {0.25, -0.25}) {
     KnownStructure known;
     for (std::size_t i = 0; i <= walls_.size(); ++i) {

@@ -2,10 +2,10 @@
 #include <archive_entry.h>
 #include <fcntl.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/read_ahead.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/frontend/bzip2_decoder.h>
 #include <plumbline/frontend/input_stream.h>
-#include <plumbline/frontend/read_ahead.h>
 #include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>

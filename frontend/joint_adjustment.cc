@@ -67,44 +67,6 @@ std::size_t CountReturns(const std::vector<Scan>& scans, std::size_t begin,
   return count;
 }
 
-std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
-                                const std::vector<RefinedScan>& refined,
-                                const std::vector<KeyScanRecord>& records,
-                                const std::vector<std::size_t>& begins,
-                                const JointAdjustmentOptions& options) {
-  std::vector<Place> places(begins.size());
-  ParallelFor(places.size(), options.num_threads, [&](std::size_t p) {
-    Place& place = places[p];
-    place.num_scans = 0;
-    std::vector<ScanPoint> points;
-    Pose2 key = Pose2::Zero();
-    const std::size_t last =
-        p + 1 < begins.size() ? begins[p + 1] : records.size();
-    if (begins[p] < last) {
-      place.returns.reserve(CountReturns(
-          scans, records[begins[p]].scan,
-          last < records.size() ? records[last].scan : refined.size(),
-          options.points));
-    }
-    for (std::size_t k = begins[p]; k < last; ++k) {
-      if (k > begins[p]) key = Compose(key, records[k].motion.mean);
-      const std::size_t begin = records[k].scan;
-      const std::size_t end =
-          k + 1 < records.size() ? records[k + 1].scan : refined.size();
-      for (std::size_t i = begin; i < end; ++i) {
-        ExtractScanPoints(scans[i], options.points, &points);
-        if (place.num_scans == 0) place.scan = points;
-        const Pose2 pose =
-            i == begin ? key : Compose(key, refined[i].since_key.mean);
-        if (i == begin) AddReference(points, pose, &place.reference);
-        AddReturns(points, pose, &place.returns);
-        ++place.num_scans;
-      }
-    }
-  });
-  return places;
-}
-
 // Chi-square of a relative pose at the present state.
 double ChiSquare(const Graph& graph, FeatureId from, FeatureId to,
                  const Pose2& expected, const Eigen::Matrix3d& information) {
@@ -182,23 +144,72 @@ UncertainPose2 MotionTo(const std::vector<KeyScanRecord>& records,
 
 }  // namespace
 
+std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
+                                const std::vector<RefinedScan>& refined,
+                                const std::vector<KeyScanRecord>& records,
+                                const JointAdjustmentOptions& options,
+                                const std::function<bool()>& stop) {
+  const std::vector<std::size_t> begins =
+      PlaceBegins(records, options.place_stride);
+  std::vector<Place> places(begins.size());
+  ParallelFor(places.size(), options.num_threads, [&](std::size_t p) {
+    Place& place = places[p];
+    place.num_scans = 0;
+    if (stop && stop()) return;
+    std::vector<ScanPoint> points;
+    Pose2 key = Pose2::Zero();
+    const std::size_t last =
+        p + 1 < begins.size() ? begins[p + 1] : records.size();
+    if (begins[p] < last) {
+      place.returns.reserve(CountReturns(
+          scans, records[begins[p]].scan,
+          last < records.size() ? records[last].scan : refined.size(),
+          options.points));
+    }
+    for (std::size_t k = begins[p]; k < last; ++k) {
+      if (k > begins[p]) key = Compose(key, records[k].motion.mean);
+      const std::size_t begin = records[k].scan;
+      const std::size_t end =
+          k + 1 < records.size() ? records[k + 1].scan : refined.size();
+      for (std::size_t i = begin; i < end; ++i) {
+        ExtractScanPoints(scans[i], options.points, &points);
+        if (place.num_scans == 0) place.scan = points;
+        const Pose2 pose =
+            i == begin ? key : Compose(key, refined[i].since_key.mean);
+        if (i == begin) AddReference(points, pose, &place.reference);
+        AddReturns(points, pose, &place.returns);
+        ++place.num_scans;
+      }
+    }
+  });
+  return places;
+}
+
 JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
                                  const Registry& registry,
                                  const std::vector<Scan>& scans,
                                  const std::vector<RefinedScan>& refined,
                                  const std::vector<KeyScanRecord>& records,
                                  const JointAdjustmentOptions& options,
-                                 std::function<bool()> stop)
+                                 std::function<bool()> stop,
+                                 std::vector<Place> places)
     : graph_(graph),
       session_(session),
       registry_(registry),
       options_(options),
       stop_(std::move(stop)),
-      records_(records) {
+      records_(records),
+      places_(std::move(places)) {
   options_.relations.num_threads = options_.num_threads;
   options_.votes.num_threads = options_.num_threads;
   begins_ = PlaceBegins(records_, options_.place_stride);
-  places_ = GatherPlaces(scans, refined, records_, begins_, options_);
+  if (places_.empty()) {
+    places_ = GatherPlaces(scans, refined, records_, options_);
+  }
+  if (places_.size() != begins_.size()) {
+    throw PLUMBLINE_ERROR(std::to_string(places_.size()) + " places",
+                          std::to_string(begins_.size()));
+  }
   for (std::size_t p = 0; p < places_.size(); ++p) {
     const KeyScanRecord& record = records_[begins_[p]];
     places_[p].follows_previous = record.from < 0 && !record.is_loose;
@@ -220,7 +231,7 @@ JointAdjustment::JointAdjustment(
     const std::vector<KeyScanRecord>& records, StateReader* state,
     const JointAdjustmentOptions& options, std::function<bool()> stop)
     : JointAdjustment(graph, session, registry, scans, refined, records,
-                      options, std::move(stop)) {
+                      options, std::move(stop), {}) {
   finder_->ReadState(state);
   ExchangeState(*state);
   if (poses_.size() != places_.size()) {
@@ -247,9 +258,10 @@ JointAdjustment::JointAdjustment(
     const std::vector<Scan>& scans, const std::vector<RefinedScan>& refined,
     const std::vector<KeyScanRecord>& records,
     const std::vector<Pose2>& key_poses, FeatureId robot,
-    const JointAdjustmentOptions& options, std::function<bool()> stop)
+    const JointAdjustmentOptions& options, std::function<bool()> stop,
+    std::vector<Place> places)
     : JointAdjustment(graph, session, registry, scans, refined, records,
-                      options, std::move(stop)) {
+                      options, std::move(stop), std::move(places)) {
   if (records.size() != key_poses.size()) {
     throw PLUMBLINE_ERROR(
         std::to_string(key_poses.size()) + " poses",
@@ -284,9 +296,9 @@ JointAdjustment::JointAdjustment(
         pose_pose, {provisional[arrival.from], provisional[p]}, motion.mean,
         0.5 * (information + information.transpose()), kSource));
   }
-  const TransactionResult places = graph_->Apply(std::move(transaction));
-  poses_ = places.features;
-  for (const ConstraintId id : places.constraints) {
+  const TransactionResult added = graph_->Apply(std::move(transaction));
+  poses_ = added.features;
+  for (const ConstraintId id : added.constraints) {
     motions_.emplace_back(id, graph_->GetConstraint(id).information);
   }
   // What stood for the poses goes, where the returns speak themselves.

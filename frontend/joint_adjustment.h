@@ -76,6 +76,17 @@ std::vector<Pose2> KeyPosesOfPlaces(const Graph& graph,
 /// small angles need it; covariances of walls would come out too wide with it.
 void ReportVoteVariances(double excess, const Registry& registry, Graph* graph);
 
+/// What was seen from the places into which the records divide the log, one
+/// every `options.place_stride` key scans; how they follow each other is left
+/// open. `refined` has one entry per scan. Once `stop` (may be null) says so
+/// the rest of the places is left empty. Uses options.num_threads threads.
+/// Cost: linear in the returns.
+std::vector<Place> GatherPlaces(const std::vector<Scan>& scans,
+                                const std::vector<RefinedScan>& refined,
+                                const std::vector<KeyScanRecord>& records,
+                                const JointAdjustmentOptions& options,
+                                const std::function<bool()>& stop = nullptr);
+
 /// Joint adjustment of poses, walls and structure to all scans (not in the
 /// paper, whose method, core/method.md, section 7, ends with finding the scans
 /// again on a map that stays as it is).
@@ -99,14 +110,16 @@ class JointAdjustment {
   /// not owned and must outlive this, and so must `registry`, `records` and
   /// what `stop` (may be null) refers to: it is asked now and then here and
   /// below; once it has returned true the work ends early, the graph whole but
-  /// unfinished.
+  /// unfinished. `gathered`: what GatherPlaces made of the same; none: that is
+  /// done here.
   JointAdjustment(Graph* graph, SolverSession* session,
                   const Registry& registry, const std::vector<Scan>& scans,
                   const std::vector<RefinedScan>& refined,
                   const std::vector<KeyScanRecord>& records,
                   const std::vector<Pose2>& key_poses, FeatureId robot,
                   const JointAdjustmentOptions& options,
-                  std::function<bool()> stop = nullptr);
+                  std::function<bool()> stop = nullptr,
+                  std::vector<Place> gathered = {});
 
   /// Goes on from what WriteState of another one wrote that was made with the
   /// same scans, records and options, on an equal graph.
@@ -188,7 +201,7 @@ class JointAdjustment {
                   const std::vector<RefinedScan>& refined,
                   const std::vector<KeyScanRecord>& records,
                   const JointAdjustmentOptions& options,
-                  std::function<bool()> stop);
+                  std::function<bool()> stop, std::vector<Place> places);
   template <typename Archive>
   void ExchangeState(Archive& archive);
   std::vector<Pose2> PlacePoses() const;

@@ -926,8 +926,15 @@ void OdometryRefiner::ContinueTrack(const Scan& scan,
 }
 
 RefinedScan OdometryRefiner::Process(const Scan& scan) {
+  return Process(scan, [&](double, std::vector<ScanPoint>* points) {
+    ExtractScanPoints(scan, options_.points, points);
+  });
+}
+
+RefinedScan OdometryRefiner::Process(const Scan& scan,
+                                     const ReturnsOf& returns_of) {
   AllowForNoise(scan);
-  ExtractScanPoints(scan, options_.points, &points_);
+  returns_of(noise_scale_, &points_);
   SettledScan done;
   done.index = count_++;
   const Pose2 by_wheels =

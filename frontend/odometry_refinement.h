@@ -157,6 +157,12 @@ class OdometryRefiner {
   /// Scans in the order of the log. Returns what is known of the scan now;
   /// while a tie is open its pose is a guess.
   RefinedScan Process(const Scan& scan);
+  /// The same with returns that are made elsewhere: sets those of the scan
+  /// (ExtractScanPoints with the options' points, for a laser noisier by
+  /// `noise_scale`).
+  using ReturnsOf =
+      std::function<void(double noise_scale, std::vector<ScanPoint>* points)>;
+  RefinedScan Process(const Scan& scan, const ReturnsOf& returns_of);
 
   /// Takes out the next scan that is settled, in the order of Process; false
   /// when there is none.

@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/range_offset.h>
 #include <plumbline/frontend/scan_points.h>
@@ -37,6 +38,8 @@ constexpr std::size_t kMostReturns = 180;
 constexpr double kCauchy = 0.03;
 // Where one wall only is seen the motion along it is open, 1/m^2 and 1/rad^2.
 constexpr double kRidge = 1.0;
+// Pairs that one thread compares in turn.
+constexpr std::size_t kPairsInTurn = 25;
 // The log is taken in so many parts, which differ by chance.
 constexpr std::size_t kParts = 8;
 // What is compared moves with what is taken out: done again, at most so often,
@@ -195,10 +198,17 @@ std::vector<Pair> PairsToCompare(const std::vector<Scan>& scans) {
 
 std::vector<Equation> CompareAll(const std::vector<Scan>& scans, double known,
                                  std::vector<Pair>* pairs) {
-  PairComparison comparison;
+  std::vector<Equation> of_pairs(pairs->size());
+  const std::size_t turns = (pairs->size() + kPairsInTurn - 1) / kPairsInTurn;
+  ParallelFor(turns, ThreadsHere(), [&](std::size_t turn) {
+    PairComparison comparison;
+    const std::size_t end = std::min(pairs->size(), (turn + 1) * kPairsInTurn);
+    for (std::size_t i = turn * kPairsInTurn; i < end; ++i) {
+      of_pairs[i] = comparison.Compare(scans, known, &(*pairs)[i]);
+    }
+  });
   std::vector<Equation> equations;
-  for (Pair& pair : *pairs) {
-    const Equation equation = comparison.Compare(scans, known, &pair);
+  for (const Equation& equation : of_pairs) {
     if (equation.information > 0.0) equations.push_back(equation);
   }
   return equations;

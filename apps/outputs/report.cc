@@ -7,7 +7,6 @@
 #include <plumbline/factors/chi_square.h>
 #include <plumbline/outputs/map_drawing.h>
 #include <plumbline/outputs/report.h>
-#include <plumbline/outputs/report_picture.h>
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -16,6 +15,7 @@
 #include <exception>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 namespace plumbline {
 
@@ -27,13 +27,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kLeastWay = 0.1;  // m, between poses of the path
-// Of the grid's picture.
-constexpr double kMostPixels = 4e6;
-// Of a run that was interrupted: somebody waits for it.
-constexpr double kMostPixelsOfAPart = 1e6;
-// Opaque, red, green, blue.
-constexpr std::uint32_t kOccupiedPixel = 0xff6b7682;
-constexpr std::uint32_t kFreePixel = 0xffeef1f4;
 
 // To a tenth of a millimetre, or of the unit that it is in: the page stays
 // small. What is not finite becomes null.
@@ -358,41 +351,14 @@ Json PlacedClosuresToJson(const std::vector<PlacedClosure>& closures) {
   return array;
 }
 
-// The grid as a picture, unknown cells clear; coarser where it is large: a
-// pixel is then occupied where one of its cells is.
-Json GridToJson(const OccupancyGrid* grid, double most_pixels) {
-  if (grid == nullptr) return nullptr;
-  int cells = 1;
-  while (static_cast<double>(grid->width()) * grid->height() /
-             (static_cast<double>(cells) * cells) >
-         most_pixels) {
-    ++cells;
-  }
-  ReportPicture picture;
-  picture.width = (grid->width() + cells - 1) / cells;
-  picture.height = (grid->height() + cells - 1) / cells;
-  picture.pixels.assign(static_cast<std::size_t>(picture.width) *
-                            static_cast<std::size_t>(picture.height),
-                        0);
-  grid->VisitKnown([&](int column, int row, std::uint8_t value) {
-    // The first row of a picture is the upper one.
-    std::uint32_t& pixel =
-        picture
-            .pixels[static_cast<std::size_t>(picture.height - 1 - row / cells) *
-                        static_cast<std::size_t>(picture.width) +
-                    static_cast<std::size_t>(column / cells)];
-    if (value == OccupancyGrid::kOccupied) {
-      pixel = kOccupiedPixel;
-    } else if (pixel == 0) {
-      pixel = kFreePixel;
-    }
-  });
-  return {{"x", Rounded(grid->origin().x())},
-          {"y", Rounded(grid->origin().y())},
-          {"resolution", Rounded(grid->resolution() * cells, 1e9)},
-          {"width", picture.width},
-          {"height", picture.height},
-          {"png", PngInBase64(picture)}};
+Json GridToJson(const std::optional<ReportGrid>& grid) {
+  if (!grid) return nullptr;
+  return {{"x", Rounded(grid->origin.x())},
+          {"y", Rounded(grid->origin.y())},
+          {"resolution", Rounded(grid->resolution, 1e9)},
+          {"width", grid->width},
+          {"height", grid->height},
+          {"png", grid->png}};
 }
 
 Json TraceToJson(const std::vector<EmTraceRow>& trace) {
@@ -457,8 +423,7 @@ Json DataToJson(const Report& report) {
   json["structure"] = StructureToJson(report, &relations, &sources);
   json["closures"] = ClosuresToJson(*report.graph);
   json["placed_closures"] = PlacedClosuresToJson(report.closures);
-  json["grid"] = GridToJson(report.grid,
-                            summary.partial ? kMostPixelsOfAPart : kMostPixels);
+  json["grid"] = GridToJson(report.grid);
   json["live"] = report.reload_seconds > 0
                      ? Json{{"stage", report.stage},
                             {"seconds", report.reload_seconds},

@@ -8,11 +8,12 @@
 #include <plumbline/frontend/map_without_structure.h>
 #include <plumbline/outputs/em_trace.h>
 #include <plumbline/outputs/map_drawing.h>
-#include <plumbline/outputs/occupancy_grid.h>
+#include <plumbline/outputs/report_grid.h>
 #include <plumbline/outputs/summary.h>
 #include <plumbline/plan/building_plan.h>
 
 #include <cstdint>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -36,9 +37,9 @@ struct Report {
   std::vector<FlagValue> flags;
   double delta_threshold = 0.0;
   std::string title;
-  /// A layer under the walls: what is free and occupied; null where there is
-  /// none.
-  const OccupancyGrid* grid = nullptr;
+  /// A layer under the walls: what is free and occupied; none where there is no
+  /// grid.
+  std::optional<ReportGrid> grid;
   /// Those of a first map that another one stands for.
   std::vector<PlacedClosure> closures;
   /// How what is broken was broken, as far as it is known.

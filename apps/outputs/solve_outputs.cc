@@ -162,7 +162,6 @@ Report MakeReport(const SolveOutcome& outcome) {
   report.graph = outcome.graph;
   if (outcome.without_structure) report.before = outcome.without_structure();
   report.path = Poses(outcome);
-  report.building = outcome.parts->Building(outcome);
   for (const EmPhase& phase : outcome.trace)
     report.trace.push_back({phase, {}});
   report.summary = outcome.summary;
@@ -173,8 +172,15 @@ Report MakeReport(const SolveOutcome& outcome) {
   report.closures = outcome.closures;
   if (outcome.scans != nullptr && !outcome.trajectory.empty()) {
     std::string reason;
-    report.grid = outcome.parts->Grid(outcome, &reason);
+    const OccupancyGrid* const grid = outcome.parts->Grid(outcome, &reason);
+    if (grid != nullptr) {
+      report.grid = MakeReportGrid(*grid, outcome.summary.partial
+                                              ? kMostReportPixelsOfAPart
+                                              : kMostReportPixels);
+    }
   }
+  // Last, as another thread may be making it.
+  report.building = outcome.parts->Building(outcome);
   return report;
 }
 
@@ -264,7 +270,7 @@ WriteResult RunWriter(const OutputWriterType& writer,
 // too. 0 without such a part.
 int TurnOf(const OutputWriterType& output) {
   static const std::vector<std::string> kOfThePlan = {
-      "report.html",   "map.json",          "occupancy.pgm", "floorplan.svg",
+      "report.html",   "map.json",          "floorplan.svg",
       "floorplan.dxf", "floorplan.geojson", "rooms.csv"};
   const auto found =
       std::find(kOfThePlan.begin(), kOfThePlan.end(), output.name);
@@ -283,6 +289,14 @@ std::vector<std::size_t> OrderOfWriting(
                      return TurnOf(*outputs[a]) < TurnOf(*outputs[b]);
                    });
   return order;
+}
+
+// Whether files show the grid.
+bool HasGrid(const std::vector<const OutputWriterType*>& outputs) {
+  return std::any_of(
+      outputs.begin(), outputs.end(), [](const OutputWriterType* output) {
+        return output->name == "report.html" || output->name == "occupancy.pgm";
+      });
 }
 
 // Makes the plan that others will ask for.
@@ -447,6 +461,12 @@ WrittenOutputs WriteSolveOutputs(
   const bool has_plan = std::any_of(
       selected.begin(), selected.end(),
       [](const OutputWriterType* output) { return TurnOf(*output) > 0; });
+  // On all threads, before each of them has a file to write.
+  std::string no_grid;
+  if (HasGrid(selected) && outcome.scans != nullptr &&
+      !outcome.trajectory.empty()) {
+    outcome.parts->Grid(outcome, &no_grid);
+  }
   std::vector<WriteResult> results(selected.size());
   std::mutex mutex;
   int done = 0;

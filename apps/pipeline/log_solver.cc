@@ -7,6 +7,7 @@
 #include <plumbline/detectors/visibility.h>
 #include <plumbline/frontend/looks.h>
 #include <plumbline/frontend/relocalization.h>
+#include <plumbline/frontend/returns_ahead.h>
 #include <plumbline/pipeline/glimpsed_walls.h>
 #include <plumbline/pipeline/log_run.h>
 #include <plumbline/pipeline/log_solver.h>
@@ -171,17 +172,24 @@ void LogSolver::RequireFresh() const {
 Pose2 LogSolver::AddScan(Scan scan) {
   RequireUnfinished();
   scans_.push_back(std::move(scan));
-  TakeScan(scans_, Process(scans_.back()));
+  TakeScan(scans_, Process(scans_.back(), nullptr));
   if (builder_->records().empty()) return refined_.back().pose;
   return refined_.back().is_key
              ? builder_->robot()
              : Compose(builder_->robot(), refined_.back().since_key.mean);
 }
 
-LogSolver::Processed LogSolver::Process(const Scan& scan) {
+LogSolver::Processed LogSolver::Process(const Scan& scan,
+                                        ReturnsAhead* returns) {
   const Stopwatch watch;
   Processed processed;
-  processed.refined = refiner_.Process(scan);
+  processed.refined =
+      returns == nullptr
+          ? refiner_.Process(scan)
+          : refiner_.Process(
+                scan, [&](double noise_scale, std::vector<ScanPoint>* points) {
+                  returns->Take(noise_scale, points);
+                });
   processed.settled = Settled();
   processed.all_settled = refiner_.IsSettled();
   processed.seconds = watch.Seconds();
@@ -283,14 +291,14 @@ bool LogSolver::TakeStage(const std::vector<Scan>& scans,
   // its state is written.
   std::size_t next = refined_.size();
   bool is_end = false;
+  ReturnsAhead returns(scans, next, options_.odometry.points, kScansAhead);
   ReadAhead<Processed> ahead(
-      [&, stage_begin = stage_begin_]() -> std::optional<Processed> {
-        if (is_end || next == scans.size()) return std::nullopt;
-        Processed processed = Process(scans[next++]);
-        is_end = EndsStage(stage_begin, next, processed);
-        return processed;
-      },
-      kScansAhead, ThreadsHere() > 1);
+      kScansAhead, [&, stage_begin = stage_begin_](Processed* processed) {
+        if (is_end || next == scans.size()) return false;
+        *processed = Process(scans[next++], &returns);
+        is_end = EndsStage(stage_begin, next, *processed);
+        return true;
+      });
   bool is_stopped = false;
   const auto ask_stop = [&] {
     if (is_stopped || !control.stop || !control.stop()) return;
@@ -298,8 +306,12 @@ bool LogSolver::TakeStage(const std::vector<Scan>& scans,
     ahead.Stop();
   };
   ask_stop();
-  while (const std::optional<Processed> processed = ahead.Next()) {
-    TakeScan(scans, *processed);
+  while (true) {
+    while (!ahead.HasNext() && returns.MakeNext()) {
+    }
+    Processed processed;
+    if (!ahead.Next(&processed)) break;
+    TakeScan(scans, processed);
     if (control.progress) control.progress(refined_.size(), scans.size());
     if (control.look) {
       control.look(
@@ -492,6 +504,9 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
   result.records = builder_->records();
   result.refined = std::move(refined_);
   builder_.reset();
+  if (end == Stage::kEnd && options_.refine == Refinement::kFull) {
+    context.second.GatherAhead();
+  }
   return FinishFrom(Stage::kFindStructure, end, &context);
 }
 
@@ -532,6 +547,7 @@ LogSolverResult LogSolver::FinishFrom(Stage stage, Stage end,
   context->result.detect_seconds = totals.detect_seconds;
   context->result.solve_seconds = totals.solve_seconds;
   context->result.breaks = map_.breaks();
+  context->second.DropGathered();
   scans_ = {};
   return std::move(context->result);
 }

@@ -15,6 +15,7 @@
 #include <plumbline/frontend/point_map_builder.h>
 #include <plumbline/frontend/pose_recovery.h>
 #include <plumbline/frontend/relocalization.h>
+#include <plumbline/frontend/returns_ahead.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/wall_completion.h>
 #include <plumbline/frontend/way_check.h>
@@ -268,8 +269,9 @@ class LogSolver {
   void RequireFresh() const;
   struct Processed;
 
-  // Odometry refinement of the next scan, which does not touch the map.
-  Processed Process(const Scan& scan);
+  // Odometry refinement of the next scan, which does not touch the map. Without
+  // `returns` they are made here.
+  Processed Process(const Scan& scan, ReturnsAhead* returns);
   // Scans that the refiner has settled.
   std::vector<SettledScan> Settled();
   // A scan by itself: key scans enter the map, now and then with an EM step.
@@ -278,7 +280,8 @@ class LogSolver {
   // Takes those that are left; stages end on the way.
   void TakeScans(const std::vector<Scan>& scans, const RunControl& control);
   // Those of a stage, refined on a thread of their own ahead of the map where
-  // there is one; false when it is time to stop.
+  // there is one, and returns made for it where this one has nothing to do;
+  // false when it is time to stop.
   bool TakeStage(const std::vector<Scan>& scans, const RunControl& control);
   // Whether a stage that began with `begin` scans ends after so many.
   bool EndsStage(std::size_t begin, std::size_t end,

@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/wall_completion.h>
 #include <plumbline/pipeline/bent_map.h>
@@ -7,7 +8,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <future>
+#include <system_error>
 #include <utility>
+#include <vector>
 
 namespace plumbline {
 namespace {
@@ -30,7 +34,29 @@ SecondMap::SecondMap(const Registry& registry, const LogSolverOptions& options,
                      LogRun* run, SolvedMap* map)
     : registry_(registry), options_(options), run_(*run), map_(*map) {}
 
-SecondMap::~SecondMap() = default;
+SecondMap::~SecondMap() { DropGathered(); }
+
+void SecondMap::GatherAhead() {
+  if (ThreadsHere() < 2) return;
+  try {
+    gathered_ = std::async(std::launch::async, [this] {
+      JointAdjustmentOptions alone = options_.adjustment;
+      alone.num_threads = 1;
+      return GatherPlaces(run_.scans, run_.result.refined, run_.result.records,
+                          alone,
+                          [this] { return is_gathering_dropped_.load(); });
+    });
+  } catch (const std::system_error&) {
+    // No thread is granted.
+  }
+}
+
+void SecondMap::DropGathered() {
+  if (!gathered_.valid()) return;
+  is_gathering_dropped_ = true;
+  gathered_.wait();
+  gathered_ = {};
+}
 
 void SecondMap::AdjustPoses() {
   KeepFirst();
@@ -60,10 +86,12 @@ void SecondMap::AdjustFrom(const std::vector<Pose2>& start,
                            const JointAdjustmentOptions& options) {
   adjustment_.reset();
   map_.Clear();
+  std::vector<Place> places;
+  if (gathered_.valid()) places = gathered_.get();
   adjustment_ = std::make_unique<JointAdjustment>(
       &map_.graph(), &map_.session(), registry_, run_.scans,
       run_.result.refined, run_.result.records, start, kNoId, options,
-      run_.control.stop);
+      run_.control.stop, std::move(places));
   run_.places = adjustment_->places();
   adjustment_->Adjust();
   if (!run_.IsStopped()) {

@@ -9,6 +9,8 @@
 #include <plumbline/pipeline/map_review.h>
 #include <plumbline/pipeline/solved_map.h>
 
+#include <atomic>
+#include <future>
 #include <memory>
 #include <string>
 #include <vector>
@@ -34,6 +36,14 @@ class SecondMap {
   /// Length of the first map's walls, m, that this one's are measured by, where
   /// the first map does not lie in the SolvedMap; 0: it does.
   void SetFirstLength(double length) { first_length_ = length; }
+
+  /// Begins to gather what was seen from the places (GatherPlaces), on a thread
+  /// of its own while the first map is made; without ThreadsHere() to spare
+  /// AdjustPoses does it. From now on the refined scans and records of the run
+  /// stay as they are.
+  void GatherAhead();
+  /// What was begun is not needed any more.
+  void DropGathered();
 
   /// Adjusts the poses alone, from the key poses of the run or from odometry,
   /// whichever agrees better with what was seen. Sets the places and the
@@ -91,6 +101,9 @@ class SecondMap {
   std::vector<Pose2> first_trajectory_;
   double first_length_ = 0.0;
   double vote_excess_ = 1.0;
+  std::atomic<bool> is_gathering_dropped_{false};
+  // None once they are taken. Last, as it uses the others.
+  std::future<std::vector<Place>> gathered_;
 };
 
 }  // namespace plumbline

@@ -407,7 +407,7 @@ TEST_F(ReportTest, GridAndClosures) {
   options.resolution = 0.5;
   options.border = 0;
   const OccupancyGrid grid({0.0, 0.0}, {4.0, 2.0}, options);
-  report.grid = &grid;
+  report.grid = MakeReportGrid(grid);
   report.stage = "closing of loops";
   report.reload_seconds = 5;
   data = Script(Text(report), "data");
@@ -509,7 +509,7 @@ TEST_F(ReportInBrowserTest, MeasuresAndShowsLayers) {
   OccupancyGrid grid({0.0, -3.0}, {20.0, 5.0}, OccupancyOptions());
   Report report = MakeReport();
   report.building = &plan;
-  report.grid = &grid;
+  report.grid = MakeReportGrid(grid);
   Open(report);
   const auto text_of = [this](const std::string& id) {
     return browser_

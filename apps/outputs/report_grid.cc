@@ -1,13 +1,28 @@
 #include <cairo.h>
 #include <plumbline/core/error.h>
-#include <plumbline/outputs/report_picture.h>
+#include <plumbline/outputs/report_grid.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <memory>
+#include <string>
+#include <vector>
 
 namespace plumbline {
 namespace {
+
+// Opaque, red, green, blue.
+constexpr std::uint32_t kOccupiedPixel = 0xff6b7682;
+constexpr std::uint32_t kFreePixel = 0xffeef1f4;
+
+// Pixels by rows, the upper one first: 0 where it is clear, otherwise opaque,
+// 0xffRRGGBB.
+struct Picture {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint32_t> pixels;
+};
 
 struct SurfaceDeleter {
   void operator()(cairo_surface_t* s) const { cairo_surface_destroy(s); }
@@ -41,9 +56,7 @@ std::string Base64(const std::string& bytes) {
   return text;
 }
 
-}  // namespace
-
-std::string PngInBase64(const ReportPicture& picture) {
+std::string PngInBase64(const Picture& picture) {
   const std::unique_ptr<cairo_surface_t, SurfaceDeleter> surface(
       cairo_image_surface_create(CAIRO_FORMAT_ARGB32, picture.width,
                                  picture.height));
@@ -71,6 +84,38 @@ std::string PngInBase64(const ReportPicture& picture) {
     throw PLUMBLINE_ERROR("a picture that cannot be written", "memory");
   }
   return Base64(png);
+}
+
+}  // namespace
+
+ReportGrid MakeReportGrid(const OccupancyGrid& grid, double most_pixels) {
+  int cells = 1;
+  while (static_cast<double>(grid.width()) * grid.height() /
+             (static_cast<double>(cells) * cells) >
+         most_pixels) {
+    ++cells;
+  }
+  Picture picture;
+  picture.width = (grid.width() + cells - 1) / cells;
+  picture.height = (grid.height() + cells - 1) / cells;
+  picture.pixels.assign(static_cast<std::size_t>(picture.width) *
+                            static_cast<std::size_t>(picture.height),
+                        0);
+  grid.VisitKnown([&](int column, int row, std::uint8_t value) {
+    // The first row of a picture is the upper one.
+    std::uint32_t& pixel =
+        picture
+            .pixels[static_cast<std::size_t>(picture.height - 1 - row / cells) *
+                        static_cast<std::size_t>(picture.width) +
+                    static_cast<std::size_t>(column / cells)];
+    if (value == OccupancyGrid::kOccupied) {
+      pixel = kOccupiedPixel;
+    } else if (pixel == 0) {
+      pixel = kFreePixel;
+    }
+  });
+  return {grid.origin(), grid.resolution() * cells, picture.width,
+          picture.height, PngInBase64(picture)};
 }
 
 }  // namespace plumbline

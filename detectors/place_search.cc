@@ -18,7 +18,7 @@ using Eigen::Vector2d;
 
 // Places that are compared by all threads together, and between two questions
 // whether to stop.
-constexpr std::size_t kPlacesAtOnce = 32;
+constexpr std::size_t kPlacesAtOnce = 128;
 // Without candidates in searches of the least width those of so many times that
 // are looked at before all others.
 constexpr double kWiden = 6.0;
@@ -43,6 +43,7 @@ class PlaceSearch {
         scope_(scope),
         marginals_(*marginals),
         candidates_(*candidates),
+        team_(ThreadsHere()),
         ways_(walls, options.place_links),
         parts_(ways_.Parts()),
         places_in_(parts_.size(), 0),
@@ -146,7 +147,7 @@ class PlaceSearch {
     for (std::size_t i = 0; i < places.size(); i += kPlacesAtOnce) {
       if (scope_.ShouldStop()) return false;
       const std::size_t count = std::min(kPlacesAtOnce, places.size() - i);
-      ParallelFor(count, ThreadsHere(), [&](std::size_t k) {
+      team_.For(count, [&](std::size_t k) {
         comparisons_[k].found.clear();
         comparisons_[k].tally = Tally();
         work(places[i + k], &comparisons_[k]);
@@ -431,6 +432,7 @@ class PlaceSearch {
   const DetectionScope& scope_;
   Marginals& marginals_;
   ClosureCandidates& candidates_;
+  ThreadTeam team_;
   WallWays ways_;
   // Of each wall its part, and of each part its places.
   std::vector<std::size_t> parts_;

@@ -245,7 +245,8 @@ class PartComparison {
                  const std::vector<Pose2>& trajectory,
                  const std::vector<TrackCut>& cuts,
                  const MapCheckOptions& options)
-      : keys_(keys),
+      : scans_(scans),
+        keys_(keys),
         trajectory_(trajectory),
         cuts_(cuts),
         options_(options),
@@ -284,7 +285,32 @@ class PartComparison {
 
   // Whether a scan of the log agrees with what all parts saw around it.
   bool Fits(int scan) {
-    const Pose2& pose = trajectory_[static_cast<std::size_t>(scan)];
+    return FitsAt(scan, trajectory_[static_cast<std::size_t>(scan)]);
+  }
+
+  // Whether a scan next to a cut would fit, too, where odometry has it, seen
+  // from the other side: along a corridor nothing tells where between both it
+  // is.
+  bool IsOpen(const TrackCut& cut) {
+    return MayBeWhereOdometrySays(cut.begin, cut.end) ||
+           MayBeWhereOdometrySays(cut.end, cut.begin);
+  }
+
+ private:
+  bool MayBeWhereOdometrySays(int from, int scan) {
+    const auto pose = [this](int i) {
+      return trajectory_[static_cast<std::size_t>(i)];
+    };
+    const auto odometry = [this](int i) {
+      return scans_[static_cast<std::size_t>(i)].odometry;
+    };
+    Pose2 there = Compose(pose(from), Between(odometry(from), odometry(scan)));
+    there[2] = pose(scan)[2];
+    return (there - pose(scan)).head<2>().norm() > options_.open_way &&
+           FitsAt(scan, there);
+  }
+
+  bool FitsAt(int scan, const Pose2& pose) {
     std::vector<Neighbor> others;
     for (const auto& [part, of_part] : Near(pose)) {
       others.insert(others.end(), of_part.begin(), of_part.end());
@@ -295,7 +321,6 @@ class PartComparison {
                options_);
   }
 
- private:
   using Pair = std::pair<std::size_t, std::size_t>;
   // Distance, m, and index of a key scan.
   using Neighbor = std::pair<double, std::size_t>;
@@ -375,6 +400,7 @@ class PartComparison {
     }
   }
 
+  const std::vector<Scan>& scans_;
   const std::vector<int>& keys_;
   const std::vector<Pose2>& trajectory_;
   const std::vector<TrackCut>& cuts_;
@@ -438,30 +464,32 @@ MapAgreement CountAgreement(const std::vector<Scan>& scans,
   return count;
 }
 
-std::vector<bool> FindConfirmedTies(const std::vector<Scan>& scans,
-                                    const std::vector<int>& keys,
-                                    const std::vector<Pose2>& trajectory,
-                                    const std::vector<TrackCut>& cuts,
-                                    const MapCheckOptions& options,
-                                    const std::function<bool()>& stop) {
+std::vector<TieVerdict> JudgeTies(const std::vector<Scan>& scans,
+                                  const std::vector<int>& keys,
+                                  const std::vector<Pose2>& trajectory,
+                                  const std::vector<TrackCut>& cuts,
+                                  const MapCheckOptions& options,
+                                  const std::function<bool()>& stop) {
   if (trajectory.size() != scans.size()) {
     throw PLUMBLINE_ERROR(
         std::to_string(trajectory.size()) + " poses",
         "one for each of " + std::to_string(scans.size()) + " scans");
   }
-  std::vector<bool> is_confirmed(cuts.size(), false);
-  if (cuts.empty()) return is_confirmed;
+  std::vector<TieVerdict> verdicts(cuts.size(), TieVerdict::kUnconfirmed);
+  if (cuts.empty()) return verdicts;
   PartComparison parts(scans, keys, trajectory, cuts, options);
-  if (!parts.Collect(stop)) return is_confirmed;
+  if (!parts.Collect(stop)) return verdicts;
   DisjointSets joined = parts.Join();
   for (std::size_t c = 0; c < cuts.size(); ++c) {
     bool fits = joined.Find(c) == joined.Find(c + 1);
     for (int i = cuts[c].begin + 1; fits && i < cuts[c].end; ++i) {
       fits = parts.Fits(i);
     }
-    is_confirmed[c] = fits;
+    if (!fits) continue;
+    verdicts[c] =
+        parts.IsOpen(cuts[c]) ? TieVerdict::kOpen : TieVerdict::kConfirmed;
   }
-  return is_confirmed;
+  return verdicts;
 }
 
 }  // namespace plumbline

@@ -35,7 +35,7 @@ struct MapCheckOptions {
   /// reported.
   int min_scans = 3;
   /// What it takes to believe that two parts of a track lie right to each other
-  /// (FindConfirmedTies): at least this many scans of either, one for each
+  /// (JudgeTies): at least this many scans of either, one for each
   /// `spacing`, that agree with the other, this share of all that can be
   /// compared, and no larger share that contradicts it. Their places have at
   /// least this standard deviation in every direction, m: along a corridor all
@@ -46,6 +46,9 @@ struct MapCheckOptions {
   double min_confirming_spread = 1.0;
   /// Comparisons that are enough for two parts that see much of each other.
   int enough_compared = 100;
+  /// Odometry that is off by more over a cut, m, says where the scans next to
+  /// it may be, too.
+  double open_way = 0.5;
   /// Shares as above, up to which a scan agrees, and share of its returns that
   /// do not lie in the unknown.
   double agreeing_intruders = 0.1;
@@ -108,17 +111,31 @@ struct TrackCut {
   int end = 0;
 };
 
-/// Says for each cut (in the order of scans) whether the parts of the track
+/// What is seen of a tie over a cut.
+enum class TieVerdict {
+  /// Nothing shows that the parts before and behind it lie right to each other.
+  kUnconfirmed,
+  /// They do, but the scans next to it fit as well where odometry has them,
+  /// seen
+  /// from the other side, and that is elsewhere: somewhere between, as along a
+  /// corridor while wheels were not read.
+  kOpen,
+  /// They do.
+  kConfirmed,
+};
+
+/// Says of each cut (in the order of scans) whether the parts of the track
 /// before and behind it are seen to lie right to each other by what they have
 /// seen of the same places on the way, directly or by way of other parts, and
 /// the scans between them fit, too. `trajectory` has the pose of each scan, map
 /// frame; `keys`, `stop` and Error as above. Once `stop` has returned true no
 /// cut is confirmed.
-std::vector<bool> FindConfirmedTies(
-    const std::vector<Scan>& scans, const std::vector<int>& keys,
-    const std::vector<Pose2>& trajectory, const std::vector<TrackCut>& cuts,
-    const MapCheckOptions& options,
-    const std::function<bool()>& stop = nullptr);
+std::vector<TieVerdict> JudgeTies(const std::vector<Scan>& scans,
+                                  const std::vector<int>& keys,
+                                  const std::vector<Pose2>& trajectory,
+                                  const std::vector<TrackCut>& cuts,
+                                  const MapCheckOptions& options,
+                                  const std::function<bool()>& stop = nullptr);
 
 }  // namespace plumbline
 

@@ -151,15 +151,35 @@ void MapReview::DropConfirmed(std::vector<LooseTrack>* loose) const {
     // A guess is one from its first scan on.
     cuts.push_back({track.begin, track.found ? track.end : track.begin + 1});
   }
-  const std::vector<bool> is_confirmed =
-      FindConfirmedTies(scans_, keys_, trajectory_, cuts, check_, stop_);
+  const std::vector<TieVerdict> verdicts =
+      JudgeTies(scans_, keys_, trajectory_, cuts, check_, stop_);
   std::vector<LooseTrack> left;
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     LooseTrack& track = (*loose)[i];
-    if (track.found && is_confirmed[i]) continue;
+    if (track.found && verdicts[i] == TieVerdict::kConfirmed) continue;
+    if (track.found && verdicts[i] == TieVerdict::kOpen) WidenToStill(&track);
     left.push_back(std::move(track));
   }
   *loose = std::move(left);
+}
+
+// Where odometry stood still on either side, the robot need not have.
+void MapReview::WidenToStill(LooseTrack* track) const {
+  const auto stands = [this](int first, int second) {
+    return Between(scans_[static_cast<std::size_t>(first)].odometry,
+                   scans_[static_cast<std::size_t>(second)].odometry)
+        .isZero(0.0);
+  };
+  const int begin = track->begin;
+  const int end = track->end;
+  const int last = static_cast<int>(scans_.size()) - 1;
+  while (track->begin > 0 && stands(track->begin - 1, track->begin)) {
+    --track->begin;
+  }
+  while (track->end < last && stands(track->end, track->end + 1)) ++track->end;
+  if (track->begin == begin && track->end == end) return;
+  track->why +=
+      "; odometry stood still, and nothing in sight shows that the robot did";
 }
 
 }  // namespace plumbline

@@ -46,6 +46,7 @@ class MapReview {
  private:
   std::vector<OpenWay> OpenWays() const;
   void DropConfirmed(std::vector<LooseTrack>* loose) const;
+  void WidenToStill(LooseTrack* track) const;
 
   const std::vector<Scan>& scans_;
   const std::vector<Pose2>& trajectory_;

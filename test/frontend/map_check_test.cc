@@ -141,28 +141,28 @@ TEST(FindContradictionsTest, RefusesPosesThatDoNotFit) {
   EXPECT_THROW(FindContradictions(rounds.scans, rounds.keys, {}, {}), Error);
 }
 
+using Verdicts = std::vector<TieVerdict>;
+
 // The second round hangs on the first by one match.
-TEST(FindConfirmedTiesTest, WhatManyScansShowIsSure) {
+TEST(JudgeTiesTest, WhatManyScansShowIsSure) {
   Rounds rounds = TwoRounds();
   const std::vector<TrackCut> cuts = {{rounds.second - 1, rounds.second}};
-  EXPECT_EQ(
-      FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, cuts, {}),
-      std::vector<bool>{true});
+  EXPECT_EQ(JudgeTies(rounds.scans, rounds.keys, rounds.poses, cuts, {}),
+            Verdicts{TieVerdict::kConfirmed});
   // One scan on the way, which is off.
   const std::vector<TrackCut> wide = {{rounds.second - 1, rounds.second + 2}};
-  EXPECT_EQ(
-      FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, wide, {}),
-      std::vector<bool>{true});
+  EXPECT_EQ(JudgeTies(rounds.scans, rounds.keys, rounds.poses, wide, {}),
+            Verdicts{TieVerdict::kConfirmed});
   std::vector<Pose2> off = rounds.poses;
   off[static_cast<std::size_t>(rounds.second)] =
       Compose(off[static_cast<std::size_t>(rounds.second)],
               Pose2(0.6, 0.0, DegToRad(20.0)));
-  EXPECT_EQ(FindConfirmedTies(rounds.scans, rounds.keys, off, wide, {}),
-            std::vector<bool>{false});
+  EXPECT_EQ(JudgeTies(rounds.scans, rounds.keys, off, wide, {}),
+            Verdicts{TieVerdict::kUnconfirmed});
 }
 
 // A round that lies wrong is not sure, nor is one that saw nothing again.
-TEST(FindConfirmedTiesTest, WhatNothingShowsIsNot) {
+TEST(JudgeTiesTest, WhatNothingShowsIsNot) {
   Rounds rounds = TwoRounds();
   const std::vector<TrackCut> cuts = {{rounds.second - 1, rounds.second}};
   std::vector<Pose2> turned = rounds.poses;
@@ -173,20 +173,98 @@ TEST(FindConfirmedTiesTest, WhatNothingShowsIsNot) {
     away[k] = Compose(Pose2(40.0, 0.0, 0.0), away[k]);
   }
   for (const std::vector<Pose2>& poses : {turned, away}) {
-    EXPECT_EQ(FindConfirmedTies(rounds.scans, rounds.keys, poses, cuts, {}),
-              std::vector<bool>{false});
+    EXPECT_EQ(JudgeTies(rounds.scans, rounds.keys, poses, cuts, {}),
+              Verdicts{TieVerdict::kUnconfirmed});
   }
-  EXPECT_EQ(FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, cuts, {},
-                              [] { return true; }),
-            std::vector<bool>{false});
-  EXPECT_TRUE(FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, {}, {})
-                  .empty());
-  EXPECT_THROW(FindConfirmedTies(rounds.scans, rounds.keys, {}, cuts, {}),
-               Error);
+  EXPECT_EQ(JudgeTies(rounds.scans, rounds.keys, rounds.poses, cuts, {},
+                      [] { return true; }),
+            Verdicts{TieVerdict::kUnconfirmed});
+  EXPECT_TRUE(
+      JudgeTies(rounds.scans, rounds.keys, rounds.poses, {}, {}).empty());
+  EXPECT_THROW(JudgeTies(rounds.scans, rounds.keys, {}, cuts, {}), Error);
+}
+
+// Two rounds through the hall, and between them down a corridor 30 m long, in
+// the middle of which the track is cut, and back.
+struct CutInACorridor {
+  Rounds rounds;
+  TrackCut cut;
+};
+
+CutInACorridor CutWithNiches(const std::vector<WallEnds>& niches) {
+  CutInACorridor result;
+  Rounds& rounds = result.rounds;
+  const Rounds hall = TwoRounds();
+  std::vector<WallEnds> walls =
+      testing::Moved(Room(60.0, 2.0), Pose2(60.0, 0.0, 0.0));
+  walls.insert(walls.end(), niches.begin(), niches.end());
+  Laser laser;
+  laser.sigma = 0.01;
+  laser.maximum_range = 8.0;
+  Noise noise(5);
+  const auto add = [&rounds](const Scan& scan, const Pose2& pose) {
+    rounds.keys.push_back(static_cast<int>(rounds.scans.size()));
+    rounds.scans.push_back(scan);
+    rounds.scans.back().odometry = pose;
+    rounds.poses.push_back(pose);
+  };
+  for (int round = 0; round < 2; ++round) {
+    for (int i = 0; i < 100; ++i) {
+      const Pose2 pose(45.0 + 0.3 * (round == 0 ? i : 99 - i), 0.2,
+                       round == 0 ? 0.0 : kPi);
+      if (round == 0 && i == 0) {
+        for (int k = 0; k < hall.second; ++k) {
+          add(hall.scans[static_cast<std::size_t>(k)],
+              hall.poses[static_cast<std::size_t>(k)]);
+        }
+      }
+      if (round == 0 && i == 50) {
+        result.cut.end = static_cast<int>(rounds.scans.size());
+        result.cut.begin = result.cut.end - 1;
+      }
+      add(MakeScan(walls, pose, laser, &noise), pose);
+    }
+  }
+  for (std::size_t k = static_cast<std::size_t>(hall.second);
+       k < hall.scans.size(); ++k) {
+    add(hall.scans[k], hall.poses[k]);
+  }
+  return result;
+}
+
+// The halls show that both parts lie right, but not where in the corridor the
+// robot was when wheels were not read.
+TEST(JudgeTiesTest, NextToACutInACorridorOdometryMayBeRight) {
+  CutInACorridor plain = CutWithNiches({});
+  const auto verdicts = [](const CutInACorridor& world) {
+    return JudgeTies(world.rounds.scans, world.rounds.keys, world.rounds.poses,
+                     {world.cut}, {});
+  };
+  EXPECT_EQ(verdicts(plain), Verdicts{TieVerdict::kConfirmed});
+  const auto stop_wheels = [](CutInACorridor* world) {
+    for (std::size_t k = static_cast<std::size_t>(world->cut.end);
+         k < world->rounds.scans.size(); ++k) {
+      Pose2& odometry = world->rounds.scans[k].odometry;
+      odometry = Compose(Pose2(-1.5, 0.0, 0.0), odometry);
+    }
+  };
+  stop_wheels(&plain);
+  EXPECT_EQ(verdicts(plain), Verdicts{TieVerdict::kOpen});
+  // Where something is in sight it shows where the robot was.
+  std::vector<WallEnds> niches;
+  for (const double x : {57.0, 60.5, 64.0}) {
+    for (const WallEnds& side :
+         testing::Moved(Room(0.8, 0.5), Pose2(x, -0.8, 0.0))) {
+      niches.push_back(side);
+    }
+  }
+  CutInACorridor with_niches = CutWithNiches(niches);
+  stop_wheels(&with_niches);
+  EXPECT_EQ(verdicts(with_niches), Verdicts{TieVerdict::kConfirmed});
 }
 
 // Along a corridor all agrees wherever it lies.
-TEST(FindConfirmedTiesTest, ACorridorSaysNothingAlongItself) {
+TEST(JudgeTiesTest, ACorridorSaysNothingAlongItself) {
   const std::vector<WallEnds> walls = Room(80.0, 2.0);
   Laser laser;
   laser.sigma = 0.01;
@@ -205,9 +283,8 @@ TEST(FindConfirmedTiesTest, ACorridorSaysNothingAlongItself) {
     }
   }
   const std::vector<TrackCut> cuts = {{rounds.second - 1, rounds.second}};
-  EXPECT_EQ(
-      FindConfirmedTies(rounds.scans, rounds.keys, rounds.poses, cuts, {}),
-      std::vector<bool>{false});
+  EXPECT_EQ(JudgeTies(rounds.scans, rounds.keys, rounds.poses, cuts, {}),
+            Verdicts{TieVerdict::kUnconfirmed});
 }
 
 }  // namespace

@@ -22,8 +22,9 @@ void Exchange(Archive& archive, UncertainPose2& pose) {
 
 template <typename Archive>
 void Exchange(Archive& archive, RefinedScan& scan) {
-  auto& [pose, since_key, since, is_key, odometry_only, tie] = scan;
-  ExchangeAll(archive, pose, since_key, since, is_key, odometry_only, tie);
+  auto& [pose, since_key, since, is_key, odometry_only, tie, missed] = scan;
+  ExchangeAll(archive, pose, since_key, since, is_key, odometry_only, tie,
+              missed);
 }
 
 template <typename Archive>

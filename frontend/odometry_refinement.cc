@@ -699,6 +699,7 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   }
   track_.wheels.Follow(match.pose.head<2>(), match.information);
   outcome.verdict = Outcome::Verdict::kBelieved;
+  if (track_.refused > 0) result.missed = Between(result.pose, match.pose);
   result.pose = match.pose;
   result.odometry_only = false;
   const Pose2 key_pose = track_.keys.back().pose;
@@ -1174,8 +1175,15 @@ bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
 }
 
 void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
+  // Found again near by: the robot moved as it did before.
+  const bool has_missed = first.tie == TrackTie::kMatched && first.since < 0 &&
+                          !open_->before.after_gap;
   for (SettledScan& done : pending_) {
     if (done.index == open_->first) {
+      if (has_missed) {
+        const Pose2& predicted = done.refined.pose;
+        done.refined.missed = Between(predicted, Compose(shift, predicted));
+      }
       done.refined.tie = first.tie;
       done.refined.since = first.since;
       done.refined.since_key = first.since_key;

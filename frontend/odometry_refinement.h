@@ -127,6 +127,9 @@ struct RefinedScan {
   bool odometry_only = false;
   /// Of the first scan of a track that was lost; a key scan.
   TrackTie tie = TrackTie::kNone;
+  /// Where odometry alone had placed the scans before: what it had missed by
+  /// this one, which was matched, seen from where it had it.
+  Pose2 missed = Pose2::Zero();
 };
 
 /// A scan whose place in the track is settled.

@@ -6,6 +6,7 @@
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/detectors/visibility.h>
 #include <plumbline/frontend/looks.h>
+#include <plumbline/frontend/missed_motion.h>
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/frontend/returns_ahead.h>
 #include <plumbline/pipeline/glimpsed_walls.h>
@@ -484,6 +485,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
     if (!refiner_.late_ties().empty() && !result.interrupted) {
       TakeAnew(scans, &em_seconds);
     }
+    SpreadMissedMotion(&refined_);
     frontend_seconds_ += watch.Seconds() - em_seconds;
   }
   builder_->WriteRobot();
@@ -781,7 +783,7 @@ void LogSolver::CheckMap(Context* context) const {
       context->may_have_open_ways || result.second_map_refused;
   MapReview(context->scans, result.records, result.trajectory, options_.check,
             options_.way_check, [context] { return context->IsStopped(); })
-      .Revise(map_.graph(), tell_open_ways, &result.loose);
+      .Revise(map_.graph(), result.refined, tell_open_ways, &result.loose);
 }
 
 void LogSolver::BeginClosing(Context* context) {

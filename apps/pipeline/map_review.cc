@@ -1,4 +1,5 @@
 #include <plumbline/core/wall.h>
+#include <plumbline/frontend/missed_motion.h>
 #include <plumbline/pipeline/map_review.h>
 
 #include <algorithm>
@@ -69,6 +70,26 @@ void AddBlockedWays(const std::vector<BlockedWay>& ways,
   }
 }
 
+// Where more than so much, m, was missing.
+void AddBlindRuns(const std::vector<BlindRun>& runs, double most,
+                  std::vector<LooseTrack>* loose) {
+  for (const BlindRun& run : runs) {
+    const double missed = run.missed.head<2>().norm();
+    if (missed <= most) continue;
+    const bool is_told = std::any_of(
+        loose->begin(), loose->end(), [&run](const LooseTrack& track) {
+          return track.begin <= run.begin && track.end >= run.end;
+        });
+    if (is_told) continue;
+    char why[128];
+    std::snprintf(why, sizeof why,
+                  "nothing that the robot saw here could be matched, and "
+                  "odometry missed %.1f m",
+                  missed);
+    AddLoose(run.begin, run.end, why, loose);
+  }
+}
+
 void AddOpenWays(const std::vector<OpenWay>& ways,
                  std::vector<LooseTrack>* loose) {
   for (const OpenWay& way : ways) {
@@ -128,7 +149,9 @@ std::vector<OpenWay> MapReview::OpenWays() const {
   return FindOpenWays(scans_, keys_, poses_, options, stop_);
 }
 
-void MapReview::Revise(const Graph& graph, bool tell_open_ways,
+void MapReview::Revise(const Graph& graph,
+                       const std::vector<RefinedScan>& refined,
+                       bool tell_open_ways,
                        std::vector<LooseTrack>* loose) const {
   const std::vector<MapContradiction> contradictions =
       FindContradictions(scans_, keys_, poses_, check_, stop_);
@@ -138,6 +161,7 @@ void MapReview::Revise(const Graph& graph, bool tell_open_ways,
   if (contradictions.empty() && blocked.empty()) DropConfirmed(loose);
   AddContradictions(contradictions, loose);
   AddBlockedWays(blocked, loose);
+  AddBlindRuns(FindBlindRuns(refined), check_.open_way, loose);
   if (tell_open_ways) AddOpenWays(OpenWays(), loose);
   std::stable_sort(loose->begin(), loose->end(),
                    [](const LooseTrack& a, const LooseTrack& b) {

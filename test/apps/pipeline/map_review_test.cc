@@ -83,12 +83,39 @@ TEST(MapReviewTest, WhatIsRightIsNoLongerReported) {
   EXPECT_FALSE(review.HasContradictions());
   EXPECT_GT(review.Agreement().agreeing, 20);
   std::vector<LooseTrack> loose = {SecondRound()};
-  review.Revise(Graph(), true, &loose);
+  review.Revise(Graph(), {}, true, &loose);
   EXPECT_TRUE(loose.empty());
   // No match says where a guess lies, whatever agrees.
   loose = {SecondRound()};
   loose[0].found = false;
-  review.Revise(Graph(), true, &loose);
+  review.Revise(Graph(), {}, true, &loose);
+  EXPECT_EQ(loose.size(), 1u);
+}
+
+// Scans that odometry alone placed, unless that is told already.
+TEST(MapReviewTest, TellsWhatOdometryMissed) {
+  const ReviewedDrive drive = RoundsOfAHall();
+  const MapReview review = drive.Review();
+  std::vector<RefinedScan> refined(drive.trajectory.size());
+  for (std::size_t i = 30; i < 40; ++i) refined[i].odometry_only = true;
+  refined[40].missed = Pose2(0.3, 0.3, 0.1);
+  std::vector<LooseTrack> loose;
+  review.Revise(Graph(), refined, true, &loose);
+  EXPECT_TRUE(loose.empty());
+  refined[40].missed = Pose2(0.6, -0.8, 0.1);
+  review.Revise(Graph(), refined, true, &loose);
+  ASSERT_EQ(loose.size(), 1u);
+  EXPECT_EQ(loose[0].begin, 29);
+  EXPECT_EQ(loose[0].end, 40);
+  EXPECT_TRUE(loose[0].found);
+  EXPECT_EQ(loose[0].why,
+            "nothing that the robot saw here could be matched, and odometry "
+            "missed 1.0 m");
+  LooseTrack guess;
+  guess.begin = 20;
+  guess.end = 50;
+  loose = {guess};
+  review.Revise(Graph(), refined, true, &loose);
   EXPECT_EQ(loose.size(), 1u);
 }
 
@@ -100,7 +127,7 @@ TEST(MapReviewTest, WhereSomethingIsWrongNothingIsTakenForSure) {
   }
   EXPECT_TRUE(drive.Review().HasContradictions());
   std::vector<LooseTrack> loose = {SecondRound()};
-  drive.Review().Revise(Graph(), true, &loose);
+  drive.Review().Revise(Graph(), {}, true, &loose);
   ASSERT_GE(loose.size(), 2u);
   EXPECT_TRUE(std::is_sorted(loose.begin(), loose.end(),
                              [](const LooseTrack& a, const LooseTrack& b) {
@@ -125,7 +152,7 @@ TEST(MapReviewTest, NothingOnceItIsToldToStop) {
   EXPECT_FALSE(review.HasContradictions());
   EXPECT_EQ(review.Agreement().agreeing, 0);
   std::vector<LooseTrack> loose = {SecondRound()};
-  review.Revise(Graph(), true, &loose);
+  review.Revise(Graph(), {}, true, &loose);
   EXPECT_EQ(loose.size(), 1u);
 }
 
@@ -168,7 +195,7 @@ TEST(MapReviewTest, AWayThroughAWallOfTheMap) {
     return track.why.find("went through") != std::string::npos;
   };
   std::vector<LooseTrack> loose;
-  drive.Review().Revise(graph, false, &loose);
+  drive.Review().Revise(graph, {}, false, &loose);
   const auto found = std::find_if(loose.begin(), loose.end(), through);
   ASSERT_NE(found, loose.end());
   EXPECT_LT(found->begin, 24);
@@ -180,12 +207,12 @@ TEST(MapReviewTest, AWayThroughAWallOfTheMap) {
   between.begin = 50;
   between.end = 51;
   loose = {between};
-  drive.Review().Revise(graph, false, &loose);
+  drive.Review().Revise(graph, {}, false, &loose);
   EXPECT_EQ(std::count_if(loose.begin(), loose.end(), through), 0);
 
   // A map without that wall.
   loose.clear();
-  drive.Review().Revise(Graph(), false, &loose);
+  drive.Review().Revise(Graph(), {}, false, &loose);
   EXPECT_EQ(std::count_if(loose.begin(), loose.end(), through), 0);
 }
 
@@ -199,9 +226,9 @@ TEST(MapReviewTest, OpenWaysAreToldWhenAskedFor) {
   }
   EXPECT_TRUE(drive.Review().HasOpenWays());
   std::vector<LooseTrack> loose;
-  drive.Review().Revise(Graph(), false, &loose);
+  drive.Review().Revise(Graph(), {}, false, &loose);
   EXPECT_TRUE(loose.empty());
-  drive.Review().Revise(Graph(), true, &loose);
+  drive.Review().Revise(Graph(), {}, true, &loose);
   ASSERT_FALSE(loose.empty());
   EXPECT_NE(loose[0].why.find("how far the robot went"), std::string::npos);
   EXPECT_FALSE(RoundsOfAHall().Review().HasOpenWays());

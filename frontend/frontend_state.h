@@ -22,9 +22,10 @@ void Exchange(Archive& archive, UncertainPose2& pose) {
 
 template <typename Archive>
 void Exchange(Archive& archive, RefinedScan& scan) {
-  auto& [pose, since_key, since, is_key, odometry_only, tie, missed] = scan;
+  auto& [pose, since_key, since, is_key, odometry_only, tie, missed,
+         missed_since] = scan;
   ExchangeAll(archive, pose, since_key, since, is_key, odometry_only, tie,
-              missed);
+              missed, missed_since);
 }
 
 template <typename Archive>

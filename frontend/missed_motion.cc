@@ -46,11 +46,11 @@ void Spread(const BlindRun& run, std::vector<RefinedScan>* refined) {
 std::vector<BlindRun> FindBlindRuns(const std::vector<RefinedScan>& refined) {
   std::vector<BlindRun> runs;
   for (std::size_t end = 1; end < refined.size(); ++end) {
-    if (refined[end].missed.isZero(0.0)) continue;
-    std::size_t begin = end - 1;
-    while (begin > 0 && refined[begin].odometry_only &&
-           !refined[begin].is_key) {
-      --begin;
+    if (refined[end].missed_since < 0) continue;
+    auto begin = static_cast<std::size_t>(refined[end].missed_since);
+    // A key scan anchors what follows.
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      if (refined[i].is_key) begin = i;
     }
     runs.push_back(
         {static_cast<int>(begin), static_cast<int>(end), refined[end].missed});

@@ -8,7 +8,8 @@
 
 namespace plumbline {
 
-/// Scans that odometry alone placed, between two that were matched.
+/// Scans that odometry alone placed or had stand, between two that were
+/// matched.
 struct BlindRun {
   /// The last scan before them and the first one after.
   int begin = 0;

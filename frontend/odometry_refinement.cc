@@ -42,6 +42,11 @@ constexpr double kFastestChange = 1.0;
 // A pose explains a scan clearly better than another from this difference on,
 // in squared standard deviations of returns that lie apart.
 constexpr double kClearly = 10.0;
+// The same of all scans since they lie apart: what they say is much the same.
+constexpr double kClearlyInAll = 20.0;
+// Where a robot stands or goes on are one place when they are nearer to each
+// other than this share of the way between.
+constexpr double kNearShare = 0.25;
 // From here on a robot has moved while odometry stood still, m and rad.
 constexpr double kMovedWay = 0.2;
 constexpr double kMovedTurn = DegToRad(8.0);
@@ -181,6 +186,8 @@ struct OdometryRefiner::Outcome {
   std::string why;
   // Share of the reference that the scan before looked through.
   double seen_through = 0.0;
+  // The robot is known to have gone on while odometry stood still.
+  bool has_gone_on = false;
 };
 
 OdometryRefiner::OdometryRefiner(const OdometryRefinementOptions& options)
@@ -573,9 +580,13 @@ UncertainPose2 OdometryRefiner::StepOf(const Pose2& by_wheels) {
                            ? odometry_calibration_.Corrected(by_wheels)
                            : by_wheels;
   UncertainPose2 step = {motion, OdometryCovariance(motion, options_.noise)};
-  // Odometry that has only been late catches up with all of the way at once.
-  if (is_dead_ && IsLate(motion)) {
+  if (still_ > 0 && IsLate(motion)) {
+    // Odometry that has only been late catches up with all of the way at once.
     step.mean = Between(track_.last_pose, Compose(still_pose_, motion));
+  } else if (ahead_.exists && !is_dead_) {
+    // While odometry stood still nothing in sight told whether the robot did.
+    const Pose2 perhaps = Between(track_.last_pose, ahead_.pose);
+    step.covariance += perhaps * perhaps.transpose();
   }
   last_motion_ = motion;
   still_ = 0;
@@ -594,7 +605,8 @@ bool OdometryRefiner::IsLate(const Pose2& motion) const {
 }
 
 bool OdometryRefiner::MovesOn(bool leapt, UncertainPose2* since_key,
-                              MatchPrior* prior, MatchResult* match) {
+                              MatchPrior* prior, MatchResult* match,
+                              bool* returns_lead) {
   if (is_dead_ || (still_ == 0 && !leapt)) return false;
   // The returns may lead on by themselves.
   const Pose2 moved = Between(still_pose_, match->pose);
@@ -608,7 +620,7 @@ bool OdometryRefiner::MovesOn(bool leapt, UncertainPose2* since_key,
     const bool abruptly =
         leapt ? !track_.after_gap : steady_.Explains(last_motion_);
     if (!steady_.IsMoving() || !abruptly) return false;
-    ahead_ = {true, track_.last_pose, track_.since_key, steady_.Step()};
+    ahead_ = {true, track_.last_pose, track_.since_key, steady_.Step(), 0.0};
   }
   ahead_.since_key = Compose(ahead_.since_key, ahead_.step);
   MatchPrior moving;
@@ -618,12 +630,22 @@ bool OdometryRefiner::MovesOn(bool leapt, UncertainPose2* since_key,
   ahead_.pose = other.pose;
   const Pose2 apart = Between(match->pose, other.pose);
   const double clearly = (match->cost - other.cost) * CountApart(points_);
-  const bool same = apart.head<2>().norm() <= options_.clutter_distance &&
+  // A slow robot has not gone far: returns lead both to one place where they
+  // are much nearer to each other than what it would have gone by then.
+  const double gone = still_ * ahead_.step.mean.head<2>().norm();
+  const double near = leapt ? options_.clutter_distance
+                            : std::min(options_.clutter_distance,
+                                       std::max(kStandsWay, kNearShare * gone));
+  const bool same = apart.head<2>().norm() <= near &&
                     std::abs(apart[2]) <= options_.clutter_rotation;
+  *returns_lead = same && !leapt;
+  // What each scan says is little where little shows how far the robot went.
+  ahead_.evidence += clearly;
   // No robot leaps: what the returns do not speak against holds.
   const bool moves = (leapt || !same) &&
                      other.inlier_ratio >= options_.minimum_inlier_ratio &&
-                     clearly > (leapt ? -kClearly : kClearly);
+                     (clearly > (leapt ? -kClearly : kClearly) ||
+                      (clearly > 0.0 && ahead_.evidence > kClearlyInAll));
   if (trace_) {
     char text[200];
     std::snprintf(
@@ -639,6 +661,7 @@ bool OdometryRefiner::MovesOn(bool leapt, UncertainPose2* since_key,
   if (leapt || moves || same || clearly < -kClearly) ahead_.exists = false;
   if (!moves) return false;
   is_dead_ = !leapt;
+  if (is_dead_) steady_.GoOn(ahead_.step.mean);
   *since_key = ahead_.since_key;
   *prior = moving;
   *match = other;
@@ -661,7 +684,11 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   MatchPrior prior = PriorOf(result.pose, step);
   GoByWheels(motion, leapt, &prior);
   MatchResult match = MatchPoints(points_, prior, motion);
-  const bool moves_on = MovesOn(leapt, &result.since_key, &prior, &match);
+  const Pose2 by_odometry = result.pose;
+  bool returns_lead = false;
+  const bool moves_on =
+      MovesOn(leapt, &result.since_key, &prior, &match, &returns_lead);
+  outcome.has_gone_on = moves_on && is_dead_;
   if (moves_on) {
     track_.wheels.Reset();
     result.pose = prior.pose;
@@ -676,8 +703,8 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
     MatchWithoutClutter(scan, prior, motion, &match);
   }
   if (HaveWheelsBeenSteady()) MatchAsWheelsSay(scan, prior, &match);
-  if (!moves_on && !is_dead_ && !leapt && !track_.jumped && !track_.after_gap &&
-      track_.refused == 0) {
+  if (!moves_on && !returns_lead && !is_dead_ && !leapt && !track_.jumped &&
+      !track_.after_gap && track_.refused == 0) {
     StayUnlessClear(prior, motion, scan.laser_offset.head<2>(), &match);
   }
   bool believed = match.inlier_ratio >= options_.good_inlier_ratio;
@@ -699,7 +726,11 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
   }
   track_.wheels.Follow(match.pose.head<2>(), match.information);
   outcome.verdict = Outcome::Verdict::kBelieved;
-  if (track_.refused > 0) result.missed = Between(result.pose, match.pose);
+  if (track_.refused > 0 || outcome.has_gone_on) {
+    result.missed = Between(by_odometry, match.pose);
+    // The last scan before this one that was refused, or where odometry stood.
+    result.missed_since = count_ - 1 - std::max(track_.refused + 1, still_);
+  }
   result.pose = match.pose;
   result.odometry_only = false;
   const Pose2 key_pose = track_.keys.back().pose;
@@ -755,7 +786,7 @@ void OdometryRefiner::NoteMatch(const Outcome& outcome, const Pose2& motion) {
     const Pose2 moved = Between(track_.last_pose, outcome.refined.pose);
     if (track_.refused > 0 || (track_.after_gap && !steady_.Explains(moved))) {
       steady_.Break();
-    } else {
+    } else if (!outcome.has_gone_on) {
       steady_.Add(moved);
     }
     track_.way = 0.0;
@@ -1183,6 +1214,7 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
       if (has_missed) {
         const Pose2& predicted = done.refined.pose;
         done.refined.missed = Between(predicted, Compose(shift, predicted));
+        done.refined.missed_since = open_->last_sure;
       }
       done.refined.tie = first.tie;
       done.refined.since = first.since;

@@ -127,9 +127,11 @@ struct RefinedScan {
   bool odometry_only = false;
   /// Of the first scan of a track that was lost; a key scan.
   TrackTie tie = TrackTie::kNone;
-  /// Where odometry alone had placed the scans before: what it had missed by
-  /// this one, which was matched, seen from where it had it.
+  /// Where odometry alone had placed the scans before, or had them stand: what
+  /// it had missed by this one, which was matched, seen from where it had it;
+  /// and the last scan before them (-1: nothing was missed).
   Pose2 missed = Pose2::Zero();
+  int missed_since = -1;
 };
 
 /// A scan whose place in the track is settled.
@@ -305,9 +307,10 @@ class OdometryRefiner {
   Outcome Match(const Scan& scan, const UncertainPose2& step, bool leapt);
   // While odometry stands still or leaps: whether the returns say that the
   // robot goes on as before, against `match`, which follows odometry. If so
-  // sets where it is, and its match.
+  // sets where it is, and its match. `returns_lead`: they lead to one place
+  // whether the robot goes on or stands.
   bool MovesOn(bool leapt, UncertainPose2* since_key, MatchPrior* prior,
-               MatchResult* match);
+               MatchResult* match, bool* returns_lead);
   // Takes the match back to where odometry has the robot when the returns do
   // not speak clearly for the place where it is.
   void StayUnlessClear(const MatchPrior& prior, const Pose2& motion,
@@ -456,17 +459,19 @@ class OdometryRefiner {
   Pose2 still_pose_ = Pose2::Zero();
   bool is_dead_ = false;
   // Where the robot is if it goes on while odometry stands still: the pose, the
-  // same since the key scan, the motion that goes on.
+  // same since the key scan, the motion that goes on, and by how much better
+  // than standing it explains the scans so far.
   struct Ahead {
     bool exists = false;
     Pose2 pose = Pose2::Zero();
     UncertainPose2 since_key;
     UncertainPose2 step;
+    double evidence = 0.0;
 
     template <typename Archive>
     friend void Exchange(Archive& archive, Ahead& ahead) {
-      auto& [exists, pose, since_key, step] = ahead;
-      ExchangeAll(archive, exists, pose, since_key, step);
+      auto& [exists, pose, since_key, step, evidence] = ahead;
+      ExchangeAll(archive, exists, pose, since_key, step, evidence);
     }
   };
   Ahead ahead_;

@@ -22,6 +22,12 @@ class SteadyMotion {
   /// The next scan's motion does not follow on the last one's.
   void Break() { count_ = 0; }
 
+  /// The robot went on like this, as is known afterwards.
+  void GoOn(const Pose2& step) {
+    steps_.fill(step);
+    count_ = kSteps;
+  }
+
   /// Whether enough scans were matched in a row, and the robot moved.
   bool IsMoving() const;
 

@@ -83,8 +83,8 @@ void AddBlindRuns(const std::vector<BlindRun>& runs, double most,
     if (is_told) continue;
     char why[128];
     std::snprintf(why, sizeof why,
-                  "nothing that the robot saw here could be matched, and "
-                  "odometry missed %.1f m",
+                  "odometry alone says how far the robot went here, and missed "
+                  "%.1f m",
                   missed);
     AddLoose(run.begin, run.end, why, loose);
   }

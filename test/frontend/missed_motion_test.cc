@@ -6,7 +6,7 @@
 namespace plumbline {
 namespace {
 
-// A key scan at (1, 2) that looks along y, and six scans by odometry: 1 m a
+// A key scan at (1, 2) that looks along y, and scans by odometry: 1 m a
 // scan along y, but for the third, which stands.
 std::vector<RefinedScan> Drive() {
   std::vector<RefinedScan> refined(8);
@@ -16,7 +16,6 @@ std::vector<RefinedScan> Drive() {
     if (i > 0 && i != 3) way += 1.0;
     refined[i].since_key.mean = Pose2(way, 0.0, 0.0);
     refined[i].pose = Compose(key, refined[i].since_key.mean);
-    refined[i].odometry_only = i > 1 && i < 7;
   }
   refined[0].is_key = true;
   return refined;
@@ -26,6 +25,7 @@ std::vector<RefinedScan> Drive() {
 std::vector<RefinedScan> MatchedAgain() {
   std::vector<RefinedScan> refined = Drive();
   refined[7].missed = Pose2(0.6, -0.5, 0.1);
+  refined[7].missed_since = 1;
   refined[7].pose = Compose(refined[7].pose, refined[7].missed);
   refined[7].since_key.mean =
       Compose(refined[7].since_key.mean, refined[7].missed);
@@ -72,8 +72,7 @@ TEST(MissedMotionTest, RunsEndWhereAScanIsMatched) {
 // From the first scan on, and by a robot that stands.
 TEST(MissedMotionTest, WithoutAWayNothingMoves) {
   std::vector<RefinedScan> refined(3);
-  refined[1].odometry_only = true;
-  refined[0].odometry_only = true;
+  refined[2].missed_since = 0;
   refined[2].missed = Pose2(0.3, 0.0, 0.0);
   refined[2].pose = refined[2].missed;
   SpreadMissedMotion(&refined);

@@ -348,13 +348,13 @@ TEST(OdometryRefinerTest, OdometryThatJumpsToAnotherPlace) {
 }
 
 // A corridor with a niche every 6 m.
-std::vector<WallEnds> NichedCorridor() {
+std::vector<WallEnds> NichedCorridor(double depth = 0.5) {
   std::vector<WallEnds> walls = {{{-200.0, 1.0}, {200.0, 1.0}}};
   for (double x = -60.0; x < 60.0; x += 6.0) {
     walls.push_back({{x, -1.0}, {x + 5.0, -1.0}});
-    walls.push_back({{x + 5.0, -1.0}, {x + 5.0, -1.5}});
-    walls.push_back({{x + 5.0, -1.5}, {x + 6.0, -1.5}});
-    walls.push_back({{x + 6.0, -1.5}, {x + 6.0, -1.0}});
+    walls.push_back({{x + 5.0, -1.0}, {x + 5.0, -1.0 - depth}});
+    walls.push_back({{x + 5.0, -1.0 - depth}, {x + 6.0, -1.0 - depth}});
+    walls.push_back({{x + 6.0, -1.0 - depth}, {x + 6.0, -1.0}});
   }
   return walls;
 }
@@ -389,12 +389,50 @@ TEST(OdometryRefinerTest, OdometryThatStandsStillWhileTheRobotGoes) {
   EXPECT_LT(errors.back(), 0.2);
 }
 
+// A slow robot has gone by little more than the noise when odometry stops, and
+// shallow niches show little of it in any one scan; deep ones show all.
+TEST(OdometryRefinerTest, OdometryThatStandsStillWhileASlowRobotGoes) {
+  for (const double depth : {0.08, 0.5}) {
+    for (const double step : {0.04, 0.06}) {
+      const std::vector<Pose2> motions(120, Pose2(step, 0.0, 0.0));
+      std::vector<Pose2> reported = motions;
+      std::fill_n(reported.begin() + 60, 40, Pose2::Zero());
+      const std::vector<double> errors =
+          ErrorsAlong(NichedCorridor(depth), motions, reported);
+      EXPECT_LT(errors.back(), 0.1) << depth << " m deep, " << step << " m";
+    }
+  }
+}
+
 // Nothing tells that the robot has stopped but odometry.
 TEST(OdometryRefinerTest, ARobotThatStopsAtOnceInABareCorridor) {
   std::vector<Pose2> motions(120, Pose2(0.1, 0.0, 0.0));
   std::fill_n(motions.begin() + 40, 40, Pose2::Zero());
   const std::vector<double> errors = ErrorsAlong(Corridor(), motions, motions);
   EXPECT_LT(*std::max_element(errors.begin(), errors.end()), 0.1);
+}
+
+// Or that it has not: how far it may have gone is in the covariance.
+TEST(OdometryRefinerTest, InABareCorridorItMayHaveGoneOn) {
+  std::vector<Pose2> motions(80, Pose2(0.1, 0.0, 0.0));
+  std::fill_n(motions.begin() + 40, 6, Pose2::Zero());
+  Laser laser = FullCircle();
+  laser.maximum_range = 5.0;
+  const std::vector<RefinedScan> refined =
+      Refine(Corridor(), Along(Pose2::Zero(), motions, motions), laser,
+             RefinerOptions());
+  // The next key scan after it went on.
+  std::size_t next = 47;
+  while (!refined[next].is_key) ++next;
+  const Eigen::Matrix3d& covariance = refined[next].since_key.covariance;
+  EXPECT_GT(std::sqrt(covariance(0, 0)), 0.4);
+  EXPECT_LT(std::sqrt(covariance(0, 0)), 0.8);
+  EXPECT_LT(std::sqrt(covariance(1, 1)), 0.1);
+  EXPECT_LT(std::sqrt(covariance(2, 2)), DegToRad(2.0));
+  // That of the one after it is as usual.
+  do ++next;
+  while (!refined[next].is_key);
+  EXPECT_LT(std::sqrt(refined[next].since_key.covariance(0, 0)), 0.2);
 }
 
 // The same message comes again, and the next one has all of the way.

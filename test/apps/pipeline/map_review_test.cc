@@ -97,7 +97,7 @@ TEST(MapReviewTest, TellsWhatOdometryMissed) {
   const ReviewedDrive drive = RoundsOfAHall();
   const MapReview review = drive.Review();
   std::vector<RefinedScan> refined(drive.trajectory.size());
-  for (std::size_t i = 30; i < 40; ++i) refined[i].odometry_only = true;
+  refined[40].missed_since = 29;
   refined[40].missed = Pose2(0.3, 0.3, 0.1);
   std::vector<LooseTrack> loose;
   review.Revise(Graph(), refined, true, &loose);
@@ -108,9 +108,9 @@ TEST(MapReviewTest, TellsWhatOdometryMissed) {
   EXPECT_EQ(loose[0].begin, 29);
   EXPECT_EQ(loose[0].end, 40);
   EXPECT_TRUE(loose[0].found);
-  EXPECT_EQ(loose[0].why,
-            "nothing that the robot saw here could be matched, and odometry "
-            "missed 1.0 m");
+  EXPECT_EQ(
+      loose[0].why,
+      "odometry alone says how far the robot went here, and missed 1.0 m");
   LooseTrack guess;
   guess.begin = 20;
   guess.end = 50;

@@ -1249,6 +1249,9 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
     if (!part.found) {
       guessed_ = static_cast<int>(loose_.size());
       loose_of_.push_back(guessed_);
+    } else if (first.since >= 0) {
+      found_ties_.push_back(
+          {open_->first, first.since, static_cast<int>(loose_.size())});
     }
     loose_.push_back(std::move(part));
   }
@@ -1285,17 +1288,35 @@ void OdometryRefiner::Finish(const std::function<bool()>& stop) {
   guessed_ = -1;
   late_ties_ = JoinParts(options_.tracking, options_.drift, loose_of_, &search_,
                          &loose_);
+  JoinDoubtfulParts();
   search_.set_stop(nullptr);
   // No scan follows.
   search_.Clear();
+}
+
+void OdometryRefiner::JoinDoubtfulParts() {
+  std::vector<FoundTie> ties = found_ties_;
+  for (const LateTie& late : late_ties_) {
+    ties.push_back({late.scan, late.since, late.loose});
+  }
+  const CutTies cut = CutDoubtfulTies(std::move(ties), &search_, &loose_of_);
+  if (cut.doubts.empty()) return;
+  std::map<int, LateTie> by_scan;
+  for (const LateTie& late : late_ties_) by_scan[late.scan] = late;
+  for (const LateTie& better : JoinParts(options_.tracking, options_.drift,
+                                         loose_of_, &search_, &loose_, cut)) {
+    by_scan[better.scan] = better;
+  }
+  late_ties_.clear();
+  for (auto& [scan, late] : by_scan) late_ties_.push_back(std::move(late));
 }
 
 template <typename StateArchive>
 void OdometryRefiner::ExchangeState(StateArchive& archive) {
   ExchangeAll(archive, track_, points_, started_, count_, last_odometry_,
               last_time_, usual_step_, search_.seen(), part_, num_parts_,
-              loose_of_, wide_searches_, refusals_, losses_, loose_, guessed_,
-              noise_, noise_scale_, last_step_, key_odometry_,
+              loose_of_, found_ties_, wide_searches_, refusals_, losses_,
+              loose_, guessed_, noise_, noise_scale_, last_step_, key_odometry_,
               squared_innovations_, compared_motions_, odometry_calibration_,
               steady_, still_, last_motion_, steady_wheels_, scans_since_key_,
               still_pose_, is_dead_, ahead_);

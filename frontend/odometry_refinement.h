@@ -11,6 +11,7 @@
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/scan_points.h>
 #include <plumbline/frontend/steady_motion.h>
+#include <plumbline/frontend/tie_doubts.h>
 #include <plumbline/frontend/track_search.h>
 #include <plumbline/frontend/tracking_options.h>
 #include <plumbline/frontend/wheel_track.h>
@@ -412,6 +413,8 @@ class OdometryRefiner {
   // wrong odometry is; true where it cannot be told.
   bool IsInReach(const FoundTrack& found, std::size_t middle,
                  std::size_t since) const;
+  // Looks once more for what hangs on ties that proved doubtful.
+  void JoinDoubtfulParts();
   void Settle(const Pose2& shift, const RefinedScan& first);
 
   const OdometryRefinementOptions usual_options_;
@@ -439,6 +442,8 @@ class OdometryRefiner {
   int num_parts_ = 1;
   // By part but the first: its entry in loose_.
   std::vector<int> loose_of_;
+  // Ties by one match with all that was seen.
+  std::vector<FoundTie> found_ties_;
   std::vector<LateTie> late_ties_;
   // Odometry at the last key scan; sum of chi-squares of the motions that were
   // compared with matches.

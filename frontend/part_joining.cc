@@ -1,3 +1,4 @@
+#include <plumbline/frontend/part_evidence.h>
 #include <plumbline/frontend/part_joining.h>
 
 #include <Eigen/Core>
@@ -27,6 +28,12 @@ constexpr double kLateAngle = DegToRad(5.0);
 constexpr double kRoughSigma = 10.0;
 constexpr double kRoughAngle = DegToRad(20.0);
 
+// Shares that contradict (PartEvidence::Doubt) from which on a part is not
+// taken; drift makes a third of the scans contradict at times. Of one that
+// hangs on another tie: of that one's.
+constexpr double kMostDoubt = 0.5;
+constexpr double kLessDoubt = 0.5;
+
 double Square(double x) { return x * x; }
 
 // Joins parts one after the other.
@@ -34,12 +41,13 @@ class PartJoining {
  public:
   PartJoining(const TrackingOptions& tracking, const MatchDrift& drift,
               const std::vector<int>& loose_of, TrackSearch* search,
-              std::vector<LooseTrack>* loose)
+              std::vector<LooseTrack>* loose, const CutTies& cut)
       : tracking_(tracking),
         drift_(drift),
         loose_of_(loose_of),
         search_(search),
-        loose_(loose) {}
+        loose_(loose),
+        cut_(cut) {}
 
   std::vector<LateTie> Run();
 
@@ -53,6 +61,10 @@ class PartJoining {
   std::size_t num_parts() const { return loose_of_.size() + 1; }
   // Key scans by part.
   std::vector<std::vector<std::size_t>> Parts() const;
+  // Whether they were one part before ties were cut.
+  bool HungTogether(std::size_t a, std::size_t b) const {
+    return cut_.before[a] == cut_.before[b];
+  }
   // Where the second part lies in the first.
   bool JoinPart(const std::vector<std::size_t>& rest,
                 const std::vector<std::size_t>& part);
@@ -69,14 +81,19 @@ class PartJoining {
                     const LateVote& vote) const;
   // `is_rough`: it says little more than where to look.
   void AddLateTie(const std::vector<std::size_t>& rest,
-                  const std::vector<std::size_t>& part, const LateVote& vote,
-                  const LateTie& tie, bool is_rough);
+                  const std::vector<std::size_t>& part, const LateTie& tie,
+                  bool is_rough);
+  void Move(const std::vector<std::size_t>& part, const Pose2& shift);
+  // The entry of the later one of two parts.
+  int LooseOf(const std::vector<std::size_t>& a,
+              const std::vector<std::size_t>& b) const;
 
   const TrackingOptions& tracking_;
   const MatchDrift& drift_;
   const std::vector<int>& loose_of_;
   TrackSearch* search_;
   std::vector<LooseTrack>* loose_;
+  const CutTies& cut_;
   std::vector<LateTie> ties_;
 };
 
@@ -94,6 +111,8 @@ std::vector<LateTie> PartJoining::Run() {
   // Key scans that a part was looked for in, by part.
   std::vector<std::size_t> tried(num_parts(), 0);
   bool is_joined = num_parts() > 1;
+  // Something lies elsewhere than when all parts were looked for.
+  bool is_moved = cut_.before.empty();
   int looked_for = 0;
   while (is_joined) {
     is_joined = false;
@@ -103,8 +122,11 @@ std::vector<LateTie> PartJoining::Run() {
         [](const auto& a, const auto& b) { return a.size() > b.size(); });
     for (std::size_t p = 1; p < parts.size() && !is_joined; ++p) {
       if (parts[p].empty()) break;
-      std::size_t& before = tried[static_cast<std::size_t>(
-          search_->seen()[parts[p].front()].part)];
+      const auto number = [&](std::size_t i) {
+        return static_cast<std::size_t>(search_->seen()[parts[i].front()].part);
+      };
+      if (!is_moved && !HungTogether(number(0), number(p))) continue;
+      std::size_t& before = tried[number(p)];
       const std::size_t rest = parts[0].size();
       if (static_cast<double>(rest) < kMoreRest * static_cast<double>(before)) {
         continue;
@@ -114,6 +136,7 @@ std::vector<LateTie> PartJoining::Run() {
       if (++looked_for > kMostLateParts) break;
       if (search_->Stops()) break;
       is_joined = JoinPart(parts[0], parts[p]);
+      is_moved = is_moved || is_joined;
     }
   }
   if (search_->Stops()) {
@@ -193,8 +216,38 @@ bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
       best->since_key.covariance(2, 2) > Square(kRoughAngle)) {
     return false;
   }
-  AddLateTie(rest, part, best_vote, *best, variance(*best) > 1.0);
+  const bool is_rough = variance(*best) > 1.0;
+  best->loose = LooseOf(rest, part);
+  const auto held = cut_.doubts.find(best->loose);
+  const bool is_held = held != cut_.doubts.end();
+  // The match that it hangs on is more than where to look.
+  if (is_rough && is_held) return false;
+  const Pose2 shift =
+      Compose(best_vote.found.pose,
+              Inverse(search_->seen()[part[best_vote.middle]].pose));
+  Move(part, shift);
+  if (CompareParts(*search_, part, rest).Doubt() >
+      (is_held ? kLessDoubt * held->second : kMostDoubt)) {
+    search_->Trace("NOT JOINED: contradicted");
+    Move(part, Inverse(shift));
+    return false;
+  }
+  AddLateTie(rest, part, *best, is_rough);
   return true;
+}
+
+void PartJoining::Move(const std::vector<std::size_t>& part,
+                       const Pose2& shift) {
+  for (const std::size_t k : part) {
+    search_->seen()[k].pose = Compose(shift, search_->seen()[k].pose);
+  }
+}
+
+int PartJoining::LooseOf(const std::vector<std::size_t>& a,
+                         const std::vector<std::size_t>& b) const {
+  // Parts are numbered in the order in which they began.
+  const int number = search_->seen()[std::max(a.front(), b.front())].part;
+  return loose_of_[static_cast<std::size_t>(number) - 1];
 }
 
 std::size_t PartJoining::NumLateWindows(std::size_t keys,
@@ -266,18 +319,14 @@ LateTie PartJoining::LateTieOf(const std::vector<std::size_t>& rest,
 
 void PartJoining::AddLateTie(const std::vector<std::size_t>& rest,
                              const std::vector<std::size_t>& part,
-                             const LateVote& vote, const LateTie& tie,
-                             bool is_rough) {
+                             const LateTie& tie, bool is_rough) {
   ties_.push_back(tie);
   search_->Trace("JOINED scan " + std::to_string(tie.scan) + " since " +
                  std::to_string(tie.since) + (is_rough ? " roughly" : ""));
   const bool is_later = part.front() > rest.front();
   const std::vector<std::size_t>& later = is_later ? part : rest;
   const std::vector<std::size_t>& earlier = is_later ? rest : part;
-  // Parts are numbered in the order in which they began.
-  const int number = search_->seen()[later.front()].part;
-  LooseTrack& loose =
-      (*loose_)[loose_of_[static_cast<std::size_t>(number) - 1]];
+  LooseTrack& loose = (*loose_)[static_cast<std::size_t>(tie.loose)];
   loose.why = loose.why.substr(0, loose.why.find(';')) +
               "; found again on what was seen later";
   if (is_rough) {
@@ -286,12 +335,7 @@ void PartJoining::AddLateTie(const std::vector<std::size_t>& rest,
     loose.found = true;
     loose.end = tie.scan;
   }
-  const Pose2 shift = Compose(vote.found.pose,
-                              Inverse(search_->seen()[part[vote.middle]].pose));
   const int into = search_->seen()[earlier.front()].part;
-  for (const std::size_t k : part) {
-    search_->seen()[k].pose = Compose(shift, search_->seen()[k].pose);
-  }
   for (const std::size_t k : later) search_->seen()[k].part = into;
 }
 
@@ -301,8 +345,9 @@ std::vector<LateTie> JoinParts(const TrackingOptions& tracking,
                                const MatchDrift& drift,
                                const std::vector<int>& loose_of,
                                TrackSearch* search,
-                               std::vector<LooseTrack>* loose) {
-  return PartJoining(tracking, drift, loose_of, search, loose).Run();
+                               std::vector<LooseTrack>* loose,
+                               const CutTies& cut) {
+  return PartJoining(tracking, drift, loose_of, search, loose, cut).Run();
 }
 
 }  // namespace plumbline

@@ -3,6 +3,7 @@
 
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/match_drift.h>
+#include <plumbline/frontend/tie_doubts.h>
 #include <plumbline/frontend/track_search.h>
 #include <plumbline/frontend/tracking_options.h>
 
@@ -24,29 +25,36 @@ struct LooseTrack {
 };
 
 /// A tie found once all scans were in, for a part of the track that was settled
-/// as loose.
+/// as loose or by a tie that proved doubtful.
 struct LateTie {
-  /// First scan of the part; its RefinedScan::tie was kLoose.
+  /// First scan of the part.
   int scan = 0;
   /// What RefinedScan::since and since_key of it are now.
   int since = 0;
   UncertainPose2 since_key;
+  /// The part's entry among the loose tracks.
+  int loose = 0;
 };
 
 /// Looks for the parts of a track that hang loose in each other, once all scans
 /// are in (core/method.md, section 7, step 0). The largest one takes in others,
 /// largest first, until none is found. A part is taken where one of its windows
-/// of key scans was found and another one says the same.
+/// of key scans was found and another one says the same, unless half of what
+/// both saw of the same places contradicts it.
 ///
 /// `search` has the key scans of all parts; they are moved and renumbered as
 /// parts are joined. `loose_of`: by part but the first, its entry in `loose`,
-/// which says in the end what was found. Returns the ties in the order of
-/// scans; none, with `loose` as it was, when `search` was stopped.
+/// which says in the end what was found. `cut`: of parts that hang on a
+/// doubtful tie and were looked for before it was cut. Another place of theirs
+/// must be clearly less doubtful, and the other parts are looked for once more
+/// only when there is one. Returns the ties in the order of scans; none, with
+/// `loose` as it was, when `search` was stopped.
 std::vector<LateTie> JoinParts(const TrackingOptions& tracking,
                                const MatchDrift& drift,
                                const std::vector<int>& loose_of,
                                TrackSearch* search,
-                               std::vector<LooseTrack>* loose);
+                               std::vector<LooseTrack>* loose,
+                               const CutTies& cut = {});
 
 }  // namespace plumbline
 

@@ -103,6 +103,17 @@ std::vector<TrackKey> TrackSearch::Unpacked(
   return keys;
 }
 
+ScanAgreement TrackSearch::CompareKey(
+    std::size_t key, const std::vector<std::size_t>& others) const {
+  ScanMatcher matcher(matcher_);
+  SetReference(others, 0, others.size(), &matcher);
+  std::vector<ScanPoint> points;
+  for (const Eigen::Vector4f& values : seen_[key].points) {
+    points.push_back(PointOf(values));
+  }
+  return matcher.Compare(points, seen_[key].pose, seen_[key].laser);
+}
+
 TrackSearch::View TrackSearch::ViewOf(const std::vector<TrackKey>& keys,
                                       std::size_t begin, std::size_t end) {
   View view;

@@ -116,6 +116,9 @@ class TrackSearch {
   std::vector<SeenKey>& seen() { return seen_; }
   /// Some of them as key scans of a track.
   std::vector<TrackKey> Unpacked(const std::vector<std::size_t>& where) const;
+  /// How one of them, at its pose, agrees with what others of them saw.
+  ScanAgreement CompareKey(std::size_t key,
+                           const std::vector<std::size_t>& others) const;
   /// Forgets them.
   void Clear() { std::vector<SeenKey>().swap(seen_); }
 

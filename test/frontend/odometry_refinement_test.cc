@@ -1345,6 +1345,59 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
   EXPECT_NE(drifting.loose()[0].why.find("roughly"), std::string::npos);
 }
 
+// Carried to where it has not been, into a hall that looks in part like the one
+// that it was taken from: there it is found, wrongly. It drives back into the
+// first hall through what cannot be there; in the end it is known.
+TEST(OdometryRefinerTest, CarriedToAPlaceThatLooksAlikeAndFoundInTheEnd) {
+  // A hall of 30 m by 6 m, a corridor of 29 m, a hall like the nearer 13 m of
+  // the first one, and a corridor on from there.
+  std::vector<WallEnds> walls = {
+      {{-30.0, 3.0}, {-30.0, -3.0}}, {{-30.0, -3.0}, {0.0, -3.0}},
+      {{0.0, -3.0}, {0.0, -1.2}},    {{0.0, -1.2}, {29.0, -1.2}},
+      {{29.0, -1.2}, {29.0, -3.0}},  {{29.0, -3.0}, {42.0, -3.0}},
+      {{42.0, -3.0}, {42.0, -1.2}},  {{42.0, -1.2}, {47.0, -1.2}},
+      {{47.0, -1.2}, {47.0, 1.2}},   {{47.0, 1.2}, {42.0, 1.2}},
+      {{42.0, 1.2}, {42.0, 3.0}},    {{42.0, 3.0}, {29.0, 3.0}},
+      {{29.0, 3.0}, {29.0, 1.2}},    {{29.0, 1.2}, {0.0, 1.2}},
+      {{0.0, 1.2}, {0.0, 3.0}},      {{0.0, 3.0}, {-30.0, 3.0}}};
+  for (const WallEnds& side :
+       testing::Moved(Pillars(-20.0), {-10.0, 0.0, 0.0})) {
+    walls.push_back(side);
+    if (side.a.x() < -12.0) continue;
+    walls.push_back({side.a + Eigen::Vector2d(42.0, 0.0),
+                     side.b + Eigen::Vector2d(42.0, 0.0)});
+  }
+  Laser laser = FullCircle();
+  laser.beams = 240;
+  laser.angle_step = DegToRad(1.5);
+  laser.maximum_range = 5.0;
+  laser.sigma = 0.01;
+  Noise noise(4);
+  OdometryRefiner refiner(RefinerOptions());
+  constexpr int kCarried = 165;
+  std::vector<Pose2> truth;
+  for (int i = 0; i < 580; ++i) {
+    truth.push_back(i < kCarried
+                        ? Pose2(-27.0 + 0.15 * i, 0.0, 0.0)
+                        : Pose2(37.5 - 0.15 * (i - kCarried), 0.1, kPi));
+  }
+  DriveAndBeCarried(walls, walls, kCarried, truth, laser, &noise, &refiner);
+  const std::vector<RefinedScan> refined = TakeAll(&refiner, {});
+  const auto error = [&](int since, const UncertainPose2& tie) {
+    const Pose2 expected = Between(truth[since], truth[kCarried]);
+    return Between(expected, tie.mean).head<2>().norm();
+  };
+  ASSERT_EQ(refined[kCarried].tie, TrackTie::kMatched);
+  EXPECT_GT(error(refined[kCarried].since, refined[kCarried].since_key), 30.0);
+  ASSERT_EQ(refiner.late_ties().size(), 1u);
+  const LateTie& late = refiner.late_ties()[0];
+  EXPECT_EQ(late.scan, kCarried);
+  EXPECT_LT(error(late.since, late.since_key), 0.5);
+  ASSERT_EQ(refiner.loose().size(), 1u);
+  EXPECT_NE(refiner.loose()[0].why.find("found again on what was seen later"),
+            std::string::npos);
+}
+
 // Carried into another building, the end of which looks like a piece of the
 // first one: of all that it sees there one window fits, and that is too little
 // for a part of many.

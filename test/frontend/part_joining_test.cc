@@ -1,52 +1,16 @@
 #include <gtest/gtest.h>
 #include <plumbline/frontend/part_joining.h>
 
-#include <cmath>
 #include <vector>
 
-#include "frontend/synthetic_world.h"
+#include "frontend/long_hall.h"
 
 namespace plumbline {
 namespace {
 
-using testing::FullCircle;
 using testing::HeadingError;
-using testing::MakeScan;
-using testing::PointsOf;
 using testing::PositionError;
-using testing::Room;
-using testing::WallEnds;
-
-// A hall in which something else stands every 2 m.
-std::vector<WallEnds> LongHall() {
-  std::vector<WallEnds> walls = Room(40.0, 6.0);
-  testing::Noise layout(7);
-  for (double x = -18.0; x < 19.0; x += 2.0) {
-    const Pose2 place(x + 0.3 * layout.Normal(1.0),
-                      layout.Normal(1.0) > 0.0 ? 1.8 : -1.8,
-                      0.5 * layout.Normal(1.0));
-    for (const WallEnds& side : testing::Moved(
-             Room(0.5 + 0.2 * std::abs(layout.Normal(1.0)), 0.8), place)) {
-      walls.push_back(side);
-    }
-  }
-  return walls;
-}
-
-// `count` key scans along the hall from `x` on, as part `part`; their poses are
-// off by `shift`.
-void SeeHall(double x, int count, int part, const Pose2& shift, double y,
-             TrackSearch* search) {
-  static const std::vector<WallEnds> hall = LongHall();
-  for (int k = 0; k < count; ++k) {
-    const Pose2 truth(x + 0.3 * k, y, 0.0);
-    search->Add(
-        {static_cast<int>(10 * search->seen().size()), Compose(shift, truth),
-         PointsOf(MakeScan(hall, truth, FullCircle()), ScanPointsOptions()),
-         Eigen::Vector2d::Zero()},
-        part);
-  }
-}
+using testing::SeeHall;
 
 std::vector<LooseTrack> Guessed(int begin, int end) {
   LooseTrack part;
@@ -88,6 +52,57 @@ TEST(PartJoiningTest, APartOfAnotherPlaceIsNot) {
       JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose).empty());
   EXPECT_FALSE(loose[0].found);
   EXPECT_EQ(loose[0].why, Guessed(0, 0)[0].why);
+}
+
+// A part that hangs on a doubtful tie has to be less doubtful where it is
+// found.
+TEST(PartJoiningTest, AnotherPlaceMustBeLessDoubtful) {
+  for (const double doubt : {0.9, 0.3}) {
+    TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
+    SeeHall(-15.0, 90, 0, Pose2::Zero(), -0.2, &search);
+    SeeHall(-5.0, 60, 1, Pose2(1.0, 0.0, 0.0), 0.2, &search);
+    // Something that it does not see at its right place.
+    for (std::size_t k = 128; k < 148; ++k) {
+      for (Eigen::Vector4f& point : search.seen()[k].points) {
+        point.head<2>() *= 0.5f;
+      }
+    }
+    std::vector<LooseTrack> loose = Guessed(890, 900);
+    loose[0].found = true;
+    CutTies cut;
+    cut.doubts = {{0, doubt}};
+    cut.before = {0, 0};
+    const std::vector<LateTie> ties =
+        JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose, cut);
+    if (doubt < 0.5) {
+      EXPECT_TRUE(ties.empty());
+      EXPECT_EQ(search.seen().back().part, 1);
+      EXPECT_NEAR(search.seen()[90].pose.x(), -4.0, 1e-9);
+      EXPECT_EQ(loose[0].why, Guessed(0, 0)[0].why);
+    } else {
+      ASSERT_EQ(ties.size(), 1u);
+      EXPECT_EQ(ties[0].loose, 0);
+      EXPECT_NEAR(search.seen()[90].pose.x(), -5.0, 0.1);
+    }
+  }
+}
+
+// A part that was looked for in all of this before is not once more.
+TEST(PartJoiningTest, OtherPartsAreLookedForWhenSomethingHasMoved) {
+  TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
+  SeeHall(-15.0, 90, 0, Pose2::Zero(), -0.2, &search);
+  SeeHall(-5.0, 30, 1, Pose2(1.0, 0.0, 0.0), 0.2, &search);
+  std::vector<LooseTrack> loose = Guessed(890, 1190);
+  CutTies cut;
+  cut.before = {0, 1};
+  EXPECT_TRUE(
+      JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose, cut)
+          .empty());
+  cut.before = {0, 0};
+  EXPECT_EQ(
+      JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose, cut)
+          .size(),
+      1u);
 }
 
 TEST(PartJoiningTest, StoppedItLeavesAllAsItWas) {

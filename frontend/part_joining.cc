@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <iterator>
 #include <optional>
+#include <set>
+#include <string>
 #include <utility>
 
 namespace plumbline {
@@ -33,6 +35,16 @@ constexpr double kRoughAngle = DegToRad(20.0);
 // hangs on another tie: of that one's.
 constexpr double kMostDoubt = 0.5;
 constexpr double kLessDoubt = 0.5;
+
+// Where no window is clear: quality of a place that one may have at least,
+// windows that have to agree on a place, and places that are looked at.
+constexpr double kLeastQuality = 0.3;
+constexpr std::size_t kFewestAgreed = 3;
+constexpr std::size_t kMostPlaces = 6;
+// How many scans that agree one that contradicts takes back, and how many have
+// to be left.
+constexpr int kContradictionWeight = 3;
+constexpr int kLeastWeight = 12;
 
 double Square(double x) { return x * x; }
 
@@ -83,7 +95,24 @@ class PartJoining {
   void AddLateTie(const std::vector<std::size_t>& rest,
                   const std::vector<std::size_t>& part, const LateTie& tie,
                   bool is_rough);
-  void Move(const std::vector<std::size_t>& part, const Pose2& shift);
+  // Whether two windows of a part say the same of it.
+  static bool Agree(const std::vector<TrackKey>& keys, const LateVote& a,
+                    const LateVote& b);
+  // Where no window is clear by itself: the place that most of them may have,
+  // if what all of the part and the rest saw speaks for it and for no other.
+  bool MostAgreed(const std::vector<TrackKey>& keys,
+                  const std::vector<std::size_t>& rest,
+                  const std::vector<std::size_t>& part,
+                  const std::vector<LateVote>& candidates,
+                  LateVote* most) const;
+  // By which the part moves to where a window says, and what is seen of it
+  // there.
+  Pose2 ShiftOf(const LateVote& vote,
+                const std::vector<std::size_t>& part) const;
+  PartEvidence EvidenceOf(const LateVote& vote,
+                          const std::vector<std::size_t>& rest,
+                          const std::vector<std::size_t>& part) const;
+  void Move(const std::vector<std::size_t>& part, const Pose2& shift) const;
   // The entry of the later one of two parts.
   int LooseOf(const std::vector<std::size_t>& a,
               const std::vector<std::size_t>& b) const;
@@ -161,6 +190,7 @@ bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
   // too short for another: one that fits nowhere is no reason to believe it.
   const bool is_short = NumLateWindows(part.size(), size) == 1;
   std::vector<LateVote> votes;
+  std::vector<LateVote> candidates;
   LateVote best_vote;
   std::optional<LateTie> best;
   const auto variance = [](const LateTie& tie) {
@@ -175,22 +205,17 @@ bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
     if (nodes <= 0) break;
     // A jump within a window is none of the track's: parts are whole.
     LateVote vote{begin + size / 2, {}};
-    if (!search_->FindAnywhere(keys, view, begin, begin + size, 0.0, &nodes,
-                               &vote.found)) {
-      continue;
+    const std::vector<FoundTrack> hypotheses =
+        search_->FindAll(keys, view, begin, begin + size, 0.0, &nodes);
+    for (const FoundTrack& hypothesis : hypotheses) {
+      if (hypothesis.quality >= kLeastQuality)
+        candidates.push_back({vote.middle, hypothesis});
     }
+    if (!search_->IsClear(hypotheses, &vote.found)) continue;
     search_->Trace("LATE window found");
-    const auto confirms = [&](const LateVote& other) {
-      const Pose2 expected =
-          Compose(other.found.pose,
-                  Between(keys[other.middle].pose, keys[vote.middle].pose));
-      const Pose2 apart = Between(expected, vote.found.pose);
-      return apart.head<2>().norm() < TrackSearch::kVisitDistance &&
-             std::abs(apart[2]) < TrackSearch::kVisitRotation;
-    };
     std::vector<const LateVote*> agreeing;
     for (const LateVote& other : votes) {
-      if (confirms(other)) agreeing.push_back(&other);
+      if (Agree(keys, vote, other)) agreeing.push_back(&other);
     }
     if (!agreeing.empty() || is_short) {
       agreeing.push_back(&vote);
@@ -210,6 +235,9 @@ bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
     }
     votes.push_back(vote);
   }
+  if (!best && MostAgreed(keys, rest, part, candidates, &best_vote)) {
+    best = LateTieOf(rest, part, best_vote);
+  }
   if (!best ||
       best->since_key.covariance.diagonal().head<2>().maxCoeff() >
           Square(kRoughSigma) ||
@@ -222,22 +250,92 @@ bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
   const bool is_held = held != cut_.doubts.end();
   // The match that it hangs on is more than where to look.
   if (is_rough && is_held) return false;
-  const Pose2 shift =
-      Compose(best_vote.found.pose,
-              Inverse(search_->seen()[part[best_vote.middle]].pose));
-  Move(part, shift);
-  if (CompareParts(*search_, part, rest).Doubt() >
+  if (EvidenceOf(best_vote, rest, part).Doubt() >
       (is_held ? kLessDoubt * held->second : kMostDoubt)) {
     search_->Trace("NOT JOINED: contradicted");
-    Move(part, Inverse(shift));
     return false;
   }
+  Move(part, ShiftOf(best_vote, part));
   AddLateTie(rest, part, *best, is_rough);
   return true;
 }
 
+bool PartJoining::Agree(const std::vector<TrackKey>& keys, const LateVote& a,
+                        const LateVote& b) {
+  const Pose2 between = Between(keys[b.middle].pose, keys[a.middle].pose);
+  const Pose2 apart = Between(Compose(b.found.pose, between), a.found.pose);
+  return apart.head<2>().norm() < TrackSearch::kVisitDistance &&
+         std::abs(apart[2]) < TrackSearch::kVisitRotation;
+}
+
+bool PartJoining::MostAgreed(const std::vector<TrackKey>& keys,
+                             const std::vector<std::size_t>& rest,
+                             const std::vector<std::size_t>& part,
+                             const std::vector<LateVote>& candidates,
+                             LateVote* most) const {
+  // By candidate: windows that say the same.
+  std::vector<std::pair<std::size_t, const LateVote*>> counted;
+  for (const LateVote& candidate : candidates) {
+    std::set<std::size_t> windows;
+    for (const LateVote& other : candidates) {
+      if (Agree(keys, candidate, other)) windows.insert(other.middle);
+    }
+    if (windows.size() >= kFewestAgreed) {
+      counted.emplace_back(windows.size(), &candidate);
+    }
+  }
+  std::stable_sort(
+      counted.begin(), counted.end(), [](const auto& a, const auto& b) {
+        return a.first != b.first
+                   ? a.first > b.first
+                   : a.second->found.quality > b.second->found.quality;
+      });
+  std::vector<const LateVote*> places;
+  int best = 0;
+  int second = 0;
+  for (const auto& [windows, candidate] : counted) {
+    if (places.size() == kMostPlaces || search_->Stops()) break;
+    if (std::any_of(places.begin(), places.end(), [&](const LateVote* place) {
+          return Agree(keys, *candidate, *place);
+        })) {
+      continue;
+    }
+    places.push_back(candidate);
+    const PartEvidence evidence = EvidenceOf(*candidate, rest, part);
+    search_->Trace("LATE place of " + std::to_string(windows) +
+                   " windows: agree " + std::to_string(evidence.agreeing) +
+                   " contradict " + std::to_string(evidence.contradicting));
+    const int weight =
+        evidence.agreeing - kContradictionWeight * evidence.contradicting;
+    if (weight > best) {
+      second = best;
+      best = weight;
+      *most = *candidate;
+    } else {
+      second = std::max(second, weight);
+    }
+  }
+  return best >= kLeastWeight && second <= tracking_.rival_share * best;
+}
+
+Pose2 PartJoining::ShiftOf(const LateVote& vote,
+                           const std::vector<std::size_t>& part) const {
+  return Compose(vote.found.pose,
+                 Inverse(search_->seen()[part[vote.middle]].pose));
+}
+
+PartEvidence PartJoining::EvidenceOf(
+    const LateVote& vote, const std::vector<std::size_t>& rest,
+    const std::vector<std::size_t>& part) const {
+  const Pose2 shift = ShiftOf(vote, part);
+  Move(part, shift);
+  const PartEvidence evidence = CompareParts(*search_, part, rest);
+  Move(part, Inverse(shift));
+  return evidence;
+}
+
 void PartJoining::Move(const std::vector<std::size_t>& part,
-                       const Pose2& shift) {
+                       const Pose2& shift) const {
   for (const std::size_t k : part) {
     search_->seen()[k].pose = Compose(shift, search_->seen()[k].pose);
   }

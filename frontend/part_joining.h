@@ -40,7 +40,8 @@ struct LateTie {
 /// are in (core/method.md, section 7, step 0). The largest one takes in others,
 /// largest first, until none is found. A part is taken where one of its windows
 /// of key scans was found and another one says the same, unless half of what
-/// both saw of the same places contradicts it.
+/// both saw of the same places contradicts it; or where three windows may lie,
+/// each with rivals, and what both saw speaks for that place and no other.
 ///
 /// `search` has the key scans of all parts; they are moved and renumbered as
 /// parts are joined. `loose_of`: by part but the first, its entry in `loose`,

@@ -197,12 +197,12 @@ bool TrackSearch::Judge(const View& view, const ScoredPose& peak,
   return true;
 }
 
-bool TrackSearch::Find(
+std::vector<FoundTrack> TrackSearch::Find(
     const std::vector<TrackKey>& keys, const ScanMatcher& reference,
     const std::function<std::vector<Visit>(const Pose2&)>& visits,
     const Pose2& center, double translation_window, std::size_t begin,
-    std::size_t end, double seen_through, bool is_global, std::int64_t* nodes,
-    FoundTrack* found) const {
+    std::size_t end, double seen_through, bool is_global,
+    std::int64_t* nodes) const {
   const View view = ViewOf(keys, begin, end);
   const std::vector<ScoredPose> peaks = reference.Peaks(
       view.sparse, center, translation_window, kPi, kLeastScore, kPeakShare,
@@ -211,13 +211,18 @@ bool TrackSearch::Find(
   std::vector<FoundTrack> hypotheses;
   for (const ScoredPose& peak : peaks) {
     for (const Visit& visit : visits(peak.pose)) {
-      if (stop_ && stop_()) return false;
+      if (stop_ && stop_()) return {};
       FoundTrack hypothesis;
       if (Judge(view, peak, visit, seen_through, is_global, &hypothesis)) {
         hypotheses.push_back(hypothesis);
       }
     }
   }
+  return hypotheses;
+}
+
+bool TrackSearch::IsClear(const std::vector<FoundTrack>& hypotheses,
+                          FoundTrack* found) const {
   const FoundTrack* best = nullptr;
   for (const FoundTrack& hypothesis : hypotheses) {
     if (best == nullptr || hypothesis.quality > best->quality) {
@@ -252,8 +257,9 @@ bool TrackSearch::FindHere(const std::vector<TrackKey>& keys,
   const auto visits = [&reference](const Pose2&) {
     return std::vector<Visit>{{&reference, 0, 0}};
   };
-  return Find(keys, reference, visits, center, window, begin, end, seen_through,
-              false, nullptr, found);
+  return IsClear(Find(keys, reference, visits, center, window, begin, end,
+                      seen_through, false, nullptr),
+                 found);
 }
 
 void TrackSearch::SetReference(const std::vector<std::size_t>& where,
@@ -312,6 +318,14 @@ bool TrackSearch::FindAnywhere(const std::vector<TrackKey>& keys,
                                const SearchArea& area, std::size_t begin,
                                std::size_t end, double seen_through,
                                std::int64_t* nodes, FoundTrack* found) const {
+  return IsClear(FindAll(keys, area, begin, end, seen_through, nodes), found);
+}
+
+std::vector<FoundTrack> TrackSearch::FindAll(const std::vector<TrackKey>& keys,
+                                             const SearchArea& area,
+                                             std::size_t begin, std::size_t end,
+                                             double seen_through,
+                                             std::int64_t* nodes) const {
   const std::vector<std::size_t>& where = area.where;
   std::deque<ScanMatcher> around;
   const auto visits = [&](const Pose2& pose) {
@@ -342,7 +356,7 @@ bool TrackSearch::FindAnywhere(const std::vector<TrackKey>& keys,
     return result;
   };
   return Find(keys, area.matcher, visits, area.center, area.window, begin, end,
-              seen_through, true, nodes, found);
+              seen_through, true, nodes);
 }
 
 double TrackSearch::Clearness(const std::vector<TrackKey>& keys,

@@ -144,6 +144,15 @@ class TrackSearch {
   bool FindAnywhere(const std::vector<TrackKey>& keys, const SearchArea& area,
                     std::size_t begin, std::size_t end, double seen_through,
                     std::int64_t* nodes, FoundTrack* found) const;
+  /// Where they may lie in an area, each visit to a place by itself: of these
+  /// FindAnywhere gives the one that IsClear.
+  std::vector<FoundTrack> FindAll(const std::vector<TrackKey>& keys,
+                                  const SearchArea& area, std::size_t begin,
+                                  std::size_t end, double seen_through,
+                                  std::int64_t* nodes) const;
+  /// Whether the best of them holds and no other place comes near; sets it.
+  bool IsClear(const std::vector<FoundTrack>& hypotheses,
+               FoundTrack* best) const;
 
   /// How clearly key scans [begin, end) fit somewhere in the area, at a
   /// fraction of FindAnywhere's cost (ScanMatcher::ClearestScore).
@@ -166,11 +175,13 @@ class TrackSearch {
              double seen_through, bool is_global, FoundTrack* hypothesis) const;
   // `visits` gives what was seen around a pose, each time that the robot was
   // there. `is_global`: it was looked for in all that was seen.
-  bool Find(const std::vector<TrackKey>& keys, const ScanMatcher& reference,
-            const std::function<std::vector<Visit>(const Pose2&)>& visits,
-            const Pose2& center, double translation_window, std::size_t begin,
-            std::size_t end, double seen_through, bool is_global,
-            std::int64_t* nodes, FoundTrack* found) const;
+  // None once it was stopped.
+  std::vector<FoundTrack> Find(
+      const std::vector<TrackKey>& keys, const ScanMatcher& reference,
+      const std::function<std::vector<Visit>(const Pose2&)>& visits,
+      const Pose2& center, double translation_window, std::size_t begin,
+      std::size_t end, double seen_through, bool is_global,
+      std::int64_t* nodes) const;
   // Sets what was seen from these key scans, [begin, end).
   void SetReference(const std::vector<std::size_t>& where, std::size_t begin,
                     std::size_t end, ScanMatcher* matcher) const;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/frontend/part_joining.h>
 
+#include <string>
 #include <vector>
 
 #include "frontend/long_hall.h"
@@ -52,6 +53,35 @@ TEST(PartJoiningTest, APartOfAnotherPlaceIsNot) {
       JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose).empty());
   EXPECT_FALSE(loose[0].found);
   EXPECT_EQ(loose[0].why, Guessed(0, 0)[0].why);
+}
+
+// However unclear each window is, together they say where a part lies.
+TEST(PartJoiningTest, WhatUnclearWindowsAgreeOnIsTaken) {
+  TrackingOptions tracking;
+  // Any other place is a rival.
+  tracking.rival_share = 0.01;
+  for (const bool is_there : {true, false}) {
+    TrackSearch search{tracking, ScanMatcherOptions()};
+    SeeHall(is_there ? -15.0 : 6.0, is_there ? 90 : 40, 0, Pose2::Zero(), -0.2,
+            &search);
+    const Pose2 lost(50.0, 20.0, 2.0);
+    SeeHall(-14.0, 60, 1, lost, 0.2, &search);
+    std::vector<LooseTrack> loose = Guessed(890, 1490);
+    int clear = 0;
+    search.set_trace([&clear](const std::string& line) {
+      if (line == "LATE window found") ++clear;
+    });
+    const std::vector<LateTie> ties =
+        JoinParts(tracking, MatchDrift(), {0}, &search, &loose);
+    // Two clear ones would do by themselves.
+    EXPECT_LT(clear, 2);
+    ASSERT_EQ(ties.size(), is_there ? 1u : 0u);
+    if (!is_there) continue;
+    EXPECT_TRUE(loose[0].found);
+    const Pose2& first = search.seen()[90].pose;
+    EXPECT_LT(PositionError(first, Pose2(-14.0, 0.2, 0.0)), 0.1);
+    EXPECT_LT(HeadingError(first, Pose2(-14.0, 0.2, 0.0)), DegToRad(1.0));
+  }
 }
 
 // A part that hangs on a doubtful tie has to be less doubtful where it is

@@ -45,6 +45,9 @@ constexpr std::size_t kMostPlaces = 6;
 // to be left.
 constexpr int kContradictionWeight = 3;
 constexpr int kLeastWeight = 12;
+// What another place may have of that: in a building of equal rooms the right
+// place need not be among those that were seen.
+constexpr double kMostOfRival = 0.25;
 
 double Square(double x) { return x * x; }
 
@@ -315,7 +318,7 @@ bool PartJoining::MostAgreed(const std::vector<TrackKey>& keys,
       second = std::max(second, weight);
     }
   }
-  return best >= kLeastWeight && second <= tracking_.rival_share * best;
+  return best >= kLeastWeight && second <= kMostOfRival * best;
 }
 
 Pose2 PartJoining::ShiftOf(const LateVote& vote,

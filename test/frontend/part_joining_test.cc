@@ -84,6 +84,19 @@ TEST(PartJoiningTest, WhatUnclearWindowsAgreeOnIsTaken) {
   }
 }
 
+// Where much of it may lie elsewhere as well, the right place may be a third.
+TEST(PartJoiningTest, APlaceWithARivalIsNotTaken) {
+  TrackingOptions tracking;
+  tracking.rival_share = 0.01;
+  TrackSearch search{tracking, ScanMatcherOptions()};
+  SeeHall(-15.0, 90, 0, Pose2::Zero(), -0.2, &search);
+  SeeHall(-15.0, 56, 0, Pose2(0.0, 40.0, 0.0), -0.2, &search);
+  SeeHall(-14.0, 84, 1, Pose2(50.0, 20.0, 2.0), 0.2, &search);
+  std::vector<LooseTrack> loose = Guessed(1450, 2290);
+  EXPECT_TRUE(JoinParts(tracking, MatchDrift(), {0}, &search, &loose).empty());
+  EXPECT_EQ(search.seen().back().part, 1);
+}
+
 // A part that hangs on a doubtful tie has to be less doubtful where it is
 // found.
 TEST(PartJoiningTest, AnotherPlaceMustBeLessDoubtful) {

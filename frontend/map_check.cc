@@ -30,21 +30,6 @@ constexpr std::size_t kFewestKept = 64;
 // In which parts of a track are compared.
 constexpr std::size_t kRounds = 4;
 
-enum class Verdict { kUnknown, kAgrees, kContradicts };
-
-Verdict Judge(const ScanAgreement& agreement, const MapCheckOptions& options) {
-  const int known = agreement.hits + agreement.intruders;
-  if (known < options.min_returns && agreement.seen < options.min_returns) {
-    return Verdict::kUnknown;
-  }
-  const bool contradicts =
-      (known >= options.min_returns &&
-       agreement.intruders > options.max_intruders * known) ||
-      (agreement.seen >= options.min_returns &&
-       agreement.seen_through > options.max_seen_through * agreement.seen);
-  return contradicts ? Verdict::kContradicts : Verdict::kAgrees;
-}
-
 // The returns of scans, those of some of the last ones kept.
 class ScanReturns {
  public:
@@ -182,7 +167,7 @@ struct Evidence {
 struct JudgedScans {
   // Of the keys, ascending.
   std::vector<std::size_t> looked_at;
-  std::vector<Verdict> verdicts;
+  std::vector<ScanVerdict> verdicts;
 };
 
 JudgedScans JudgeScans(const std::vector<Scan>& scans,
@@ -199,7 +184,7 @@ JudgedScans JudgeScans(const std::vector<Scan>& scans,
   std::vector<std::size_t> looked_at = SpreadOver(way, options.spacing);
   const PlaceGrid grid(poses, options.radius);
   const MapComparison comparison(scans, keys, poses, options);
-  std::vector<Verdict> verdicts(looked_at.size(), Verdict::kUnknown);
+  std::vector<ScanVerdict> verdicts(looked_at.size(), ScanVerdict::kUnknown);
   const auto judge = [&](std::size_t i, ScanReturns* returns) {
     const std::size_t k = looked_at[i];
     std::vector<std::pair<double, std::size_t>> others;
@@ -211,9 +196,9 @@ JudgedScans JudgeScans(const std::vector<Scan>& scans,
       }
     });
     if (static_cast<int>(others.size()) < options.min_others) return;
-    verdicts[i] =
-        Judge(comparison.Compare(keys[k], poses[k], std::move(others), returns),
-              options);
+    verdicts[i] = JudgeScan(
+        comparison.Compare(keys[k], poses[k], std::move(others), returns),
+        options);
   };
   ThreadTeam team(options.num_threads);
   const auto threads =
@@ -390,7 +375,7 @@ class PartComparison {
   void TakeEvidence(const Pose2& pose, const ScanAgreement& agreement,
                     const Pair& pair) {
     const bool contradicts =
-        Judge(agreement, options_) == Verdict::kContradicts;
+        JudgeScan(agreement, options_) == ScanVerdict::kContradicts;
     if (!contradicts && !IsKnown(agreement, options_)) return;
     Evidence& of_pair = evidence_[pair];
     ++of_pair.compared;
@@ -418,6 +403,20 @@ class PartComparison {
 
 }  // namespace
 
+ScanVerdict JudgeScan(const ScanAgreement& agreement,
+                      const MapCheckOptions& options) {
+  const int known = agreement.hits + agreement.intruders;
+  if (known < options.min_returns && agreement.seen < options.min_returns) {
+    return ScanVerdict::kUnknown;
+  }
+  const bool contradicts =
+      (known >= options.min_returns &&
+       agreement.intruders > options.max_intruders * known) ||
+      (agreement.seen >= options.min_returns &&
+       agreement.seen_through > options.max_seen_through * agreement.seen);
+  return contradicts ? ScanVerdict::kContradicts : ScanVerdict::kAgrees;
+}
+
 std::vector<MapContradiction> FindContradictions(
     const std::vector<Scan>& scans, const std::vector<int>& keys,
     const std::vector<Pose2>& poses, const MapCheckOptions& options,
@@ -427,7 +426,7 @@ std::vector<MapContradiction> FindContradictions(
   std::vector<MapContradiction> found;
   std::size_t i = 0;
   while (i < verdicts.size()) {
-    if (verdicts[i] != Verdict::kContradicts) {
+    if (verdicts[i] != ScanVerdict::kContradicts) {
       ++i;
       continue;
     }
@@ -435,7 +434,7 @@ std::vector<MapContradiction> FindContradictions(
     std::size_t last = i;
     int contradictions = 0;
     for (int passed = 0; i < verdicts.size() && passed <= 1; ++i) {
-      if (verdicts[i] == Verdict::kContradicts) {
+      if (verdicts[i] == ScanVerdict::kContradicts) {
         ++contradictions;
         last = i;
         passed = 0;
@@ -456,10 +455,10 @@ MapAgreement CountAgreement(const std::vector<Scan>& scans,
                             const MapCheckOptions& options,
                             const std::function<bool()>& stop) {
   MapAgreement count;
-  for (const Verdict verdict :
+  for (const ScanVerdict verdict :
        JudgeScans(scans, keys, poses, options, stop).verdicts) {
-    count.agreeing += verdict == Verdict::kAgrees ? 1 : 0;
-    count.contradicting += verdict == Verdict::kContradicts ? 1 : 0;
+    count.agreeing += verdict == ScanVerdict::kAgrees ? 1 : 0;
+    count.contradicting += verdict == ScanVerdict::kContradicts ? 1 : 0;
   }
   return count;
 }

@@ -63,6 +63,18 @@ struct MapCheckOptions {
   }
 };
 
+/// What a scan says of the place that it was compared at.
+enum class ScanVerdict {
+  /// It shares too little with what was seen there.
+  kUnknown,
+  kAgrees,
+  kContradicts,
+};
+
+/// By the options' shares and least number of returns.
+ScanVerdict JudgeScan(const ScanAgreement& agreement,
+                      const MapCheckOptions& options);
+
 /// Scans that contradict what was seen on other visits.
 struct MapContradiction {
   /// First and last one: indices into `scans`.
@@ -116,9 +128,8 @@ enum class TieVerdict {
   /// Nothing shows that the parts before and behind it lie right to each other.
   kUnconfirmed,
   /// They do, but the scans next to it fit as well where odometry has them,
-  /// seen
-  /// from the other side, and that is elsewhere: somewhere between, as along a
-  /// corridor while wheels were not read.
+  /// seen from the other side, and that is elsewhere: somewhere between, as
+  /// along a corridor while wheels were not read.
   kOpen,
   /// They do.
   kConfirmed,

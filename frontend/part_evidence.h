@@ -10,7 +10,7 @@ namespace plumbline {
 
 /// How key scans of two parts of a track, as they lie to each other, agree on
 /// what is solid and what is free: one of either for each 1.2 m of its way that
-/// has key scans of the other around it.
+/// has key scans of the other around it, by the defaults of MapCheckOptions.
 struct PartEvidence {
   int agreeing = 0;
   int contradicting = 0;

@@ -51,6 +51,14 @@ constexpr double kMostOfRival = 0.25;
 
 double Square(double x) { return x * x; }
 
+// The largest of a tie's variances, as shares of those of a rough one.
+double VarianceOf(const LateTie& tie) {
+  const Eigen::Matrix3d& covariance = tie.since_key.covariance;
+  return std::max({covariance(0, 0) / Square(kLateSigma),
+                   covariance(1, 1) / Square(kLateSigma),
+                   covariance(2, 2) / Square(kLateAngle)});
+}
+
 // Joins parts one after the other.
 class PartJoining {
  public:
@@ -94,6 +102,11 @@ class PartJoining {
   LateTie LateTieOf(const std::vector<std::size_t>& rest,
                     const std::vector<std::size_t>& part,
                     const LateVote& vote) const;
+  // Takes a part in where a window says, unless that is too uncertain or
+  // contradicted.
+  bool Take(const std::vector<std::size_t>& rest,
+            const std::vector<std::size_t>& part, const LateVote& vote,
+            LateTie tie);
   // `is_rough`: it says little more than where to look.
   void AddLateTie(const std::vector<std::size_t>& rest,
                   const std::vector<std::size_t>& part, const LateTie& tie,
@@ -196,12 +209,6 @@ bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
   std::vector<LateVote> candidates;
   LateVote best_vote;
   std::optional<LateTie> best;
-  const auto variance = [](const LateTie& tie) {
-    const Eigen::Matrix3d& covariance = tie.since_key.covariance;
-    return std::max({covariance(0, 0) / Square(kLateSigma),
-                     covariance(1, 1) / Square(kLateSigma),
-                     covariance(2, 2) / Square(kLateAngle)});
-  };
   std::int64_t nodes = kLateNodes;
   for (const std::size_t begin : windows) {
     if (search_->Stops()) return false;
@@ -224,42 +231,47 @@ bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
       agreeing.push_back(&vote);
       for (const LateVote* other : agreeing) {
         const LateTie tie = LateTieOf(rest, part, *other);
-        const bool is_narrow = variance(tie) <= 1.0;
+        const bool is_narrow = VarianceOf(tie) <= 1.0;
         const bool is_better =
-            !best || (is_narrow && variance(*best) <= 1.0
+            !best || (is_narrow && VarianceOf(*best) <= 1.0
                           ? other->found.quality > best_vote.found.quality
-                          : variance(tie) < variance(*best));
+                          : VarianceOf(tie) < VarianceOf(*best));
         if (is_better) {
           best = tie;
           best_vote = *other;
         }
       }
-      if (variance(*best) <= 1.0) break;
+      if (VarianceOf(*best) <= 1.0) break;
     }
     votes.push_back(vote);
   }
   if (!best && MostAgreed(keys, rest, part, candidates, &best_vote)) {
     best = LateTieOf(rest, part, best_vote);
   }
-  if (!best ||
-      best->since_key.covariance.diagonal().head<2>().maxCoeff() >
+  return best && Take(rest, part, best_vote, *best);
+}
+
+bool PartJoining::Take(const std::vector<std::size_t>& rest,
+                       const std::vector<std::size_t>& part,
+                       const LateVote& vote, LateTie tie) {
+  if (tie.since_key.covariance.diagonal().head<2>().maxCoeff() >
           Square(kRoughSigma) ||
-      best->since_key.covariance(2, 2) > Square(kRoughAngle)) {
+      tie.since_key.covariance(2, 2) > Square(kRoughAngle)) {
     return false;
   }
-  const bool is_rough = variance(*best) > 1.0;
-  best->loose = LooseOf(rest, part);
-  const auto held = cut_.doubts.find(best->loose);
+  const bool is_rough = VarianceOf(tie) > 1.0;
+  tie.loose = LooseOf(rest, part);
+  const auto held = cut_.doubts.find(tie.loose);
   const bool is_held = held != cut_.doubts.end();
   // The match that it hangs on is more than where to look.
   if (is_rough && is_held) return false;
-  if (EvidenceOf(best_vote, rest, part).Doubt() >
+  if (EvidenceOf(vote, rest, part).Doubt() >
       (is_held ? kLessDoubt * held->second : kMostDoubt)) {
     search_->Trace("NOT JOINED: contradicted");
     return false;
   }
-  Move(part, ShiftOf(best_vote, part));
-  AddLateTie(rest, part, *best, is_rough);
+  Move(part, ShiftOf(vote, part));
+  AddLateTie(rest, part, tie, is_rough);
   return true;
 }
 

@@ -51,6 +51,28 @@ Rounds TwoRounds() {
   return rounds;
 }
 
+TEST(JudgeScanTest, BySharesOfEnoughReturns) {
+  const MapCheckOptions options;
+  ScanAgreement seen;
+  seen.hits = 14;
+  seen.seen = 14;
+  EXPECT_EQ(JudgeScan(seen, options), ScanVerdict::kUnknown);
+  seen.hits = 70;
+  seen.intruders = 30;
+  EXPECT_EQ(JudgeScan(seen, options), ScanVerdict::kAgrees);
+  seen.hits = 69;
+  seen.intruders = 31;
+  EXPECT_EQ(JudgeScan(seen, options), ScanVerdict::kContradicts);
+  // What the scan looks through, by itself.
+  seen.hits = 14;
+  seen.intruders = 0;
+  seen.seen = 100;
+  seen.seen_through = 40;
+  EXPECT_EQ(JudgeScan(seen, options), ScanVerdict::kAgrees);
+  seen.seen_through = 41;
+  EXPECT_EQ(JudgeScan(seen, options), ScanVerdict::kContradicts);
+}
+
 TEST(FindContradictionsTest, NoneInATrueMap) {
   const Rounds rounds = TwoRounds();
   EXPECT_TRUE(

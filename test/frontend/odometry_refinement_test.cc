@@ -1205,6 +1205,16 @@ TEST(OdometryRefinerTest, CarriedAlongACorridorOfEqualDoors) {
   EXPECT_FALSE(refiner.loose()[0].found);
 }
 
+// Sees all around, 5 m far.
+Laser NearLaser() {
+  Laser laser = FullCircle();
+  laser.beams = 240;
+  laser.angle_step = DegToRad(1.5);
+  laser.maximum_range = 5.0;
+  laser.sigma = 0.01;
+  return laser;
+}
+
 // Drives through `here` until it is carried, for 40 s and unknown to odometry,
 // before scan `carried`, and then through `there`, where `truth` says.
 void DriveAndBeCarried(const std::vector<WallEnds>& here,
@@ -1269,11 +1279,7 @@ TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {
        testing::Moved(Pillars(-20.0), {-10.0, 0.0, 0.0})) {
     walls.push_back(side);
   }
-  Laser laser = FullCircle();
-  laser.beams = 240;
-  laser.angle_step = DegToRad(1.5);
-  laser.maximum_range = 5.0;
-  laser.sigma = 0.01;
+  const Laser laser = NearLaser();
   Noise noise(4);
   OdometryRefinementOptions options = RefinerOptions();
   options.tracking.max_open_keys = 30;
@@ -1367,11 +1373,7 @@ TEST(OdometryRefinerTest, CarriedToAPlaceThatLooksAlikeAndFoundInTheEnd) {
     walls.push_back({side.a + Eigen::Vector2d(42.0, 0.0),
                      side.b + Eigen::Vector2d(42.0, 0.0)});
   }
-  Laser laser = FullCircle();
-  laser.beams = 240;
-  laser.angle_step = DegToRad(1.5);
-  laser.maximum_range = 5.0;
-  laser.sigma = 0.01;
+  const Laser laser = NearLaser();
   Noise noise(4);
   OdometryRefiner refiner(RefinerOptions());
   constexpr int kCarried = 165;
@@ -1419,11 +1421,7 @@ TEST(OdometryRefinerTest, OneWindowThatFitsDoesNotPlaceALongPart) {
       is_near = !is_near;
     }
   }
-  Laser laser = FullCircle();
-  laser.beams = 240;
-  laser.angle_step = DegToRad(1.5);
-  laser.maximum_range = 5.0;
-  laser.sigma = 0.01;
+  const Laser laser = NearLaser();
   Noise noise(4);
   OdometryRefinementOptions options = RefinerOptions();
   options.tracking.max_open_keys = 30;

@@ -528,6 +528,9 @@ LogSolverOptions LogSolverOptionsFromFlags(const Registry& registry) {
   options.detector_parameters = DetectorParametersFromFlags(registry);
   options.session.delta_mode = FLAGS_delta_mode;
   options.session.minimizer = FLAGS_minimizer;
+  if (FLAGS_minimizer == "resident") {
+    options.session.num_threads = NumThreadsFromFlags();
+  }
   options.em = EmOptionsFromFlags(options.features);
   if (!FLAGS_structure_prior.empty()) {
     std::istringstream text(

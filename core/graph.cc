@@ -381,6 +381,10 @@ void Graph::UpdateConstraint(ConstraintId id, const Eigen::VectorXd& expected,
         "a live measurement");
   }
   CheckNumbers(*constraint.type, expected, information);
+  if (constraint.expected == expected &&
+      constraint.information == information) {
+    return;
+  }
   constraint.expected = expected;
   constraint.information = information;
   for (GraphListener* listener : listeners_) {

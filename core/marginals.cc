@@ -4,6 +4,7 @@
 #include <plumbline/core/information.h>
 #include <plumbline/core/information_factor.h>
 #include <plumbline/core/marginals.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/factors/pose2.h>
 
 #include <Eigen/SparseCore>
@@ -17,6 +18,9 @@
 
 namespace plumbline {
 namespace {
+
+// Constraints that one thread linearizes at a time.
+constexpr std::size_t kConstraintsAtOnce = 256;
 
 std::string Describe(const Feature& feature) {
   return feature.type->name + " " + std::to_string(feature.id);
@@ -195,37 +199,53 @@ struct Marginals::Impl {
       columns += entry.tangent_size;
     }
     if (columns == 0) return;
-    std::vector<Eigen::Triplet<double>> triplets;
-    for (const Constraint* constraint : constraints) {
-      const LinearizedConstraint linearized = linearize(*constraint);
-      std::vector<Eigen::MatrixXd> jacobians;
-      for (std::size_t i = 0; i < constraint->features.size(); ++i) {
-        jacobians.push_back(
-            linearized.jacobians[i] *
-            entries[static_cast<std::size_t>(constraint->features[i])]->lift);
+    using Triplets = std::vector<Eigen::Triplet<double>>;
+    std::vector<Triplets> parts((constraints.size() + kConstraintsAtOnce - 1) /
+                                kConstraintsAtOnce);
+    ParallelFor(parts.size(), ThreadsHere(), [&](std::size_t part) {
+      const std::size_t begin = part * kConstraintsAtOnce;
+      const std::size_t end =
+          std::min(constraints.size(), begin + kConstraintsAtOnce);
+      for (std::size_t k = begin; k < end; ++k) {
+        AddNormal(*constraints[k], linearize(*constraints[k]), &parts[part]);
       }
-      for (std::size_t i = 0; i < jacobians.size(); ++i) {
-        const Entry& a = *Find(constraint->features[i]);
-        if (a.column < 0) continue;
-        for (std::size_t j = 0; j < jacobians.size(); ++j) {
-          const Entry& b = *Find(constraint->features[j]);
-          if (b.column < 0 || b.column > a.column) continue;
-          const Eigen::MatrixXd block = jacobians[i].transpose() * jacobians[j];
-          for (Eigen::Index r = 0; r < block.rows(); ++r) {
-            for (Eigen::Index c = 0; c < block.cols(); ++c) {
-              const int row = a.column + static_cast<int>(r);
-              const int column = b.column + static_cast<int>(c);
-              if (row >= column) {
-                triplets.emplace_back(row, column, block(r, c));
-              }
+    });
+    Triplets triplets;
+    for (const Triplets& part : parts) {
+      triplets.insert(triplets.end(), part.begin(), part.end());
+    }
+    Eigen::SparseMatrix<double> normal(columns, columns);
+    normal.setFromTriplets(triplets.begin(), triplets.end());
+    factor.Factorize(std::move(normal), kUndeterminedVariance);
+  }
+
+  // The share of a constraint in the lower triangle of the normal matrix.
+  void AddNormal(const Constraint& constraint,
+                 const LinearizedConstraint& linearized,
+                 std::vector<Eigen::Triplet<double>>* triplets) const {
+    std::vector<Eigen::MatrixXd> jacobians;
+    for (std::size_t i = 0; i < constraint.features.size(); ++i) {
+      jacobians.push_back(linearized.jacobians[i] *
+                          Find(constraint.features[i])->lift);
+    }
+    for (std::size_t i = 0; i < jacobians.size(); ++i) {
+      const Entry& a = *Find(constraint.features[i]);
+      if (a.column < 0) continue;
+      for (std::size_t j = 0; j < jacobians.size(); ++j) {
+        const Entry& b = *Find(constraint.features[j]);
+        if (b.column < 0 || b.column > a.column) continue;
+        const Eigen::MatrixXd block = jacobians[i].transpose() * jacobians[j];
+        for (Eigen::Index r = 0; r < block.rows(); ++r) {
+          for (Eigen::Index c = 0; c < block.cols(); ++c) {
+            const int row = a.column + static_cast<int>(r);
+            const int column = b.column + static_cast<int>(c);
+            if (row >= column) {
+              triplets->emplace_back(row, column, block(r, c));
             }
           }
         }
       }
     }
-    Eigen::SparseMatrix<double> normal(columns, columns);
-    normal.setFromTriplets(triplets.begin(), triplets.end());
-    factor.Factorize(std::move(normal), kUndeterminedVariance);
   }
 
   const Entry* Find(FeatureId id) const {

@@ -1,7 +1,6 @@
-#include <ceres/cost_function.h>
 #include <ceres/iteration_callback.h>
-#include <ceres/loss_function.h>
 #include <ceres/manifold.h>
+#include <plumbline/core/flat_evaluator.h>
 #include <plumbline/core/flat_problem.h>
 #include <plumbline/core/normal_matrix.h>
 #include <plumbline/core/resident_minimizer.h>
@@ -19,47 +18,13 @@
 namespace plumbline {
 namespace {
 
-using VectorMap = Eigen::Map<Eigen::VectorXd>;
-using RowMajor =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 // Pivots of the scaled normal matrix, relative to the largest, below which they
 // may be those of an undetermined direction and rounding.
 constexpr double kLeastPivot = 1e-12;
 // What a step may raise the cost to that is hoped to be made up for.
 constexpr double kLargestRise = 2.0;
 
-using Argument = FlatProblem::Argument;
-using Term = FlatProblem::Term;
 using Variable = FlatProblem::Variable;
-
-// The weight of residuals and the correction of Jacobians that make a robust
-// loss a least squares problem (Triggs et al. 1999), as Ceres has it.
-struct Correction {
-  double residual = 1.0;
-  double jacobian = 1.0;
-  double alpha = 0.0;
-
-  Correction(double squared, const double rho[3]) {
-    jacobian = std::sqrt(rho[1]);
-    residual = jacobian;
-    if (squared == 0.0 || rho[2] <= 0.0) return;
-    const double d = 1.0 + 2.0 * squared * rho[2] / rho[1];
-    const double root = 1.0 - std::sqrt(std::max(d, 0.0));
-    residual = jacobian / (1.0 - root);
-    alpha = root / squared;
-  }
-};
-
-bool IsIdentity(const double* matrix, int rows, int columns) {
-  if (rows != columns) return false;
-  for (int i = 0; i < rows; ++i) {
-    for (int j = 0; j < columns; ++j) {
-      if (matrix[i * columns + j] != (i == j ? 1.0 : 0.0)) return false;
-    }
-  }
-  return true;
-}
 
 // Whether a step is good enough, also with respect to the last states when some
 // may be worse (Conn, Gould, Toint, Trust Region Methods, algorithm 10.1.2).
@@ -120,15 +85,15 @@ class StepJudge {
 struct ResidentMinimizer::Impl {
   class Minimization;
 
-  explicit Impl(ceres::Problem* problem) : flat(problem) {}
+  explicit Impl(ceres::Problem* problem) : flat(problem), evaluator(&flat) {}
 
   // Reads the problem as it is now; empty when it can be solved, or why not.
   // What is as it was at the last solve is taken over.
   std::string Read() {
     std::string fault = flat.Read(matrix.is_analysed() && !is_forgotten);
-    const bool is_kept =
+    has_places =
         fault.empty() && flat.has_same_variables() && matrix.FindPlaces(flat);
-    if (fault.empty() && flat.has_same_variables() && !is_kept) {
+    if (fault.empty() && flat.has_same_variables() && !has_places) {
       // What is analysed anew does not depend on what was before.
       fault = flat.ReadAnew();
     }
@@ -136,151 +101,25 @@ struct ResidentMinimizer::Impl {
       is_forgotten = true;
       return fault;
     }
-    MakeRoom();
-    if (is_kept) return {};
-    is_forgotten = false;
-    is_undetermined = false;
-    if (flat.variables().empty()) return {};
-    return matrix.Analyse(flat) ? std::string()
-                                : "The normal matrix is too large.";
-  }
-
-  void MakeRoom() {
     state.resize(flat.state_size());
-    plus_jacobians.resize(flat.plus_size());
-    residual.resize(flat.largest().rows);
-    jacobians.resize(flat.largest().jacobians);
-    tangent_jacobians.resize(flat.largest().jacobians);
-    jacobian_pointers.resize(flat.largest().arguments);
-    argument_pointers.resize(flat.largest().arguments);
+    evaluator.MakeRoom();
+    // Until it is analysed the matrix is that of another problem.
+    is_forgotten = !has_places;
+    return {};
   }
 
-  bool EvaluateTerm(const Term& term, const double* x, double** jacobian) {
-    for (int i = term.begin; i < term.end; ++i) {
-      const Argument& argument = flat.arguments()[i];
-      argument_pointers[i - term.begin] =
-          argument.variable < 0 ? flat.blocks()[argument.block].user
-                                : x + flat.variables()[argument.variable].state;
-    }
-    return term.cost->Evaluate(argument_pointers.data(), residual.data(),
-                               jacobian) &&
-           VectorMap(residual.data(), term.rows).allFinite();
-  }
-
-  static double TermCost(const Term& term, double squared, double rho[3]) {
-    if (term.loss == nullptr) return 0.5 * squared;
-    term.loss->Evaluate(squared, rho);
-    return 0.5 * rho[0];
-  }
-
-  // Of the terms that vary, or of those that do not.
-  bool Cost(bool is_fixed, const Eigen::VectorXd& x, double* cost) {
-    *cost = 0.0;
-    if (is_fixed &&
-        flat.num_reduced_terms() == static_cast<int>(flat.terms().size())) {
-      return true;
-    }
-    for (const Term& term : flat.terms()) {
-      if ((term.num_variables == 0) != is_fixed) continue;
-      if (!EvaluateTerm(term, x.data(), nullptr)) return false;
-      double rho[3];
-      *cost += TermCost(
-          term, VectorMap(residual.data(), term.rows).squaredNorm(), rho);
-    }
-    return std::isfinite(*cost);
-  }
-
-  // Normal matrix and gradient at the state, unscaled.
+  // Normal matrix and gradient at the state, unscaled. The first time after the
+  // problem was read, the matrix is analysed where it has to be.
   bool Linearize(double* cost) {
-    for (const Variable& variable : flat.variables()) {
-      if (variable.manifold == nullptr) continue;
-      if (!variable.manifold->PlusJacobian(
-              state.data() + variable.state,
-              plus_jacobians.data() + variable.plus_jacobian)) {
-        return false;
-      }
-    }
-    is_identity.resize(flat.variables().size());
-    for (std::size_t v = 0; v < flat.variables().size(); ++v) {
-      const Variable& variable = flat.variables()[v];
-      is_identity[v] =
-          variable.manifold == nullptr ||
-          IsIdentity(plus_jacobians.data() + variable.plus_jacobian,
-                     variable.size, variable.tangent_size);
-    }
-    matrix.SetZero();
-    gradient.setZero(flat.num_columns());
-    *cost = 0.0;
-    for (const Term& term : flat.terms()) {
-      if (term.num_variables > 0 && !LinearizeTerm(term, cost)) return false;
-    }
-    return std::isfinite(*cost) && gradient.allFinite();
-  }
-
-  bool LinearizeTerm(const Term& term, double* cost) {
-    const int count = term.end - term.begin;
-    for (int k = 0; k < count; ++k) {
-      const Argument& argument = flat.arguments()[term.begin + k];
-      jacobian_pointers[k] = argument.variable < 0
-                                 ? nullptr
-                                 : jacobians.data() + argument.jacobian;
-    }
-    if (!EvaluateTerm(term, state.data(), jacobian_pointers.data())) {
-      return false;
-    }
-    VectorMap r(residual.data(), term.rows);
-    const double squared = r.squaredNorm();
-    double rho[3];
-    *cost += TermCost(term, squared, rho);
-    // Jacobians with respect to tangents.
-    for (int k = 0; k < count; ++k) {
-      const Argument& argument = flat.arguments()[term.begin + k];
-      if (argument.variable < 0 || is_identity[argument.variable] != 0) {
-        continue;
-      }
-      const Variable& variable = flat.variables()[argument.variable];
-      Eigen::Map<RowMajor>(tangent_jacobians.data() + argument.jacobian,
-                           term.rows, variable.tangent_size)
-          .noalias() = Eigen::Map<const RowMajor>(jacobian_pointers[k],
-                                                  term.rows, variable.size) *
-                       Eigen::Map<const RowMajor>(
-                           plus_jacobians.data() + variable.plus_jacobian,
-                           variable.size, variable.tangent_size);
-      jacobian_pointers[k] = tangent_jacobians.data() + argument.jacobian;
-    }
-    if (term.loss != nullptr) {
-      const Correction correction(squared, rho);
-      for (int k = 0; k < count; ++k) {
-        const Argument& argument = flat.arguments()[term.begin + k];
-        if (argument.variable < 0) continue;
-        Eigen::Map<RowMajor> jacobian(
-            jacobian_pointers[k], term.rows,
-            flat.variables()[argument.variable].tangent_size);
-        if (correction.alpha != 0.0) {
-          jacobian -= correction.alpha * r * (r.transpose() * jacobian).eval();
-        }
-        jacobian *= correction.jacobian;
-      }
-      r *= correction.residual;
-    }
-    AddToGradient(term);
-    matrix.Add(flat, term, jacobian_pointers.data());
-    return true;
-  }
-
-  void AddToGradient(const Term& term) {
-    for (int i = term.begin; i < term.end; ++i) {
-      const int variable = flat.arguments()[i].variable;
-      if (variable < 0) continue;
-      const double* const jacobian = jacobian_pointers[i - term.begin];
-      const int size = flat.variables()[variable].tangent_size;
-      double* const g = gradient.data() + matrix.ColumnOf(variable);
-      for (int r = 0; r < term.rows; ++r) {
-        for (int c = 0; c < size; ++c) {
-          g[c] += jacobian[r * size + c] * residual[r];
-        }
-      }
-    }
+    is_too_large = false;
+    const auto analyse = [this] {
+      if (has_places) return true;
+      is_undetermined = false;
+      has_places = matrix.Analyse(flat);
+      is_too_large = is_forgotten = !has_places;
+      return has_places;
+    };
+    return evaluator.Linearize(state, analyse, &matrix, &gradient, cost);
   }
 
   bool Plus(const Eigen::VectorXd& x, const Eigen::VectorXd& delta,
@@ -321,22 +160,19 @@ struct ResidentMinimizer::Impl {
   }
 
   FlatProblem flat;
+  FlatEvaluator evaluator;
   NormalMatrix matrix;
   bool is_forgotten = false;
+  // Whether the matrix has a place for each product of the problem as it was
+  // read last; whether it is too large for that.
+  bool has_places = false;
+  bool is_too_large = false;
   // Whether damping alone holds something; known until the next analysis.
   bool is_undetermined = false;
 
   Eigen::VectorXd state;
   Eigen::VectorXd moved;
   Eigen::VectorXd gradient;
-  std::vector<double> plus_jacobians;
-  std::vector<char> is_identity;
-  // Of one term.
-  std::vector<double> residual;
-  std::vector<double> jacobians;
-  std::vector<double> tangent_jacobians;
-  std::vector<double*> jacobian_pointers;
-  std::vector<const double*> argument_pointers;
 };
 
 // One solve: the loop of Ceres' trust region minimizer, by the same names.
@@ -372,11 +208,12 @@ class ResidentMinimizer::Impl::Minimization {
     summary_.residual_evaluation_time_in_seconds = 0.0;
     summary_.jacobian_evaluation_time_in_seconds = 0.0;
     std::string fault;
+    m_.evaluator.SetNumThreads(options_.num_threads);
     if (options_.IsValid(&fault)) fault = m_.Read();
     if (!fault.empty()) return End(ceres::FAILURE, fault);
     m_.TakeState();
     summary_.fixed_cost = 0.0;
-    if (!m_.Cost(/*is_fixed=*/true, m_.state, &summary_.fixed_cost)) {
+    if (!m_.evaluator.Cost(/*is_fixed=*/true, m_.state, &summary_.fixed_cost)) {
       return End(ceres::FAILURE, "Evaluation of the fixed residuals failed.");
     }
     summary_.num_parameter_blocks_reduced =
@@ -389,9 +226,10 @@ class ResidentMinimizer::Impl::Minimization {
       return End(ceres::CONVERGENCE, "No parameter block varies.");
     }
     if (!Linearize()) {
-      return End(
-          ceres::FAILURE,
-          "Residual and Jacobian evaluation failed at the initial state.");
+      return End(ceres::FAILURE, m_.is_too_large
+                                     ? "The normal matrix is too large."
+                                     : "Residual and Jacobian evaluation "
+                                       "failed at the initial state.");
     }
     summary_.initial_cost = cost_ + summary_.fixed_cost;
 
@@ -538,7 +376,8 @@ class ResidentMinimizer::Impl::Minimization {
     {
       const ScopedTimer timer(&summary_.residual_evaluation_time_in_seconds);
       if (!m_.Plus(m_.state, delta, &candidate_) || !candidate_.allFinite() ||
-          !m_.Cost(/*is_fixed=*/false, candidate_, &candidate_cost_)) {
+          !m_.evaluator.Cost(/*is_fixed=*/false, candidate_,
+                             &candidate_cost_)) {
         candidate_cost_ = std::numeric_limits<double>::max();
       }
       ++summary_.num_residual_evaluations;

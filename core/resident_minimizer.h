@@ -49,12 +49,14 @@ class ResidentMinimizer {
   /// max_consecutive_nonmonotonic_steps (as Ceres has them; besides, once in a
   /// solve as many steps may be taken without regard to what they cost, up to
   /// twice the lowest cost, to see whether they come to a lower one; ended at
-  /// the best state), callbacks and update_state_every_iteration. It works on
-  /// one thread and writes no log. Bounds of parameters and evaluation
-  /// callbacks are not supported: the solve fails and says so (bounds that are
-  /// set between two solves, when variables stay the same, are not noticed).
-  /// Of `summary` it fills in what says how the solve ended: termination_type,
-  /// message, costs, iterations, counts of steps and linear solves, and times.
+  /// the best state), callbacks and update_state_every_iteration. On
+  /// num_threads threads residuals of large problems are evaluated, with the
+  /// same result for any number of them; it writes no log. Bounds of parameters
+  /// and evaluation callbacks are not supported: the solve fails and says so
+  /// (bounds that are set between two solves, when variables stay the same, are
+  /// not noticed). Of `summary` it fills in what says how the solve ended:
+  /// termination_type, message, costs, iterations, counts of steps and linear
+  /// solves, and times.
   void Solve(const ceres::Solver::Options& options,
              ceres::Solver::Summary* summary,
              Damping damping = Damping::kAsGiven);

@@ -3,6 +3,7 @@
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/information.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/core/resident_minimizer.h>
 #include <plumbline/core/session.h>
 #include <plumbline/core/stopwatch.h>
@@ -32,6 +33,8 @@ constexpr double kDenseWork = 3e5;
 // Steps in a row that may lead uphill on the way to a lower cost.
 constexpr int kUphillSteps = 3;
 constexpr int kUnknownRank = -1;
+// Constraints whose cost one thread computes at a time.
+constexpr std::size_t kCostsAtOnce = 1024;
 
 // Some builds of CHOLMOD start a hard-coded number of OpenMP threads whatever
 // the machine, which makes factorizations slower. While this lives, OpenMP
@@ -148,6 +151,29 @@ class StopWhenAsked final : public ceres::IterationCallback {
   bool has_stopped_ = false;
 };
 
+// A cost that another one of the same relation can take the place of, without
+// the problem's taking its residual block out and a new one in.
+class ReplaceableCost final : public ceres::CostFunction {
+ public:
+  explicit ReplaceableCost(std::unique_ptr<ceres::CostFunction> cost) {
+    set_num_residuals(cost->num_residuals());
+    *mutable_parameter_block_sizes() = cost->parameter_block_sizes();
+    cost_ = std::move(cost);
+  }
+
+  void Replace(std::unique_ptr<ceres::CostFunction> cost) {
+    cost_ = std::move(cost);
+  }
+
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override {
+    return cost_->Evaluate(parameters, residuals, jacobians);
+  }
+
+ private:
+  std::unique_ptr<ceres::CostFunction> cost_;
+};
+
 struct Block {
   Feature* feature = nullptr;
   TypeInfo* type = nullptr;
@@ -159,6 +185,8 @@ struct Block {
 
 struct Residual {
   std::unique_ptr<ceres::CostFunction> cost;
+  // The cost itself once it has changed: what changes does so again and again.
+  ReplaceableCost* replaceable = nullptr;
   std::unique_ptr<ceres::LossFunction> loss;
   // Null while the constraint is not live.
   ceres::ResidualBlockId id = nullptr;
@@ -337,7 +365,8 @@ struct SolverSession::Impl {
       solver.max_trust_region_radius =
           std::max(solver.max_trust_region_radius, trust_region_radius);
       solver.max_num_consecutive_invalid_steps = kMaxInvalidSteps;
-      solver.num_threads = num_threads;
+      // Ceres adds up in any order; the same bytes come with one thread.
+      solver.num_threads = resident != nullptr ? 1 : num_threads;
       solver.logging_type = ceres::SILENT;
       if (static_cast<double>(rows) * columns * columns <= kDenseWork) {
         solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
@@ -359,6 +388,7 @@ struct SolverSession::Impl {
           solver.linear_solver_type != ceres::SPARSE_NORMAL_CHOLESKY) {
         ceres::Solve(solver, solved, &summary);
       } else if (solved == &problem) {
+        solver.num_threads = num_threads;
         solver.use_nonmonotonic_steps = true;
         solver.max_consecutive_nonmonotonic_steps = kUphillSteps;
         resident->Solve(solver, &summary,
@@ -495,21 +525,23 @@ struct SolverSession::Impl {
     return Weighted(std::move(linearized), std::sqrt(rho[1]));
   }
 
-  void AddCost(const Constraint& constraint, CostReport* report) const {
-    if (constraint.state != ConstraintState::kLive) return;
+  CostReport CostOf(const Constraint& constraint) const {
+    CostReport report;
+    if (constraint.state != ConstraintState::kLive) return report;
     const double squared = SquaredResidual(constraint);
     if (constraint.kind == ConstraintClass::kMeasurement) {
-      report->measurement += squared;
-      return;
+      report.measurement = squared;
+      return report;
     }
     const ceres::LossFunction* loss = residuals[constraint.id]->loss.get();
     if (loss == nullptr) {
-      report->structure += squared;
-      return;
+      report.structure = squared;
+      return report;
     }
     double rho[3];
     loss->Evaluate(squared, rho);
-    report->structure += rho[0];
+    report.structure = rho[0];
+    return report;
   }
 
   Graph* graph;
@@ -663,15 +695,26 @@ double SolverSession::UpdateDeltas(const std::vector<FeatureId>* features) {
 
 CostReport SolverSession::Cost(const std::vector<FeatureId>* features) const {
   CostReport report;
+  const auto add = [&report](const CostReport& share) {
+    report.measurement += share.measurement;
+    report.structure += share.structure;
+  };
   if (features == nullptr) {
-    for (const Constraint* constraint :
-         std::as_const(*impl_->graph).Constraints()) {
-      impl_->AddCost(*constraint, &report);
-    }
+    const auto constraints = std::as_const(*impl_->graph).Constraints();
+    std::vector<CostReport> shares(constraints.size());
+    ParallelFor((constraints.size() + kCostsAtOnce - 1) / kCostsAtOnce,
+                impl_->options.num_threads, [&](std::size_t part) {
+                  const std::size_t end =
+                      std::min(constraints.size(), (part + 1) * kCostsAtOnce);
+                  for (std::size_t k = part * kCostsAtOnce; k < end; ++k) {
+                    shares[k] = impl_->CostOf(*constraints[k]);
+                  }
+                });
+    for (const CostReport& share : shares) add(share);
     return report;
   }
   for (const ConstraintId id : impl_->LiveConstraintsOn(*features)) {
-    impl_->AddCost(*impl_->graph->FindConstraint(id), &report);
+    add(impl_->CostOf(*impl_->graph->FindConstraint(id)));
   }
   return report;
 }
@@ -699,10 +742,16 @@ void SolverSession::OnConstraintAdded(const Constraint& constraint) {
 void SolverSession::OnConstraintChanged(const Constraint& constraint) {
   Residual& residual = impl_->ResidualOf(constraint.id);
   std::unique_ptr<ceres::CostFunction> cost = impl_->MakeCost(constraint);
+  residual.degrees_of_freedom = kUnknownRank;
+  if (residual.replaceable != nullptr) {
+    residual.replaceable->Replace(std::move(cost));
+    return;
+  }
+  auto replaceable = std::make_unique<ReplaceableCost>(std::move(cost));
   const bool is_live = residual.id != nullptr;
   if (is_live) impl_->RemoveResidual(constraint);
-  residual.cost = std::move(cost);
-  residual.degrees_of_freedom = kUnknownRank;
+  residual.replaceable = replaceable.get();
+  residual.cost = std::move(replaceable);
   if (is_live) impl_->AddResidual(constraint);
 }
 

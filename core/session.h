@@ -27,9 +27,9 @@ struct SessionOptions {
   /// parameter, and never gets smaller: large for near Gauss-Newton steps from
   /// warm starts, small enough that undetermined directions stay put.
   double initial_trust_region_radius = 1e10;
-  /// Threads of residual evaluation in global solves. With more than one, Ceres
-  /// adds up costs in any order: results agree to rounding only, the same bytes
-  /// come with one thread. Residuals are not where the time goes.
+  /// Threads of residual evaluation in large global solves. Results of the
+  /// resident minimizer do not depend on them. With more than one, Ceres adds
+  /// up costs in any order: results agree to rounding only.
   int num_threads = 1;
   /// Taking constraints out costs next to nothing, whatever the size of the
   /// graph. False: making the session and global solves are cheaper, and every

@@ -1,5 +1,6 @@
 #include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/information.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/detectors/heading_drift.h>
 #include <plumbline/detectors/map_directions.h>
@@ -20,6 +21,9 @@ constexpr int kDirection = 2;
 // Eigenvalues of the information of the position below this share of the
 // largest one are rounding.
 constexpr double kRounding = 1e-9;
+
+// Constraints that one thread looks at, at a time.
+constexpr std::size_t kAtOnce = 256;
 
 // Groups of links: relative poses, and what a pose sees of a wall.
 constexpr int kRelative = 0;
@@ -160,7 +164,7 @@ MapDirections CollectDirections(const Graph& graph,
           feature->id, result.network.AddNode(feature->parameters[kDirection]));
     }
   }
-  std::vector<DirectionLink> links;
+  std::vector<const Constraint*> measurements;
   for (const auto& [id, node] : result.nodes) {
     for (const ConstraintId constraint_id : graph.ConstraintsOf(id)) {
       const Constraint& constraint = graph.GetConstraint(constraint_id);
@@ -171,15 +175,30 @@ MapDirections CollectDirections(const Graph& graph,
       }
       const auto second = result.nodes.find(constraint.features[1]);
       if (second == result.nodes.end() || second->second == node) continue;
-      const Difference difference = DirectionOf(graph, constraint);
-      if (difference.information <= 0.0) continue;
-      const double variance = 1.0 / difference.information;
-      if (!(variance < DirectionNetwork::kUnknownVariance)) continue;
-      const bool is_sighting = !constraint.type->Is(RelationRole::kPose);
-      result.constraints.push_back(constraint_id);
-      result.has_sightings = result.has_sightings || is_sighting;
-      links.push_back({id, second->first, difference, is_sighting});
+      measurements.push_back(&constraint);
     }
+  }
+  std::vector<Difference> differences(measurements.size());
+  ParallelFor((measurements.size() + kAtOnce - 1) / kAtOnce, ThreadsHere(),
+              [&](std::size_t part) {
+                const std::size_t end =
+                    std::min(measurements.size(), (part + 1) * kAtOnce);
+                for (std::size_t k = part * kAtOnce; k < end; ++k) {
+                  differences[k] = DirectionOf(graph, *measurements[k]);
+                }
+              });
+  std::vector<DirectionLink> links;
+  for (std::size_t k = 0; k < measurements.size(); ++k) {
+    const Constraint& constraint = *measurements[k];
+    const Difference& difference = differences[k];
+    if (difference.information <= 0.0) continue;
+    const double variance = 1.0 / difference.information;
+    if (!(variance < DirectionNetwork::kUnknownVariance)) continue;
+    const bool is_sighting = !constraint.type->Is(RelationRole::kPose);
+    result.constraints.push_back(constraint.id);
+    result.has_sightings = result.has_sightings || is_sighting;
+    links.push_back({constraint.features[0], constraint.features[1], difference,
+                     is_sighting});
   }
   CorrectDrift(graph, &links);
   for (const DirectionLink& link : links) {

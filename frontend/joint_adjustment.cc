@@ -9,10 +9,12 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 
 namespace plumbline {
@@ -366,46 +368,97 @@ void JointAdjustment::MatchAnew() {
 }
 
 void JointAdjustment::Match() {
-  Transaction transaction;
-  for (const ConstraintId id : relation_constraints_) {
-    transaction.RemoveConstraint(id);
-  }
   relations_ = finder_->Find(PlacePoses(), stop_);
   const RelationType& pose_pose = registry_.GetRelation("pose_pose");
+  std::vector<Constraint> wanted;
+  wanted.reserve(relations_.size());
   for (const ScanRelation& relation : relations_) {
-    transaction.AddConstraint(
+    wanted.push_back(
         MakeMeasurement(pose_pose, {poses_[relation.from], poses_[relation.to]},
-                        relation.mean, relation.information, kSource));
+                        relation.mean, WeighedInformation(relation), kSource));
   }
-  relation_constraints_ = graph_->Apply(std::move(transaction)).constraints;
+  relation_constraints_ = Replace(relation_constraints_, std::move(wanted));
 }
 
 void JointAdjustment::Vote() {
-  Transaction transaction;
-  for (const ConstraintId id : votes_) transaction.RemoveConstraint(id);
   const RelationType& relation = registry_.GetRelation(kVoteRelation);
   const std::vector<std::vector<WallVote>> votes =
       CollectWallVotes(*graph_, places_, PlacePoses(), options_.votes);
+  std::vector<Constraint> wanted;
   for (std::size_t k = 0; k < votes.size(); ++k) {
     for (const WallVote& vote : votes[k]) {
-      transaction.AddConstraint(MakeMeasurement(
+      wanted.push_back(MakeMeasurement(
           relation, {poses_[k], vote.wall}, Eigen::Vector3d::Zero(),
           vote.information / vote_factor_, kSource));
     }
   }
-  votes_ = graph_->Apply(std::move(transaction)).constraints;
+  votes_ = Replace(votes_, std::move(wanted));
+}
+
+std::vector<ConstraintId> JointAdjustment::Replace(
+    const std::vector<ConstraintId>& old,
+    std::vector<Constraint> wanted) const {
+  struct Old {
+    std::array<FeatureId, 2> features;
+    ConstraintId id;
+    bool operator<(const Old& other) const {
+      return std::tie(features, id) < std::tie(other.features, other.id);
+    }
+  };
+  const auto features_of = [](const Constraint& constraint) {
+    return std::array<FeatureId, 2>{constraint.features[0],
+                                    constraint.features[1]};
+  };
+  std::vector<Old> sorted;
+  for (const ConstraintId id : old) {
+    sorted.push_back(
+        {features_of(std::as_const(*graph_).GetConstraint(id)), id});
+  }
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<bool> is_kept(sorted.size(), false);
+  std::vector<ConstraintId> ids;
+  std::vector<std::size_t> added;
+  Transaction transaction;
+  for (Constraint& constraint : wanted) {
+    const std::array<FeatureId, 2> features = features_of(constraint);
+    auto found = std::lower_bound(sorted.begin(), sorted.end(),
+                                  Old{features, ConstraintId()});
+    const auto place = static_cast<std::size_t>(found - sorted.begin());
+    if (found != sorted.end() && found->features == features &&
+        !is_kept[place]) {
+      is_kept[place] = true;
+      graph_->UpdateConstraint(found->id, constraint.expected,
+                               constraint.information);
+      ids.push_back(found->id);
+      continue;
+    }
+    added.push_back(ids.size());
+    ids.push_back(kNoId);
+    transaction.AddConstraint(std::move(constraint));
+  }
+  for (std::size_t k = 0; k < sorted.size(); ++k) {
+    if (!is_kept[k]) transaction.RemoveConstraint(sorted[k].id);
+  }
+  const std::vector<ConstraintId> new_ids =
+      graph_->Apply(std::move(transaction)).constraints;
+  for (std::size_t i = 0; i < new_ids.size(); ++i) ids[added[i]] = new_ids[i];
+  return ids;
+}
+
+Eigen::Matrix3d JointAdjustment::WeighedInformation(
+    const ScanRelation& relation) const {
+  const Eigen::Matrix3d information = relation.information / relation_factor_;
+  const double squared =
+      ChiSquare(*graph_, poses_[relation.from], poses_[relation.to],
+                relation.mean, information);
+  return information /
+         (1.0 + squared / (options_.loss_scale * options_.loss_scale));
 }
 
 void JointAdjustment::Reweigh() {
-  const double scale = 1.0 / (options_.loss_scale * options_.loss_scale);
   for (std::size_t i = 0; i < relations_.size(); ++i) {
-    const ScanRelation& relation = relations_[i];
-    const Eigen::Matrix3d information = relation.information / relation_factor_;
-    const double squared =
-        ChiSquare(*graph_, poses_[relation.from], poses_[relation.to],
-                  relation.mean, information);
-    graph_->UpdateConstraint(relation_constraints_[i], relation.mean,
-                             information / (1.0 + scale * squared));
+    graph_->UpdateConstraint(relation_constraints_[i], relations_[i].mean,
+                             WeighedInformation(relations_[i]));
   }
 }
 

@@ -211,8 +211,16 @@ class JointAdjustment {
                                              Transaction* change) const;
   void Match();
   void Vote();
+  // Has `wanted` measurements in place of old ones, whose constraints stay
+  // where they are of the same features: most come again, a little changed.
+  // Returns the ids of all.
+  std::vector<ConstraintId> Replace(const std::vector<ConstraintId>& old,
+                                    std::vector<Constraint> wanted) const;
   // Drops walls whose returns have all gone to others.
   void DropWallsWithoutVotes();
+  // The information of a match, by the factor and the loss at the poses as they
+  // stand.
+  Eigen::Matrix3d WeighedInformation(const ScanRelation& relation) const;
   void Reweigh();
   // Solves to the tolerance of the session when `is_last`, else coarsely.
   void Solve(bool is_last);

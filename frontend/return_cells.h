@@ -100,6 +100,10 @@ class ReturnCells {
   /// Takes out everything.
   void Clear();
 
+  /// Sets memory aside for the cells of so many returns: a log has some twenty
+  /// or more in a cell.
+  void Reserve(std::size_t num_returns) { cells_.reserve(num_returns / 20); }
+
   /// Adds a return of a scan; `ray` points from the laser to it and has the
   /// length 1. Scans come in ascending order.
   void Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,

@@ -584,6 +584,9 @@ class Completion {
   void Gather(const std::vector<Scan>& scans, const std::vector<Pose2>& poses,
               std::size_t begin, std::size_t end, double reach) {
     returns_.Clear();
+    if (begin < end) {
+      returns_.Reserve((end - begin) * scans[begin].ranges.size());
+    }
     std::vector<ReturnsOfScan> found(kScansAtOnce);
     std::vector<ReturnsOfScan> before(kScansAtOnce);
     std::size_t first_before = begin;

@@ -601,6 +601,61 @@ TEST(ResidentMinimizerTest, AResidualThatIsNoNumberIsAFailure) {
   EXPECT_EQ(x, 1.0);
 }
 
+// So many terms that several threads evaluate them, in more than one go.
+constexpr int kManyPoses = 7000;
+
+TEST(ResidentMinimizerTest, TheSameBytesWithAnyNumberOfThreads) {
+  const auto loss = [] { return new ceres::CauchyLoss(0.3); };
+  std::vector<Pose> poses;
+  std::vector<double> costs;
+  for (const int num_threads : {1, 2, 3}) {
+    Ring a(kManyPoses, loss);
+    ceres::Solver::Options options = Tight();
+    options.max_num_iterations = 6;
+    options.num_threads = num_threads;
+    ResidentMinimizer minimizer(&a.problem);
+    std::vector<double> own_costs;
+    for (int solve = 0; solve < 2; ++solve) {
+      ceres::Solver::Summary summary;
+      minimizer.Solve(options, &summary);
+      ASSERT_TRUE(summary.IsSolutionUsable()) << summary.message;
+      own_costs.push_back(summary.initial_cost);
+      own_costs.push_back(summary.final_cost);
+      // What comes between two that had nothing in common is analysed anew.
+      a.Add({{0.1, 5.0, 0.5}}, 3, kManyPoses / 2);
+    }
+    EXPECT_EQ(minimizer.num_analyses(), 2);
+    EXPECT_LT(own_costs[1], 0.5 * own_costs[0]);
+    if (num_threads == 1) {
+      poses = a.poses;
+      costs = own_costs;
+    }
+    EXPECT_EQ(a.poses, poses) << num_threads;
+    EXPECT_EQ(own_costs, costs) << num_threads;
+  }
+}
+
+TEST(ResidentMinimizerTest, WhatCannotBeEvaluatedIsAFailureWithSeveralThreads) {
+  Ring a(kManyPoses);
+  double x = 1.0;
+  a.problem.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<NotFinite, 1, 1>(new NotFinite), nullptr,
+      &x);
+  const std::vector<Pose> before = a.poses;
+  ceres::Solver::Options options = Tight();
+  options.num_threads = 3;
+  ceres::Solver::Summary summary;
+  ResidentMinimizer minimizer(&a.problem);
+  minimizer.Solve(options, &summary);
+  EXPECT_EQ(summary.termination_type, ceres::FAILURE);
+  EXPECT_EQ(a.poses, before);
+  // Taken away, the rest is solved.
+  a.problem.RemoveParameterBlock(&x);
+  minimizer.Forget();
+  minimizer.Solve(options, &summary);
+  EXPECT_EQ(summary.termination_type, ceres::CONVERGENCE) << summary.message;
+}
+
 TEST(ResidentMinimizerTest, BoundsAreRefused) {
   Ring a(10);
   a.problem.SetParameterLowerBound(a.poses[3].data(), 0, -1.0);

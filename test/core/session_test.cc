@@ -394,6 +394,46 @@ TEST_F(SessionTest, ConstraintsComeAndGo) {
   EXPECT_EQ(session->num_solves(), 5);
 }
 
+TEST_F(SessionTest, AMeasurementMayChangeAgainAndAgain) {
+  const FeatureId a = Add("orientation", {0.0}, true);
+  const FeatureId b = Add("orientation", {0.5});
+  const ConstraintId changed = Add(Turn(a, b, 0.1, 1.0));
+  const ConstraintId other = Add(Turn(a, b, 0.5, 3.0));
+  const auto session = MakeSession();
+  const auto update = [&](double expected, double information) {
+    graph_.UpdateConstraint(changed, Eigen::VectorXd::Constant(1, expected),
+                            Eigen::MatrixXd::Constant(1, 1, information));
+  };
+  for (const double expected : {0.3, -0.1, 0.2}) {
+    for (const double information : {1.0, 9.0}) {
+      update(expected, information);
+      session->SolveGlobal();
+      const double mean =
+          (information * expected + 3.0 * 0.5) / (information + 3.0);
+      EXPECT_NEAR(Value(b), mean, 1e-9);
+      const double from_changed = mean - expected;
+      EXPECT_NEAR(session->SquaredResidual(graph_.GetConstraint(changed)),
+                  information * from_changed * from_changed, 1e-8);
+      EXPECT_NEAR(
+          session->Delta(graph_.GetConstraint(changed)),
+          std::erfc(std::abs(from_changed) * std::sqrt(0.5 * information)),
+          1e-6);
+      EXPECT_NEAR(MakeSession()->Cost().total(), session->Cost().total(),
+                  1e-12);
+    }
+  }
+  // A neighbourhood has what it says now, and what goes is gone.
+  const std::vector<FeatureId> scope = {b};
+  update(1.0, 1.0);
+  session->SolveLocal(scope);
+  EXPECT_NEAR(Value(b), 0.625, 1e-9);
+  Remove(changed);
+  session->SolveGlobal();
+  EXPECT_NEAR(Value(b), 0.5, 1e-9);
+  Remove(other);
+  EXPECT_EQ(session->Cost().total(), 0.0);
+}
+
 TEST_F(SessionTest, FeaturesComeAndGo) {
   const FeatureId a = Add("orientation", {0.0}, true);
   const auto session = MakeSession();

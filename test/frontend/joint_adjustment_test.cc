@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -404,6 +405,53 @@ TEST_F(JointAdjustmentTest, WithoutDriftNothingMovesFar) {
                              records_, keys_, robot_, options_);
   adjustment.Adjust();
   EXPECT_LT(WorstKey(adjustment.KeyPoses()), 0.01);
+}
+
+// What comes again keeps its constraint, whatever it says now: each round would
+// take all votes out and put others in, else.
+TEST_F(JointAdjustmentTest, VotesAndMatchesThatComeAgainKeepTheirConstraints) {
+  SolverSession session(&graph_, registry_, {});
+  JointAdjustment adjustment(&graph_, &session, registry_, scans_, refined_,
+                             records_, keys_, robot_, options_);
+  adjustment.Adjust();
+  const auto measurements = [this] {
+    std::map<ConstraintId, double> found;
+    for (const Constraint* constraint : graph_.Constraints()) {
+      found[constraint->id] = constraint->information.trace();
+    }
+    return found;
+  };
+  const std::map<ConstraintId, double> before = measurements();
+  const std::int64_t votes = adjustment.num_votes();
+  // From poses that are a little off.
+  for (const FeatureId id : adjustment.places()) {
+    Feature& pose = graph_.GetFeature(id);
+    if (!pose.fixed) pose.parameters[0] += 0.003 * (id % 3 - 1);
+  }
+  adjustment.MatchAnew();
+  adjustment.Adjust();
+  EXPECT_NEAR(static_cast<double>(adjustment.num_votes()),
+              static_cast<double>(votes), 0.05 * static_cast<double>(votes));
+  std::size_t kept = 0;
+  std::size_t changed = 0;
+  for (const auto& [id, information] : measurements()) {
+    const auto found = before.find(id);
+    if (found == before.end()) continue;
+    ++kept;
+    if (found->second != information) ++changed;
+  }
+  EXPECT_GT(kept, before.size() * 9 / 10);
+  EXPECT_GT(changed, kept / 3);
+  EXPECT_LT(WorstKey(adjustment.KeyPoses()), 0.02);
+  // As many as there are, each once.
+  std::set<std::vector<FeatureId>> pairs;
+  std::int64_t num_votes = 0;
+  for (const Constraint* constraint : graph_.Constraints()) {
+    if (constraint->type->name != "pose_segment_points") continue;
+    ++num_votes;
+    EXPECT_TRUE(pairs.insert(constraint->features).second);
+  }
+  EXPECT_EQ(num_votes, adjustment.num_votes());
 }
 
 TEST_F(JointAdjustmentTest, SameForAnyNumberOfThreads) {

@@ -8,7 +8,7 @@ namespace {
 
 // A key scan at (1, 2) that looks along y, and scans by odometry: 1 m a
 // scan along y, but for the third, which stands.
-std::vector<RefinedScan> Drive() {
+std::vector<RefinedScan> DriveWithBlindRuns() {
   std::vector<RefinedScan> refined(8);
   const Pose2 key(1.0, 2.0, 0.5 * kPi);
   double way = 0.0;
@@ -23,7 +23,7 @@ std::vector<RefinedScan> Drive() {
 
 // Scan 7, which odometry has at (1, 8), is matched at (1.5, 8.6).
 std::vector<RefinedScan> MatchedAgain() {
-  std::vector<RefinedScan> refined = Drive();
+  std::vector<RefinedScan> refined = DriveWithBlindRuns();
   refined[7].missed = Pose2(0.6, -0.5, 0.1);
   refined[7].missed_since = 1;
   refined[7].pose = Compose(refined[7].pose, refined[7].missed);
@@ -55,7 +55,7 @@ TEST(MissedMotionTest, IsSpreadOverTheWay) {
 
 TEST(MissedMotionTest, RunsEndWhereAScanIsMatched) {
   EXPECT_TRUE(FindBlindRuns({}).empty());
-  EXPECT_TRUE(FindBlindRuns(Drive()).empty());
+  EXPECT_TRUE(FindBlindRuns(DriveWithBlindRuns()).empty());
   std::vector<RefinedScan> refined = MatchedAgain();
   std::vector<BlindRun> runs = FindBlindRuns(refined);
   ASSERT_EQ(runs.size(), 1u);

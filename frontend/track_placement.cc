@@ -169,8 +169,7 @@ class Search {
       candidate.window = w;
       candidate.score = peak.score;
       if (start_) {
-        const Pose2 off =
-            Between(*start_, Compose(candidate.pose, track_.front().pose));
+        const Pose2 off = FromStart(candidate);
         if (off.head<2>().norm() > options_.start_distance ||
             std::abs(off[2]) > options_.start_turn) {
           continue;
@@ -178,6 +177,18 @@ class Search {
       }
       found_.push_back(std::move(candidate));
     }
+  }
+
+  // Where the track begins, seen from the start that somebody gave.
+  Pose2 FromStart(const Candidate& candidate) const {
+    return Between(*start_, Compose(candidate.pose, track_.front().pose));
+  }
+
+  // Whether somebody said that the track is here and not there.
+  bool IsToldFrom(const Candidate& here, const Candidate& there) const {
+    return start_ &&
+           FromStart(there).head<2>().norm() >
+               FromStart(here).head<2>().norm() + options_.start_precision;
   }
 
   // Judges the places that most windows speak for, `most` in all. False when it
@@ -221,6 +232,7 @@ class Search {
     TrackPlacement placement;
     placement.windows = static_cast<int>(windows_.size());
     Candidate* best = FindBest();
+    untold_rival_ = 0.0;
     if (best == nullptr) {
       placement.why_not = "no part of it looks like a part of the map";
       return placement;
@@ -230,13 +242,16 @@ class Search {
     placement.contradicting = best->contradicting;
     placement.doubtful = best->doubtful;
     for (Candidate& rival : judged_) {
-      if (&rival == best || rival.support() <= placement.rival ||
+      const bool is_told = IsToldFrom(*best, rival);
+      if (&rival == best ||
+          rival.support() <= (is_told ? placement.rival : untold_rival_) ||
           AreOne(*best, rival, windows_, kRivalDistance, kRivalTurn) ||
           (rival.support() > options_.max_certain_rival * best->support() &&
            IsRather(best, &rival))) {
         continue;
       }
-      placement.rival = rival.support();
+      placement.rival = std::max(placement.rival, rival.support());
+      if (!is_told) untold_rival_ = rival.support();
     }
     placement.misfit = Misfit(*best);
     placement.why_not = WhyNot(best, &placement);
@@ -345,7 +360,7 @@ class Search {
       return "where " + Parts(best->agreeing) + " of it would fit, " +
              Parts(best->contradicting) + " would contradict";
     }
-    if (placement->rival > options_.rival_share * best->support()) {
+    if (untold_rival_ > options_.rival_share * best->support()) {
       placement->is_candidate = true;
       return "it would fit in more than one place";
     }
@@ -520,6 +535,8 @@ class Search {
   double reach_ = 0.0;
   std::vector<Candidate> found_;
   std::vector<Candidate> judged_;
+  // Support of the rival of the best place that nobody told from it.
+  double untold_rival_ = 0.0;
 };
 
 // A track through the mirror image of the building.

@@ -86,10 +86,13 @@ struct TrackPlacementOptions {
   int min_agreeing_per_change = 6;
   double max_mirrored_share = 0.5;
   /// With a start that somebody gave: windows that have to agree, doors that
-  /// stand elsewhere, and how far from it the track may start, m and rad.
+  /// stand elsewhere, and how far from it the track may start, m and rad. Where
+  /// it would start farther from there by more than start_precision, m, is no
+  /// rival that keeps it apart: it is told as a doubt.
   int min_agreeing_at_start = 1;
   int min_moved_doors_at_start = 2;
   double start_distance = 3.0;
+  double start_precision = 1.0;
   double start_turn = DegToRad(45.0);
 
   /// Adapts the distances to a laser noisier by this factor

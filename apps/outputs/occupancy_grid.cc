@@ -345,9 +345,9 @@ Corners CornersOf(const std::vector<Scan>& scans,
 
 }  // namespace
 
-OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
-                                const std::vector<Pose2>& poses,
-                                const OccupancyOptions& options) {
+OccupancyGrid GatherOccupancyGrid(const std::vector<Scan>& scans,
+                                  const std::vector<Pose2>& poses,
+                                  const OccupancyOptions& options) {
   if (scans.size() < poses.size()) {
     throw PLUMBLINE_ERROR(std::to_string(poses.size()) + " poses for " +
                               std::to_string(scans.size()) + " scans",
@@ -390,6 +390,13 @@ OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
     });
     for (OccupancyGrid& other : grids) grid.Merge(std::move(other));
   }
+  return grid;
+}
+
+OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
+                                const std::vector<Pose2>& poses,
+                                const OccupancyOptions& options) {
+  OccupancyGrid grid = GatherOccupancyGrid(scans, poses, options);
   grid.ForgetUnreachable();
   return grid;
 }

@@ -178,10 +178,15 @@ class OccupancyGrid {
   std::vector<Ray> rays_;
 };
 
-/// The grid of all scans, or of OccupancyOptions::max_scans, one pose (map
-/// frame) per scan; poses that are not finite are passed over. What cannot be
-/// reached is forgotten (ForgetUnreachable). Throws as the
-/// constructor does, also when there is nothing to be seen.
+/// What all scans have seen, or OccupancyOptions::max_scans of them, one pose
+/// (map frame) per scan; poses that are not finite are passed over. Throws as
+/// the constructor does, also when there is nothing to be seen.
+OccupancyGrid GatherOccupancyGrid(const std::vector<Scan>& scans,
+                                  const std::vector<Pose2>& poses,
+                                  const OccupancyOptions& options);
+
+/// GatherOccupancyGrid, and what cannot be reached is forgotten
+/// (ForgetUnreachable).
 OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
                                 const std::vector<Pose2>& poses,
                                 const OccupancyOptions& options);

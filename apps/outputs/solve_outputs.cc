@@ -63,15 +63,23 @@ OccupancyOptions GridOptions(const SolveOutcome& outcome) {
 // Writers run side by side.
 class SharedParts {
  public:
-  // The grid; null, and why, when it cannot be made.
-  const OccupancyGrid* Grid(const SolveOutcome& outcome, std::string* reason) {
-    std::call_once(grid_once_, [&] {
+  // What several threads do of the grid; the rest waits for who needs it.
+  void BeginGrid(const SolveOutcome& outcome) {
+    std::call_once(grid_begun_, [&] {
       try {
-        grid_ = MakeOccupancyGrid(*outcome.scans, Poses(outcome),
-                                  GridOptions(outcome));
+        grid_ = GatherOccupancyGrid(*outcome.scans, Poses(outcome),
+                                    GridOptions(outcome));
       } catch (const Error& error) {
         no_grid_ = error.what();
       }
+    });
+  }
+
+  // The grid; null, and why, when it cannot be made.
+  const OccupancyGrid* Grid(const SolveOutcome& outcome, std::string* reason) {
+    BeginGrid(outcome);
+    std::call_once(grid_once_, [&] {
+      if (grid_) grid_->ForgetUnreachable();
     });
     *reason = no_grid_;
     return grid_ ? &*grid_ : nullptr;
@@ -125,6 +133,7 @@ class SharedParts {
              Poses(outcome), &plan_);
   }
 
+  std::once_flag grid_begun_;
   std::once_flag grid_once_;
   std::optional<OccupancyGrid> grid_;
   std::string no_grid_;
@@ -462,10 +471,9 @@ WrittenOutputs WriteSolveOutputs(
       selected.begin(), selected.end(),
       [](const OutputWriterType* output) { return TurnOf(*output) > 0; });
   // On all threads, before each of them has a file to write.
-  std::string no_grid;
   if (HasGrid(selected) && outcome.scans != nullptr &&
       !outcome.trajectory.empty()) {
-    outcome.parts->Grid(outcome, &no_grid);
+    outcome.parts->BeginGrid(outcome);
   }
   std::vector<WriteResult> results(selected.size());
   std::mutex mutex;

@@ -78,10 +78,16 @@ std::map<int, Strip> StripsOf(const std::vector<Cell>& cells,
                               const Vector2d& along, double width) {
   const Vector2d normal(-along[1], along[0]);
   std::map<int, Strip> strips;
+  // Neighbouring cells mostly lie in one strip or in two.
+  auto last = strips.end();
   for (const Cell& cell : cells) {
     const double t = along.dot(cell.middle);
-    Strip& strip =
-        strips[static_cast<int>(std::floor(normal.dot(cell.middle) / width))];
+    const int place =
+        static_cast<int>(std::floor(normal.dot(cell.middle) / width));
+    if (last == strips.end() || last->first != place) {
+      last = strips.try_emplace(place).first;
+    }
+    Strip& strip = last->second;
     if (strip.all == 0) strip.begin = strip.end = t;
     strip.begin = std::min(strip.begin, t);
     strip.end = std::max(strip.end, t);
@@ -158,20 +164,24 @@ std::vector<WallLine> FindUnseenWalls(const Arrangement& arrangement,
                                       const std::vector<DrawnLine>& drawn,
                                       const SpaceGrid& space,
                                       const UnseenWallOptions& options) {
-  std::map<int, std::vector<Cell>> cells;
+  std::map<int, std::vector<std::size_t>> faces;
   for (std::size_t i = 0; i < region.size(); ++i) {
-    if (region[i] < 0) continue;
-    std::vector<Cell>& here = cells[region[i]];
-    ForEachCell(arrangement.faces[i], space, [&](int column, int row) {
-      here.push_back({space.Middle(column, row), space.At(column, row)});
-    });
+    if (region[i] >= 0) faces[region[i]].push_back(i);
   }
   std::vector<WallLine> lines;
+  // Of one region after the other, in the same memory.
+  std::vector<Cell> cells;
   for (const auto& [id, directions] :
        DirectionsOf(arrangement, region, drawn, options.min_wall)) {
+    cells.clear();
+    for (const std::size_t face : faces[id]) {
+      ForEachCell(arrangement.faces[face], space, [&](int column, int row) {
+        cells.push_back({space.Middle(column, row), space.At(column, row)});
+      });
+    }
     const std::size_t count = lines.size();
     for (const Vector2d& along : directions) {
-      FindAlong(cells[id], along, space.resolution, options, &lines);
+      FindAlong(cells, along, space.resolution, options, &lines);
       // Other directions of what is left are for the parts.
       if (lines.size() > count) break;
     }

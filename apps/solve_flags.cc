@@ -354,6 +354,7 @@ EmOptions EmOptionsFromFlags(RawFeatures features) {
 // All that is done with scans.
 void TakeFrontEndFlags(LogSolverOptions* options) {
   options->odometry.match_scans = FLAGS_odometry_refinement;
+  options->odometry.prepare_ahead = NumThreadsFromFlags() > 1;
   options->range_offset = FLAGS_range_offset;
   options->odometry.points.usable_range = FLAGS_usable_range;
   options->builder.link_radius = FLAGS_link_radius;

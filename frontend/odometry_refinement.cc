@@ -194,29 +194,15 @@ OdometryRefiner::OdometryRefiner(const OdometryRefinementOptions& options)
     : usual_options_(options),
       options_(options),
       track_(options.matcher),
+      reference_(std::make_unique<TrackReference>(options.prepare_ahead)),
       search_(options.tracking, options.matcher) {
   SetNoiseScale(RangeNoiseScale(options.range_sigma));
 }
 
 void OdometryRefiner::RebuildReference(Track* track) {
-  std::vector<ScanPoint> reference;
-  std::vector<Viewpoint> viewpoints;
-  std::size_t count = 0;
-  for (const TrackKey& key : track->keys) count += key.points.size();
-  reference.reserve(count);
-  for (const TrackKey& key : track->keys) {
-    // Where odometry has jumped: nothing is in sight of both.
-    if ((key.pose - track->keys.back().pose).head<2>().norm() >
-        2.0 * options_.points.usable_range) {
-      continue;
-    }
-    const PoseTransform transform(key.pose);
-    viewpoints.push_back({transform.Point(key.laser), reference.size()});
-    for (const ScanPoint& point : key.points) {
-      reference.push_back(Moved(point, transform));
-    }
-  }
-  track->matcher.SetReference(std::move(reference), std::move(viewpoints));
+  reference_->Set(track->keys, 2.0 * options_.points.usable_range,
+                  options_.window, track->matcher.merge_distance(),
+                  &track->matcher);
 }
 
 MatchResult OdometryRefiner::MatchPoints(const std::vector<ScanPoint>& points,

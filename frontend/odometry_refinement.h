@@ -12,6 +12,7 @@
 #include <plumbline/frontend/scan_points.h>
 #include <plumbline/frontend/steady_motion.h>
 #include <plumbline/frontend/tie_doubts.h>
+#include <plumbline/frontend/track_reference.h>
 #include <plumbline/frontend/track_search.h>
 #include <plumbline/frontend/tracking_options.h>
 #include <plumbline/frontend/wheel_track.h>
@@ -73,6 +74,9 @@ struct OdometryRefinementOptions {
   double key_rotation = 0.15;
   /// Key scans that a new scan is matched with.
   int window = 12;
+  /// Whether a thread prepares what the scans after the next key scan are
+  /// matched with; the result is the same.
+  bool prepare_ahead = false;
   /// Share of matched returns below which a match is looked for again, more
   /// widely, and below which it is rejected.
   double good_inlier_ratio = 0.8;
@@ -424,6 +428,7 @@ class OdometryRefiner {
   double noise_scale_ = 1.0;
   std::function<void(const std::string&)> trace_;
   Track track_;
+  std::unique_ptr<TrackReference> reference_;
   std::vector<ScanPoint> points_;
   bool started_ = false;
   int count_ = 0;

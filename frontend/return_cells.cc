@@ -10,7 +10,7 @@ namespace plumbline {
 namespace {
 
 // Whose directions one thread fits before it takes others.
-constexpr std::size_t kCellsAtOnce = 2000;
+constexpr std::size_t kCellsAtOnce = 250;
 
 }  // namespace
 
@@ -32,14 +32,10 @@ void ReturnCells::Clear() {
   looks_.clear();
 }
 
-void ReturnCells::Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
-                      std::size_t scan) {
-  const auto column =
-      static_cast<std::int64_t>(std::floor(point.x() / cell_size_));
-  const auto row =
-      static_cast<std::int64_t>(std::floor(point.y() / cell_size_));
+void ReturnCells::Add(std::int64_t key, const Eigen::Vector2d& point,
+                      const Eigen::Vector2d& ray, std::size_t scan) {
   const int next = static_cast<int>(cells_.size());
-  const int index = cell_of_.FindOrAdd(CellKey(column, row), next);
+  const int index = cell_of_.FindOrAdd(key, next);
   if (index == next) cells_.emplace_back();
   Cell& cell = cells_[index];
   cell.sum += point;
@@ -51,11 +47,11 @@ void ReturnCells::Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
   }
 }
 
-void ReturnCells::Finish(double least_share, int num_threads) {
+void ReturnCells::Finish(double least_share, ThreadTeam* team) {
   SortLooks();
   FillBuckets();
   if (least_share > 0.0) DropStrays(least_share);
-  FitDirections(num_threads);
+  FitDirections(team);
 }
 
 void ReturnCells::SortLooks() {
@@ -230,13 +226,15 @@ void ReturnCells::DropStrays(double least_share) {
   DropUsed();
 }
 
-void ReturnCells::FitDirections(int num_threads) {
+void ReturnCells::FitDirections(ThreadTeam* team) {
+  const auto fit = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) FitDirection(&cells_[k]);
+  };
+  if (team == nullptr) return fit(0, cells_.size());
   const std::size_t blocks = (cells_.size() + kCellsAtOnce - 1) / kCellsAtOnce;
-  ParallelFor(blocks, num_threads, [&](std::size_t block) {
-    const std::size_t end = std::min(cells_.size(), (block + 1) * kCellsAtOnce);
-    for (std::size_t k = block * kCellsAtOnce; k < end; ++k) {
-      FitDirection(&cells_[k]);
-    }
+  team->For(blocks, [&](std::size_t block) {
+    const std::size_t begin = block * kCellsAtOnce;
+    fit(begin, std::min(cells_.size(), begin + kCellsAtOnce));
   });
 }
 

@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_FRONTEND_RETURN_CELLS_H_
 #define PLUMBLINE_FRONTEND_RETURN_CELLS_H_
 
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/cell_index.h>
 
 #include <Eigen/Core>
@@ -107,13 +108,24 @@ class ReturnCells {
   /// Adds a return of a scan; `ray` points from the laser to it and has the
   /// length 1. Scans come in ascending order.
   void Add(const Eigen::Vector2d& point, const Eigen::Vector2d& ray,
-           std::size_t scan);
+           std::size_t scan) {
+    Add(KeyOf(point), point, ray, scan);
+  }
+  /// Add with the KeyOf() the point, found before.
+  void Add(std::int64_t key, const Eigen::Vector2d& point,
+           const Eigen::Vector2d& ray, std::size_t scan);
+  /// Key of the cell of a point.
+  std::int64_t KeyOf(const Eigen::Vector2d& point) const {
+    return CellKey(
+        static_cast<std::int64_t>(std::floor(point.x() / cell_size_)),
+        static_cast<std::int64_t>(std::floor(point.y() / cell_size_)));
+  }
 
   /// Prepares searches, and fits directions. To be called once all returns are
   /// in. No search finds cells with less than `least_share` of the returns that
   /// one of their surroundings has: strays beside what stands there. The result
-  /// is the same with any number of threads.
-  void Finish(double least_share = 0.0, int num_threads = 1);
+  /// is the same with any team of threads (null: the caller's alone).
+  void Finish(double least_share = 0.0, ThreadTeam* team = nullptr);
 
   /// The cells in the order in which they were first seen.
   const std::vector<Cell>& cells() const { return cells_; }
@@ -205,7 +217,7 @@ class ReturnCells {
   void SortLooks();
   void FillBuckets();
   void DropStrays(double least_share);
-  void FitDirections(int num_threads);
+  void FitDirections(ThreadTeam* team);
   void FitDirection(Cell* cell) const;
 
   template <typename Look>

@@ -18,6 +18,9 @@ namespace {
 // the grids, m.
 constexpr double kReferenceReach = 120.0;
 
+// Empty buckets around those of a reference.
+constexpr int kMarginBuckets = 10;
+
 // No grid goes so far; fits an integer.
 constexpr double kFarthestBucket = 1e9;
 
@@ -41,10 +44,6 @@ constexpr double kFreeShare = 0.03;
 
 // Peaks: what a point costs where the reference has looked through.
 constexpr std::int16_t kThrough = -128;
-
-// Cosine of the largest angle between the normals of reference points that are
-// one.
-constexpr double kOneSurface = 0.9;
 
 // Cosine of the largest angle between the normals of partners.
 constexpr double kSameSide = 0.7;
@@ -86,43 +85,30 @@ struct Nearest {
   }
 };
 
-// Makes one of those of the points from the `first` on that lie nearer than
-// `distance`, m, to each other and look the same way: their mean. What was seen
-// often is a band as wide as its noise, in which whatever lies there has a
-// partner to hand: it creeps to its place, past many that say the same.
-template <typename Surface>
-void MergeNear(double distance, std::size_t first,
-               std::vector<Surface>* points) {
-  std::size_t count = first;
-  thread_local std::vector<int> shares;
-  shares.clear();
-  std::size_t last = first;
-  for (std::size_t i = first; i < points->size(); ++i) {
-    const Surface point = (*points)[i];
-    const auto is_one = [&](std::size_t k) {
-      return (point.position - (*points)[k].position).squaredNorm() <
-                 distance * distance &&
-             point.normal.dot((*points)[k].normal) >= kOneSurface;
-    };
-    // Mostly with the one before it.
-    std::size_t k = last;
-    if (k >= count || !is_one(k)) {
-      k = first;
-      while (k < count && !is_one(k)) ++k;
-    }
-    last = k;
-    if (k == count) {
-      (*points)[count++] = point;
-      shares.push_back(1);
-      continue;
-    }
-    Surface& mean = (*points)[k];
-    const int share = ++shares[k - first];
-    mean.position += (point.position - mean.position) / share;
-    mean.normal =
-        (mean.normal + (point.normal - mean.normal) / share).normalized();
+// The points that the grids may reach: so far around the middle of all. One
+// wild return cannot blow them up. Wherever it is, that reaches all of what is
+// not larger.
+std::vector<ReferencePoint> WithinReach(
+    const std::vector<ReferencePoint>& points) {
+  std::vector<double> xs, ys;
+  xs.reserve(points.size());
+  ys.reserve(points.size());
+  for (const ReferencePoint& point : points) {
+    xs.push_back(point.position.x());
+    ys.push_back(point.position.y());
   }
-  points->resize(count);
+  const auto middle = static_cast<std::ptrdiff_t>(points.size() / 2);
+  std::nth_element(xs.begin(), xs.begin() + middle, xs.end());
+  std::nth_element(ys.begin(), ys.begin() + middle, ys.end());
+  const Eigen::Vector2d center(xs[middle], ys[middle]);
+  std::vector<ReferencePoint> within;
+  for (const ReferencePoint& point : points) {
+    if ((point.position - center).lpNorm<Eigen::Infinity>() <=
+        kReferenceReach) {
+      within.push_back(point);
+    }
+  }
+  return within;
 }
 
 // Poses that an iteration went through.
@@ -190,112 +176,73 @@ double OwnShare(const std::vector<ScanPoint>& scan) {
 ScanMatcher::ScanMatcher(const ScanMatcherOptions& options)
     : options_(options) {}
 
-void ScanMatcher::SetReference(std::vector<ScanPoint> points) {
-  SetReference(std::move(points), {});
+void ScanMatcher::SetReference(const std::vector<ScanPoint>& points) {
+  SetReference(points, {});
 }
 
-void ScanMatcher::SetReference(std::vector<ScanPoint> points,
+void ScanMatcher::SetReference(const std::vector<ScanPoint>& points,
                                std::vector<Viewpoint> viewpoints) {
-  viewpoints_ = std::move(viewpoints);
-  rays_.clear();
-  if (!viewpoints_.empty()) {
-    rays_.reserve(points.size());
-    for (const ScanPoint& point : points) {
-      rays_.push_back({point.position, point.normal});
-    }
+  std::vector<ReferencePoint> given;
+  given.reserve(points.size());
+  for (const ScanPoint& point : points) {
+    given.push_back({point.position, point.normal});
   }
-  free_valid_ = false;
-  levels_.clear();
-  reference_.clear();
-  bucket_begin_.assign(1, 0);
-  bucket_columns_ = 0;
-  bucket_rows_ = 0;
-  field_valid_ = false;
-  if (points.empty()) return;
+  ReferencePoints reference(merge_distance());
+  reference.Add(given);
+  SetReference(std::move(reference), std::move(viewpoints));
+}
+
+bool ScanMatcher::IsTooWide(const std::vector<Surface>& points) const {
   Eigen::Vector2d minimum = points[0].position;
   Eigen::Vector2d maximum = minimum;
-  for (const ScanPoint& point : points) {
+  for (const Surface& point : points) {
     minimum = minimum.cwiseMin(point.position);
     maximum = maximum.cwiseMax(point.position);
   }
-  // The grids reach so far around the middle of the points: one wild return
-  // cannot blow them up. Wherever it is, it reaches all of what is not larger.
-  if (!((maximum - minimum).maxCoeff() < kReferenceReach - kRounding)) {
-    std::vector<double> xs, ys;
-    xs.reserve(points.size());
-    ys.reserve(points.size());
-    for (const ScanPoint& point : points) {
-      xs.push_back(point.position.x());
-      ys.push_back(point.position.y());
-    }
-    const auto middle = static_cast<std::ptrdiff_t>(points.size() / 2);
-    std::nth_element(xs.begin(), xs.begin() + middle, xs.end());
-    std::nth_element(ys.begin(), ys.begin() + middle, ys.end());
-    const Eigen::Vector2d center(xs[middle], ys[middle]);
-    const Eigen::Vector2d reach = Eigen::Vector2d::Constant(kReferenceReach);
-    minimum = minimum.cwiseMax(center - reach);
-    maximum = maximum.cwiseMin(center + reach);
+  return !((maximum - minimum).maxCoeff() < kReferenceReach - kRounding);
+}
+
+void ScanMatcher::SetReference(ReferencePoints points,
+                               std::vector<Viewpoint> viewpoints) {
+  viewpoints_ = std::move(viewpoints);
+  rays_.clear();
+  free_valid_ = false;
+  levels_.clear();
+  reference_.clear();
+  bucket_columns_ = 0;
+  bucket_rows_ = 0;
+  field_valid_ = false;
+  if (points.given().empty()) return;
+  if (IsTooWide(points.given())) {
+    if (!viewpoints_.empty()) rays_ = points.given();
+    ReferencePoints within(points.merge_distance());
+    within.Add(WithinReach(points.given()));
+    points = std::move(within);
+  } else if (!viewpoints_.empty()) {
+    rays_ = points.TakeGiven();
   }
-  const double margin = 1.0;
-  origin_ = minimum.array() - margin;
-  const Eigen::Vector2d size = (maximum - minimum).array() + 2.0 * margin;
-  bucket_columns_ = static_cast<int>(std::ceil(size.x() / bucket_size_)) + 1;
-  bucket_rows_ = static_cast<int>(std::ceil(size.y() / bucket_size_)) + 1;
-  // By bucket and in each as they were given: by columns first, then by rows.
-  struct Entry {
-    int row;
-    int column;
-    int point;
-  };
-  std::vector<Entry> entries;
-  entries.reserve(points.size());
-  std::vector<int> column_begin(static_cast<std::size_t>(bucket_columns_) + 1,
-                                0);
-  std::vector<int> row_begin(static_cast<std::size_t>(bucket_rows_) + 1, 0);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector2d local = (points[i].position - origin_) / bucket_size_;
-    if (!(local.x() >= 0.0 && local.y() >= 0.0 && local.x() < bucket_columns_ &&
-          local.y() < bucket_rows_)) {
-      continue;
-    }
-    const Entry entry = {static_cast<int>(local.y()),
-                         static_cast<int>(local.x()), static_cast<int>(i)};
-    entries.push_back(entry);
-    ++column_begin[static_cast<std::size_t>(entry.column) + 1];
-    ++row_begin[static_cast<std::size_t>(entry.row) + 1];
+  const std::vector<ReferencePoints::Bucket>& buckets = points.buckets();
+  if (buckets.empty()) return;
+  int low_column = buckets[0].column;
+  int high_column = low_column;
+  for (const ReferencePoints::Bucket& bucket : buckets) {
+    low_column = std::min(low_column, bucket.column);
+    high_column = std::max(high_column, bucket.column);
   }
-  std::partial_sum(column_begin.begin(), column_begin.end(),
-                   column_begin.begin());
-  std::partial_sum(row_begin.begin(), row_begin.end(), row_begin.begin());
-  std::vector<Entry> by_column(entries.size());
-  for (const Entry& entry : entries) {
-    by_column[column_begin[entry.column]++] = entry;
+  const int low_row = buckets.front().row;
+  const int high_row = buckets.back().row;
+  origin_ =
+      Eigen::Vector2d(low_column - kMarginBuckets, low_row - kMarginBuckets) *
+      bucket_size_;
+  bucket_columns_ = high_column - low_column + 1 + 2 * kMarginBuckets;
+  bucket_rows_ = high_row - low_row + 1 + 2 * kMarginBuckets;
+  bucket_starts_.Reset(bucket_columns_, bucket_rows_);
+  for (const ReferencePoints::Bucket& bucket : buckets) {
+    bucket_starts_.Begin(bucket.column - low_column + kMarginBuckets,
+                         bucket.row - low_row + kMarginBuckets, bucket.begin);
   }
-  for (const Entry& entry : by_column) entries[row_begin[entry.row]++] = entry;
-  // Most buckets are empty: each is written once.
-  bucket_begin_.resize(
-      static_cast<std::size_t>(bucket_columns_) * bucket_rows_ + 1);
-  reference_.reserve(points.size());
-  std::size_t filled = 0;
-  const auto fill_up_to = [&](std::size_t end) {
-    std::fill(bucket_begin_.begin() + static_cast<std::ptrdiff_t>(filled),
-              bucket_begin_.begin() + static_cast<std::ptrdiff_t>(end),
-              static_cast<int>(reference_.size()));
-    filled = end;
-  };
-  for (auto next = entries.begin(); next != entries.end();) {
-    const int row = next->row;
-    const int column = next->column;
-    fill_up_to(static_cast<std::size_t>(row) * bucket_columns_ + column + 1);
-    const std::size_t first = reference_.size();
-    for (; next != entries.end() && next->row == row && next->column == column;
-         ++next) {
-      const ScanPoint& point = points[static_cast<std::size_t>(next->point)];
-      reference_.push_back({point.position, point.normal});
-    }
-    MergeNear(options_.point_sigma, first, &reference_);
-  }
-  fill_up_to(bucket_begin_.size());
+  reference_ = points.TakePoints();
+  bucket_starts_.Finish(static_cast<int>(reference_.size()));
   // The last block may be read beyond the end.
   reference_x_.assign(reference_.size() + kBlock, 0.0f);
   reference_y_.assign(reference_.size() + kBlock, 0.0f);
@@ -331,8 +278,8 @@ void ScanMatcher::VisitBuckets(const Eigen::Vector2d& point,
     const int begin = cell(local.x() - half);
     const int end = std::min(bucket_columns_ - 1, cell(local.x() + half));
     if (begin > end) return;
-    const int base = row * bucket_columns_;
-    look(bucket_begin_[base + begin], bucket_begin_[base + end + 1]);
+    look(bucket_starts_.Before(begin, row),
+         bucket_starts_.Before(end + 1, row));
   };
   for (int step = 0; own_row - step >= row_begin || own_row + step <= row_end;
        ++step) {

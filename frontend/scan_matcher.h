@@ -2,6 +2,8 @@
 #define PLUMBLINE_FRONTEND_SCAN_MATCHER_H_
 
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/bucket_starts.h>
+#include <plumbline/frontend/reference_points.h>
 #include <plumbline/frontend/scan_points.h>
 
 #include <Eigen/Core>
@@ -141,11 +143,15 @@ class ScanMatcher {
   /// Sets the reference: points and normals in the frame in which poses are
   /// given. Points need no order. Cost: linear in the points and in the cells
   /// of their bounding box.
-  void SetReference(std::vector<ScanPoint> points);
+  void SetReference(const std::vector<ScanPoint>& points);
   /// SetReference with the places that the points were seen from, ascending by
   /// `begin`: between them and their points the reference is free.
-  void SetReference(std::vector<ScanPoint> points,
+  void SetReference(const std::vector<ScanPoint>& points,
                     std::vector<Viewpoint> viewpoints);
+  /// SetReference with points that are merged as this matcher does it.
+  void SetReference(ReferencePoints points, std::vector<Viewpoint> viewpoints);
+  /// Distance up to which points are merged, m (ReferencePoints).
+  double merge_distance() const { return options_.point_sigma; }
   bool empty() const { return reference_.empty(); }
 
   /// ScanMatcherOptions::point_sigma from now on.
@@ -231,11 +237,8 @@ class ScanMatcher {
                  const double* squared_radius, const Look& look) const;
 
   ScanMatcherOptions options_;
-  // What matching needs of a reference point: the search runs through many.
-  struct Surface {
-    Eigen::Vector2d position;
-    Eigen::Vector2d normal;
-  };
+  using Surface = ReferencePoint;
+  bool IsTooWide(const std::vector<Surface>& points) const;
   std::vector<Surface> reference_;
   // The positions again, from origin_ on, to leave out what is clearly too far
   // away several at a time.
@@ -285,12 +288,12 @@ class ScanMatcher {
   // `step`: by which the pose was changed since the iteration before.
   Sums SumUp(const Pose2& pose, double radius, std::size_t stride,
              const Eigen::Vector3d& step) const;
-  // Buckets of reference points, by counting sort over cells.
-  double bucket_size_ = 0.1;
+  // Buckets of reference points.
+  static constexpr double bucket_size_ = ReferencePoints::kBucketSize;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   int bucket_columns_ = 0;
   int bucket_rows_ = 0;
-  std::vector<int> bucket_begin_;
+  BucketStarts bucket_starts_;
   // Likelihood field of the reference for the search, made at its first use.
   mutable std::vector<std::uint8_t> field_;
   mutable int field_columns_ = 0;

@@ -485,7 +485,7 @@ class Completion {
             std::size_t begin, std::size_t end, double reach,
             std::initializer_list<double> smears) {
     Gather(scans, poses, begin, end, reach);
-    returns_.Finish(stray_share_, options_.num_threads);
+    returns_.Finish(stray_share_, &team_);
     const std::vector<ReturnCells::Cell>& cells = returns_.cells();
     // The straightest surroundings first; ties by the order of scans.
     std::vector<int> order;
@@ -594,7 +594,7 @@ class Completion {
     const auto sort_in = [&] {
       for (std::size_t k = 0; k < num_before; ++k) {
         for (const Return& one : before[k].returns) {
-          returns_.Add(one.point, one.ray, first_before + k);
+          returns_.Add(one.key, one.point, one.ray, first_before + k);
         }
       }
     };
@@ -615,6 +615,7 @@ class Completion {
   }
 
   struct Return {
+    std::int64_t key;
     Eigen::Vector2d point;
     // From the laser, of length 1.
     Eigen::Vector2d ray;
@@ -654,7 +655,7 @@ class Completion {
                           options_.explained_gap, &last)) {
         word |= bit;
       } else {
-        unexplained->push_back({point, ray});
+        unexplained->push_back({returns_.KeyOf(point), point, ray});
       }
     }
   }

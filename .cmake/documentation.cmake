@@ -25,7 +25,8 @@ if(DOXYGEN_FOUND)
     list(APPEND headers ${component_headers})
   endforeach()
   doxygen_add_docs(documentation README.md core/method.md core/house.md core/graph_files.md core/plugins.md
-    factors/relations.md frontend/bags.md apps/pipeline/known_beforehand.md datasets/README.md datasets/RESULTS.md datasets/sweeps/README.md
+    factors/relations.md frontend/bags.md apps/pipeline/known_beforehand.md datasets/README.md datasets/RESULTS.md datasets/HISTORY.md
+    datasets/sweeps/README.md
     apps/plan/plan.md apps/evaluation/evaluation.md
     test/benchmark/README.md ${headers}
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})

@@ -66,7 +66,7 @@ set(documents ${CMAKE_INSTALL_DATAROOTDIR}/doc/libplumbline-dev)
 foreach(page README.md core/graph_files.md core/house.md core/method.md core/plugins.md factors/relations.md
         frontend/bags.md apps/pipeline/known_beforehand.md apps/plan/plan.md
         apps/evaluation/evaluation.md
-        datasets/README.md datasets/RESULTS.md datasets/sweeps/README.md)
+        datasets/README.md datasets/RESULTS.md datasets/HISTORY.md datasets/sweeps/README.md)
   get_filename_component(folder ${page} DIRECTORY)
   install(FILES ${PROJECT_SOURCE_DIR}/${page}
     DESTINATION ${documents}/${folder} COMPONENT development)

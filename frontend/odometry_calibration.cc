@@ -50,6 +50,10 @@ Pose2 OdometryCalibration::Corrected(const Pose2& motion) const {
                across * motion[0] + along * motion[1], motion[2]);
 }
 
+double OdometryCalibration::AddedVariance(double way) {
+  return kDriftVariance * way;
+}
+
 void OdometryCalibration::Compare(const Pose2& motion,
                                   const Eigen::Matrix3d& covariance,
                                   const Pose2& matched,
@@ -58,7 +62,7 @@ void OdometryCalibration::Compare(const Pose2& motion,
   const double way = motion.head<2>().norm();
   const double change = last_step - last_step_;
   last_step_ = last_step;
-  variance_ += kDriftVariance * way;
+  variance_ += AddedVariance(way);
   course_variance_ += kCourseDriftVariance * way;
   if (way < kLeastWay) return;
   const Eigen::Vector3d along(motion[0] / way, motion[1] / way, 0.0);

@@ -8,6 +8,32 @@
 
 namespace plumbline {
 
+/// What a motion between two key scans made of odometry's metre.
+struct MetreUse {
+  /// The key scan that it leads to.
+  int scan = 0;
+  /// Way by odometry, m.
+  double way = 0.0;
+  /// What a metre was taken for on it, m; and after it, when it had been
+  /// compared with the match, with its variance and what was added to that for
+  /// the way.
+  double used = 1.0;
+  double learnt = 1.0;
+  double variance = 0.0;
+  double added_variance = 0.0;
+  /// By how much the motion changes with the metre: odometry's motion, as far
+  /// as it was followed, in the frame of the key scan before, m and rad per m.
+  Eigen::Vector3d change = Eigen::Vector3d::Zero();
+
+  /// Writes or reads all of it (state_archive.h).
+  template <typename Archive>
+  friend void Exchange(Archive& archive, MetreUse& use) {
+    auto& [scan, way, used, learnt, variance, added_variance, change] = use;
+    ExchangeAll(archive, scan, way, used, learnt, variance, added_variance,
+                change);
+  }
+};
+
 /// How odometry's motions lie to those of the scans, learnt on the way from
 /// matches. Two constants, since both hold everywhere and add up where the
 /// returns say nothing or little:
@@ -21,6 +47,9 @@ class OdometryCalibration {
  public:
   /// What a metre of odometry is presently taken for, m.
   double scale() const { return scale_; }
+  /// Its variance, and by how much that grows over a way of this length, m.
+  double scale_variance() const { return variance_; }
+  static double AddedVariance(double way);
   /// Direction of a motion in the scans, seen from that by odometry, rad.
   double course() const { return course_; }
 

@@ -927,7 +927,7 @@ void OdometryRefiner::ContinueTrack(const Scan& scan,
   // A scan that was refused anchors nothing.
   if (!moved || (refined.odometry_only && options_.match_scans)) return;
   refined.is_key = true;
-  CompareOdometry(scan, refined, information);
+  CompareOdometry(scan, *next, information);
   next->points = points_;
   // Where things move, what may move enters no reference.
   if (track_.moving > 0) {
@@ -1108,16 +1108,30 @@ void OdometryRefiner::Tie(bool last) {
 }
 
 void OdometryRefiner::CompareOdometry(const Scan& scan,
-                                      const RefinedScan& refined,
+                                      const SettledScan& settled,
                                       const Eigen::Matrix3d& information) {
+  const RefinedScan& refined = settled.refined;
   const Pose2 by_wheels = Between(key_odometry_, scan.odometry);
   key_odometry_ = scan.odometry;
   scans_since_key_ = 0;
   if (refined.odometry_only || track_.keys.empty()) return;
   const Pose2 motion = odometry_calibration_.Corrected(by_wheels);
-  odometry_calibration_.Compare(
-      by_wheels, OdometryCovariance(by_wheels, options_.noise),
-      refined.since_key.mean, information, last_step_);
+  const Eigen::Matrix3d covariance =
+      OdometryCovariance(by_wheels, options_.noise);
+  MetreUse use;
+  use.scan = settled.index;
+  use.way = by_wheels.head<2>().norm();
+  use.used = odometry_calibration_.scale();
+  odometry_calibration_.Compare(by_wheels, covariance, refined.since_key.mean,
+                                information, last_step_);
+  use.learnt = odometry_calibration_.scale();
+  use.variance = odometry_calibration_.scale_variance();
+  use.added_variance = OdometryCalibration::AddedVariance(use.way);
+  // The match is the mean of odometry and of what the returns say.
+  const Eigen::Matrix3d of_wheels = covariance.inverse();
+  use.change = (information + of_wheels).inverse() * of_wheels *
+               Eigen::Vector3d(by_wheels[0], by_wheels[1], 0.0);
+  metre_uses_.push_back(use);
   Pose2 left = refined.since_key.mean - motion;
   left[2] = NormalizeAngle(left[2]);
   const double innovation =
@@ -1304,8 +1318,8 @@ void OdometryRefiner::ExchangeState(StateArchive& archive) {
               loose_of_, found_ties_, wide_searches_, refusals_, losses_,
               loose_, guessed_, noise_, noise_scale_, last_step_, key_odometry_,
               squared_innovations_, compared_motions_, odometry_calibration_,
-              steady_, still_, last_motion_, steady_wheels_, scans_since_key_,
-              still_pose_, is_dead_, ahead_);
+              metre_uses_, steady_, still_, last_motion_, steady_wheels_,
+              scans_since_key_, still_pose_, is_dead_, ahead_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

@@ -185,6 +185,9 @@ class OdometryRefiner {
 
   /// Parts that Finish found, in the order of scans.
   const std::vector<LateTie>& late_ties() const { return late_ties_; }
+  /// What motions between key scans made of odometry's metre, in the order of
+  /// the log (late_metre.h).
+  const std::vector<MetreUse>& metre_uses() const { return metre_uses_; }
 
   /// Whether no tie is open and all that is settled was taken out.
   bool IsSettled() const { return open_ == nullptr && settled_.empty(); }
@@ -402,7 +405,7 @@ class OdometryRefiner {
   // Takes note of how odometry's motion since the last key scan agrees with the
   // match of this one, and begins anew.
   // `information`: of the returns alone, in that key scan's frame.
-  void CompareOdometry(const Scan& scan, const RefinedScan& refined,
+  void CompareOdometry(const Scan& scan, const SettledScan& settled,
                        const Eigen::Matrix3d& information);
   // Odometry's variances on this log, of those in the options.
   double OdometryVarianceScale() const;
@@ -450,6 +453,7 @@ class OdometryRefiner {
   // Ties by one match with all that was seen.
   std::vector<FoundTie> found_ties_;
   std::vector<LateTie> late_ties_;
+  std::vector<MetreUse> metre_uses_;
   // Odometry at the last key scan; sum of chi-squares of the motions that were
   // compared with matches.
   Pose2 key_odometry_ = Pose2::Zero();

@@ -5,6 +5,7 @@
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/detectors/visibility.h>
+#include <plumbline/frontend/late_metre.h>
 #include <plumbline/frontend/looks.h>
 #include <plumbline/frontend/missed_motion.h>
 #include <plumbline/frontend/relocalization.h>
@@ -36,6 +37,10 @@ constexpr std::size_t kScansAhead = 64;
 
 // Rounds of binding walls to a plan, with EM after each.
 constexpr int kPlanRounds = 6;
+
+// Motions are corrected by what was known of odometry's metre only later when
+// some stretch of LogSolverResult::kMetreWindow changes by more, m.
+constexpr double kLeastMetre = 0.1;
 
 // Before the detector that refutes closures.
 void AddSameWall(HierarchySpec* hierarchy) {
@@ -482,8 +487,15 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
     double em_seconds = 0.0;
     refiner_.Finish([&context] { return context.IsStopped(); });
     TakeSettled(scans, Settled(), &em_seconds);
-    if (!refiner_.late_ties().empty() && !result.interrupted) {
-      TakeAnew(scans, &em_seconds);
+    if (!result.interrupted) {
+      const std::vector<MotionCorrection> corrections =
+          LateMetre(refiner_.metre_uses(), LogSolverResult::kMetreWindow,
+                    kLeastMetre, &result.late_metre);
+      if (!refiner_.late_ties().empty() || !corrections.empty()) {
+        CorrectMotions(corrections, &refined_);
+        TakeAnew(scans, &em_seconds);
+      }
+      if (corrections.empty()) result.late_metre = 0.0;
     }
     SpreadMissedMotion(&refined_);
     frontend_seconds_ += watch.Seconds() - em_seconds;

@@ -162,6 +162,10 @@ struct LogSolverResult {
   /// log, rad (odometry_calibration.h). A scale of 0: of several logs.
   double odometry_scale = 0.0;
   double odometry_course = 0.0;
+  /// By how much the motions over kMetreWindow were changed at most, m, by what
+  /// was known of odometry's metre only later (late_metre.h); 0: not at all.
+  double late_metre = 0.0;
+  static constexpr double kMetreWindow = 50.0;
   /// What became of LogSolverOptions::known, for people.
   std::vector<std::string> notes;
   /// Of the first map, where a second one stands for it.

@@ -54,7 +54,8 @@ class Graph {
                ConstraintId constraint_end);
 
   /// Gives a live measurement a new expected value and information (the robot's
-  /// links while it moves). Throws Error as Apply does.
+  /// links while it moves). Listeners hear of it when it differs from what it
+  /// had. Throws Error as Apply does.
   void UpdateConstraint(ConstraintId id, const Eigen::VectorXd& expected,
                         const Eigen::MatrixXd& information);
 

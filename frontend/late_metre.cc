@@ -26,28 +26,26 @@ std::vector<double> Smoothed(const std::vector<MetreUse>& uses) {
 
 }  // namespace
 
-std::vector<MotionCorrection> LateMetre(const std::vector<MetreUse>& uses,
-                                        double window, double least,
-                                        double* largest) {
+LateMetre FindLateMetre(const std::vector<MetreUse>& uses,
+                        const LateMetreOptions& options) {
   const std::vector<double> metres = Smoothed(uses);
-  std::vector<MotionCorrection> corrections;
+  LateMetre late;
   // What stretches from the beginning on gain, and how long they are, m.
   std::vector<double> gained = {0.0};
   std::vector<double> ways = {0.0};
-  double most = 0.0;
   std::size_t first = 0;
   for (std::size_t k = 0; k < uses.size(); ++k) {
     const MetreUse& use = uses[k];
     const double off = metres[k] - use.used;
-    corrections.push_back({use.scan, off * use.change});
+    late.corrections.push_back({use.scan, off * use.change});
     gained.push_back(gained.back() + off * use.change.head<2>().norm());
     ways.push_back(ways.back() + use.way);
-    while (ways.back() - ways[first] > window) ++first;
-    most = std::max(most, std::abs(gained.back() - gained[first]));
+    while (ways.back() - ways[first] > options.window) ++first;
+    late.largest_change =
+        std::max(late.largest_change, std::abs(gained.back() - gained[first]));
   }
-  if (largest != nullptr) *largest = most;
-  if (most <= least) corrections.clear();
-  return corrections;
+  if (late.largest_change <= options.least_change) late.corrections.clear();
+  return late;
 }
 
 void CorrectMotions(const std::vector<MotionCorrection>& corrections,

@@ -106,8 +106,7 @@ void ReferencePoints::Merge(const ReferencePoint& point, Bucket* bucket) {
       (mean.normal + (point.normal - mean.normal) / share).normalized();
 }
 
-void ReferencePoints::Add(const std::vector<ReferencePoint>& points) {
-  given_.insert(given_.end(), points.begin(), points.end());
+void ReferencePoints::Add(std::vector<ReferencePoint> points) {
   const std::vector<Entry> entries = Sorted(points);
   std::vector<ReferencePoint> old_points;
   std::vector<int> old_shares;
@@ -158,6 +157,11 @@ void ReferencePoints::Add(const std::vector<ReferencePoint>& points) {
     }
   }
   keep_up_to(old_buckets.end());
+  if (given_.empty()) {
+    given_ = std::move(points);
+  } else {
+    given_.insert(given_.end(), points.begin(), points.end());
+  }
 }
 
 }  // namespace plumbline

@@ -40,7 +40,7 @@ class ReferencePoints {
 
   /// Adds points, in any order. Those whose bucket has no number that fits an
   /// integer are left out. Cost: linear in all points.
-  void Add(const std::vector<ReferencePoint>& points);
+  void Add(std::vector<ReferencePoint> points);
 
   /// As it was given, m.
   double merge_distance() const { return merge_distance_; }

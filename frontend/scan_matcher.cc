@@ -85,6 +85,17 @@ struct Nearest {
   }
 };
 
+// Whether the grids of points would reach farther than they may.
+bool IsTooWide(const std::vector<ReferencePoint>& points) {
+  Eigen::Vector2d minimum = points[0].position;
+  Eigen::Vector2d maximum = minimum;
+  for (const ReferencePoint& point : points) {
+    minimum = minimum.cwiseMin(point.position);
+    maximum = maximum.cwiseMax(point.position);
+  }
+  return !((maximum - minimum).maxCoeff() < kReferenceReach - kRounding);
+}
+
 // The points that the grids may reach: so far around the middle of all. One
 // wild return cannot blow them up. Wherever it is, that reaches all of what is
 // not larger.
@@ -188,18 +199,8 @@ void ScanMatcher::SetReference(const std::vector<ScanPoint>& points,
     given.push_back({point.position, point.normal});
   }
   ReferencePoints reference(merge_distance());
-  reference.Add(given);
+  reference.Add(std::move(given));
   SetReference(std::move(reference), std::move(viewpoints));
-}
-
-bool ScanMatcher::IsTooWide(const std::vector<Surface>& points) const {
-  Eigen::Vector2d minimum = points[0].position;
-  Eigen::Vector2d maximum = minimum;
-  for (const Surface& point : points) {
-    minimum = minimum.cwiseMin(point.position);
-    maximum = maximum.cwiseMax(point.position);
-  }
-  return !((maximum - minimum).maxCoeff() < kReferenceReach - kRounding);
 }
 
 void ScanMatcher::SetReference(ReferencePoints points,

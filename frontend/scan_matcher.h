@@ -238,7 +238,6 @@ class ScanMatcher {
 
   ScanMatcherOptions options_;
   using Surface = ReferencePoint;
-  bool IsTooWide(const std::vector<Surface>& points) const;
   std::vector<Surface> reference_;
   // The positions again, from origin_ on, to leave out what is clearly too far
   // away several at a time.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
 #include <system_error>
 #include <utility>
 
@@ -24,7 +25,7 @@ void TrackReference::Base::Gather() {
   for (const Seen& key : keys) {
     all.insert(all.end(), key.points->begin(), key.points->end());
   }
-  points.Add(all);
+  points.Add(std::move(all));
 }
 
 bool TrackReference::Base::IsOf(const std::vector<Seen>& others,
@@ -125,10 +126,16 @@ void TrackReference::Work() {
     wanted_.reset();
     is_at_work_ = true;
     lock.unlock();
-    base.Gather();
+    bool is_made = true;
+    try {
+      base.Gather();
+    } catch (const std::exception&) {
+      // Without memory: who needs it meets that himself, and can say so.
+      is_made = false;
+    }
     lock.lock();
     is_at_work_ = false;
-    made_ = std::move(base);
+    if (is_made) made_ = std::move(base);
     changed_.notify_all();
   }
 }

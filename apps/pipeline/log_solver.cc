@@ -5,7 +5,6 @@
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/detectors/visibility.h>
-#include <plumbline/frontend/late_metre.h>
 #include <plumbline/frontend/looks.h>
 #include <plumbline/frontend/missed_motion.h>
 #include <plumbline/frontend/relocalization.h>
@@ -19,6 +18,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <utility>
@@ -38,9 +38,14 @@ constexpr std::size_t kScansAhead = 64;
 // Rounds of binding walls to a plan, with EM after each.
 constexpr int kPlanRounds = 6;
 
-// Motions are corrected by what was known of odometry's metre only later when
-// some stretch of LogSolverResult::kMetreWindow changes by more, m.
-constexpr double kLeastMetre = 0.1;
+std::string NoteOf(const LateMetre& late, const LateMetreOptions& options) {
+  char text[160];
+  std::snprintf(text, sizeof(text),
+                "odometry's metre was known late: stretches of %.0f m were up "
+                "to %.2f m too long or too short, which is taken out",
+                options.window, late.largest_change);
+  return text;
+}
 
 // Before the detector that refutes closures.
 void AddSameWall(HierarchySpec* hierarchy) {
@@ -488,14 +493,15 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
     refiner_.Finish([&context] { return context.IsStopped(); });
     TakeSettled(scans, Settled(), &em_seconds);
     if (!result.interrupted) {
-      const std::vector<MotionCorrection> corrections =
-          LateMetre(refiner_.metre_uses(), LogSolverResult::kMetreWindow,
-                    kLeastMetre, &result.late_metre);
-      if (!refiner_.late_ties().empty() || !corrections.empty()) {
-        CorrectMotions(corrections, &refined_);
+      const LateMetre late =
+          FindLateMetre(refiner_.metre_uses(), options_.late_metre);
+      if (!late.corrections.empty()) {
+        result.notes.push_back(NoteOf(late, options_.late_metre));
+        CorrectMotions(late.corrections, &refined_);
+      }
+      if (!refiner_.late_ties().empty() || !late.corrections.empty()) {
         TakeAnew(scans, &em_seconds);
       }
-      if (corrections.empty()) result.late_metre = 0.0;
     }
     SpreadMissedMotion(&refined_);
     frontend_seconds_ += watch.Seconds() - em_seconds;
@@ -779,7 +785,9 @@ void LogSolver::TieToPlan(KnownStructureBinder* known, Context* context) {
     if (known->TieToPlan(context->control.stop) == 0) break;
     RunEm(context);
   }
-  context->result.notes = known->Notes();
+  for (std::string& note : known->Notes()) {
+    context->result.notes.push_back(std::move(note));
+  }
 }
 
 void LogSolver::CheckMap(Context* context) const {

@@ -9,6 +9,7 @@
 #include <plumbline/core/session.h>
 #include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/joint_adjustment.h>
+#include <plumbline/frontend/late_metre.h>
 #include <plumbline/frontend/map_builder.h>
 #include <plumbline/frontend/map_check.h>
 #include <plumbline/frontend/odometry_refinement.h>
@@ -91,6 +92,7 @@ struct LogSolverOptions {
   bool check_map = true;
   MapCheckOptions check;
   WayCheckOptions way_check;
+  LateMetreOptions late_metre;
   /// What is known of the building beforehand; needs structure and full
   /// refinement of segments.
   KnownStructure known;
@@ -162,11 +164,8 @@ struct LogSolverResult {
   /// log, rad (odometry_calibration.h). A scale of 0: of several logs.
   double odometry_scale = 0.0;
   double odometry_course = 0.0;
-  /// By how much the motions over kMetreWindow were changed at most, m, by what
-  /// was known of odometry's metre only later (late_metre.h); 0: not at all.
-  double late_metre = 0.0;
-  static constexpr double kMetreWindow = 50.0;
-  /// What became of LogSolverOptions::known, for people.
+  /// What became of LogSolverOptions::known, and what was corrected, for
+  /// people.
   std::vector<std::string> notes;
   /// Of the first map, where a second one stands for it.
   std::vector<LoopClosure> closures;

@@ -26,16 +26,16 @@ void Exchange(Archive& archive, LogSolverResult& result) {
          wall_votes, scan_seconds, key_scans, wide_searches, refused_matches,
          lost_tracks, loose, feature_matches, features_created,
          second_map_refused, loose_walls, interrupted, refined, records, breaks,
-         range_sigma, noise_scale, odometry_scale, odometry_course, late_metre,
-         notes, closures] = result;
-  ExchangeAll(
-      archive, trajectory, em, initial_cost, final_cost, frontend_seconds,
-      detect_seconds, solve_seconds, relocalization_seconds, completion_seconds,
-      adjustment_seconds, glimpsed_walls, scan_relations, wall_votes,
-      scan_seconds, key_scans, wide_searches, refused_matches, lost_tracks,
-      loose, feature_matches, features_created, second_map_refused, loose_walls,
-      interrupted, refined, records, breaks, range_sigma, noise_scale,
-      odometry_scale, odometry_course, late_metre, notes, closures);
+         range_sigma, noise_scale, odometry_scale, odometry_course, notes,
+         closures] = result;
+  ExchangeAll(archive, trajectory, em, initial_cost, final_cost,
+              frontend_seconds, detect_seconds, solve_seconds,
+              relocalization_seconds, completion_seconds, adjustment_seconds,
+              glimpsed_walls, scan_relations, wall_votes, scan_seconds,
+              key_scans, wide_searches, refused_matches, lost_tracks, loose,
+              feature_matches, features_created, second_map_refused,
+              loose_walls, interrupted, refined, records, breaks, range_sigma,
+              noise_scale, odometry_scale, odometry_course, notes, closures);
 }
 
 }  // namespace plumbline

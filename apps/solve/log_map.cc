@@ -10,7 +10,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 
 namespace plumbline {
 namespace {
@@ -63,16 +62,6 @@ void TellOfTrack(const std::string& name, const std::vector<Scan>& scans,
   for (const std::string& note : result.notes) {
     summary->notes.push_back(note);
     Remark("%s: %s", name.c_str(), PrintableUtf8(note).c_str());
-  }
-  if (result.late_metre > 0.0) {
-    char text[160];
-    std::snprintf(
-        text, sizeof(text),
-        "odometry's metre was known late: stretches of %.0f m were up "
-        "to %.2f m too long or too short, which is taken out",
-        LogSolverResult::kMetreWindow, result.late_metre);
-    summary->notes.push_back(text);
-    Remark("%s: %s", name.c_str(), text);
   }
   if (result.second_map_refused) {
     summary->notes.push_back(

@@ -29,9 +29,8 @@ TEST(LateMetreTest, TheMetreOfAllTimesIsThatOfAllThatWasLearnt) {
   const std::vector<MetreUse> uses = {
       Use(3, 1.0, 1.0, 4e-4, 1e-4, ahead), Use(6, 1.0, 1.0, 3e-4, 1e-4, ahead),
       Use(9, 1.0, 0.98, 2e-4, 1e-4, Eigen::Vector3d(0.5, 0.1, 0.01))};
-  double largest = 0.0;
-  const std::vector<MotionCorrection> corrections =
-      LateMetre(uses, 10.0, 0.01, &largest);
+  const LateMetre late = FindLateMetre(uses, {10.0, 0.01});
+  const std::vector<MotionCorrection>& corrections = late.corrections;
   ASSERT_EQ(corrections.size(), 3u);
   EXPECT_EQ(corrections[0].scan, 3);
   EXPECT_NEAR(corrections[2].change[0], -0.02 * 0.5, 1e-12);
@@ -39,22 +38,22 @@ TEST(LateMetreTest, TheMetreOfAllTimesIsThatOfAllThatWasLearnt) {
   EXPECT_NEAR(corrections[2].change[2], -0.02 * 0.01, 1e-12);
   EXPECT_NEAR(corrections[1].change[0], -0.015, 1e-12);
   EXPECT_NEAR(corrections[0].change[0], -0.012, 1e-12);
-  EXPECT_NEAR(largest, 0.012 + 0.015 + 0.02 * Eigen::Vector2d(0.5, 0.1).norm(),
-              1e-12);
+  EXPECT_NEAR(late.largest_change,
+              0.012 + 0.015 + 0.02 * Eigen::Vector2d(0.5, 0.1).norm(), 1e-12);
   // Of the last two metres alone.
-  LateMetre(uses, 2.0, 0.01, &largest);
-  EXPECT_NEAR(largest, 0.012 + 0.015, 1e-12);
+  EXPECT_NEAR(FindLateMetre(uses, {2.0, 0.01}).largest_change, 0.012 + 0.015,
+              1e-12);
 }
 
 TEST(LateMetreTest, LittleIsLeftAsItIs) {
   const Eigen::Vector3d ahead(1.0, 0.0, 0.0);
   const std::vector<MetreUse> uses = {Use(1, 1.0, 1.0, 4e-4, 1e-4, ahead),
                                       Use(2, 1.0, 0.99, 3e-4, 1e-4, ahead)};
-  double largest = 0.0;
-  EXPECT_TRUE(LateMetre(uses, 50.0, 0.1, &largest).empty());
-  EXPECT_NEAR(largest, 0.018, 1e-12);
-  EXPECT_TRUE(LateMetre({}, 50.0, 0.1, &largest).empty());
-  EXPECT_EQ(largest, 0.0);
+  const LateMetre late = FindLateMetre(uses, {50.0, 0.1});
+  EXPECT_TRUE(late.corrections.empty());
+  EXPECT_NEAR(late.largest_change, 0.018, 1e-12);
+  EXPECT_TRUE(FindLateMetre({}, {}).corrections.empty());
+  EXPECT_EQ(FindLateMetre({}, {}).largest_change, 0.0);
 }
 
 RefinedScan ScanAt(const Pose2& since_key, const Pose2& pose, bool is_key) {
@@ -144,13 +143,11 @@ TEST(LateMetreTest, ABareCorridorHasItsLengthOnceTheMetreIsKnown) {
   const double way_before = refined[160].pose[0];  // After 24 m.
   EXPECT_GT(way_before, 24.0 + 0.5);
   EXPECT_NEAR(refiner.odometry_scale(), kMetre, 0.01);
-  double largest = 0.0;
-  const std::vector<MotionCorrection> corrections =
-      LateMetre(refiner.metre_uses(), 50.0, 0.1, &largest);
-  ASSERT_FALSE(corrections.empty());
-  EXPECT_GT(largest, 0.5);
+  const LateMetre late = FindLateMetre(refiner.metre_uses(), {});
+  ASSERT_FALSE(late.corrections.empty());
+  EXPECT_GT(late.largest_change, 0.5);
   const double end_before = refined.back().pose[0];
-  CorrectMotions(corrections, &refined);
+  CorrectMotions(late.corrections, &refined);
   EXPECT_NEAR(refined[160].pose[0], 24.0, 0.3);
   EXPECT_NEAR(refined.back().pose[0], last, 0.4);
   EXPECT_LT(refined.back().pose[0], end_before - 0.5);

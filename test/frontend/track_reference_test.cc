@@ -38,8 +38,9 @@ MatchResult MatchWith(const ScanMatcher& matcher) {
 }
 
 // By points of all keys at once.
-ScanMatcher MatcherOf(const std::deque<TrackKey>& keys) {
-  ScanMatcher matcher({});
+ScanMatcher MatcherOf(const std::deque<TrackKey>& keys,
+                      const ScanMatcherOptions& options = {}) {
+  ScanMatcher matcher(options);
   std::vector<ScanPoint> points;
   std::vector<Viewpoint> viewpoints;
   for (const TrackKey& key : keys) {
@@ -123,18 +124,7 @@ TEST(TrackReferenceTest, TheDistanceOfMergingIsThatOfTheMatcher) {
   options.point_sigma = 0.06;
   ScanMatcher other(options);
   reference.Set(keys, kReach, kWindow, other.merge_distance(), &other);
-  ScanMatcher expected(options);
-  std::vector<ScanPoint> points;
-  std::vector<Viewpoint> viewpoints;
-  for (const TrackKey& key : keys) {
-    const PoseTransform transform(key.pose);
-    viewpoints.push_back({transform.Point(key.laser), points.size()});
-    for (const ScanPoint& point : key.points) {
-      points.push_back(Moved(point, transform));
-    }
-  }
-  expected.SetReference(points, viewpoints);
-  ExpectSame(other, expected);
+  ExpectSame(other, MatcherOf(keys, options));
 }
 
 }  // namespace

@@ -26,6 +26,10 @@ constexpr std::size_t kLargeProblem = 4096;
 constexpr std::size_t kBlock = 256;
 constexpr std::size_t kMostKept = 64 * kBlock;
 
+// Terms ahead of the one that is evaluated whose costs are asked for: they are
+// objects of their own, and waiting for them takes as long as evaluating them.
+constexpr std::size_t kAhead = 4;
+
 // The weight of residuals and the correction of Jacobians that make a robust
 // loss a least squares problem (Triggs et al. 1999), as Ceres has it.
 struct Correction {
@@ -44,6 +48,15 @@ struct Correction {
   }
 };
 
+// Has the processor fetch the cost of the term so far ahead of `t`.
+void FetchAhead(const std::vector<Term>& terms, std::size_t t) {
+  if (t + kAhead >= terms.size()) return;
+  const char* const cost =
+      reinterpret_cast<const char*>(terms[t + kAhead].cost);
+  __builtin_prefetch(cost);
+  __builtin_prefetch(cost + kCacheLine);
+}
+
 bool IsIdentity(const double* matrix, int rows, int columns) {
   if (rows != columns) return false;
   for (int i = 0; i < rows; ++i) {
@@ -52,6 +65,22 @@ bool IsIdentity(const double* matrix, int rows, int columns) {
     }
   }
   return true;
+}
+
+// The Jacobian of a residual with respect to the tangent of an argument, from
+// that with respect to the argument and that of Plus.
+void MakeTangent(int rows, const Argument& argument, const double* jacobian,
+                 const double* plus, double* tangent) {
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < argument.tangent_size; ++c) {
+      double sum = 0.0;
+      for (int i = 0; i < argument.size; ++i) {
+        sum += jacobian[r * argument.size + i] *
+               plus[i * argument.tangent_size + c];
+      }
+      tangent[r * argument.tangent_size + c] = sum;
+    }
+  }
 }
 
 double TermCost(const Term& term, double squared, double rho[3]) {
@@ -93,7 +122,7 @@ void FlatEvaluator::MakeRoom() {
 
 bool FlatEvaluator::EvaluateTerm(const Term& term, const double* state,
                                  double* residual, double** jacobians,
-                                 Scratch* scratch) const {
+                                 Scratch* scratch, double* squared) const {
   for (int i = term.begin; i < term.end; ++i) {
     const Argument& argument = problem_.arguments()[i];
     scratch->argument_pointers[i - term.begin] =
@@ -101,17 +130,25 @@ bool FlatEvaluator::EvaluateTerm(const Term& term, const double* state,
             ? problem_.blocks()[argument.block].user
             : state + problem_.variables()[argument.variable].state;
   }
-  return term.cost->Evaluate(scratch->argument_pointers.data(), residual,
-                             jacobians) &&
-         VectorMap(residual, term.rows).allFinite();
+  if (!term.cost->Evaluate(scratch->argument_pointers.data(), residual,
+                           jacobians)) {
+    return false;
+  }
+  *squared = 0.0;
+  for (int r = 0; r < term.rows; ++r) *squared += residual[r] * residual[r];
+  // Of numbers that are finite the square may still be none.
+  return std::isfinite(*squared) || VectorMap(residual, term.rows).allFinite();
 }
 
 bool FlatEvaluator::CostOf(const Term& term, const double* state,
                            Scratch* scratch, double* cost) const {
-  double* const residual = scratch->residual.data();
-  if (!EvaluateTerm(term, state, residual, nullptr, scratch)) return false;
+  double squared = 0.0;
+  if (!EvaluateTerm(term, state, scratch->residual.data(), nullptr, scratch,
+                    &squared)) {
+    return false;
+  }
   double rho[3];
-  *cost = TermCost(term, VectorMap(residual, term.rows).squaredNorm(), rho);
+  *cost = TermCost(term, squared, rho);
   return true;
 }
 
@@ -124,10 +161,11 @@ bool FlatEvaluator::Cost(bool is_fixed, const Eigen::VectorXd& state,
     return true;
   }
   if (IsLarge() && !is_fixed) return ParallelCost(state, cost);
-  for (const Term& term : terms) {
-    if ((term.num_variables == 0) != is_fixed) continue;
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    FetchAhead(terms, t);
+    if ((terms[t].num_variables == 0) != is_fixed) continue;
     double share = 0.0;
-    if (!CostOf(term, state.data(), &scratch_[0], &share)) return false;
+    if (!CostOf(terms[t], state.data(), &scratch_[0], &share)) return false;
     *cost += share;
   }
   return std::isfinite(*cost);
@@ -143,6 +181,7 @@ bool FlatEvaluator::ParallelCost(const Eigen::VectorXd& state, double* cost) {
          k = next.fetch_add(kBlock)) {
       const std::size_t end = std::min(terms.size(), k + kBlock);
       for (std::size_t t = k; t < end; ++t) {
+        FetchAhead(terms, t);
         if (terms[t].num_variables == 0) continue;
         if (!CostOf(terms[t], state.data(), &scratch_[thread], &costs_[t])) {
           has_failed = true;
@@ -188,35 +227,29 @@ bool FlatEvaluator::LinearizeTerm(const Term& term, const double* state,
             ? jacobians + argument.jacobian
             : scratch->jacobians.data() + argument.jacobian;
   }
+  double squared = 0.0;
   if (!EvaluateTerm(term, state, residual, scratch->jacobian_pointers.data(),
-                    scratch)) {
+                    scratch, &squared)) {
     return false;
   }
-  VectorMap r(residual, term.rows);
-  const double squared = r.squaredNorm();
   double rho[3];
   linearized[0] = TermCost(term, squared, rho);
-  // Jacobians with respect to tangents.
   for (int k = 0; k < count; ++k) {
     const Argument& argument = problem_.arguments()[term.begin + k];
     if (argument.variable < 0 || is_identity_[argument.variable] != 0) continue;
-    const Variable& variable = problem_.variables()[argument.variable];
-    Eigen::Map<RowMajor>(jacobians + argument.jacobian, term.rows,
-                         variable.tangent_size)
-        .noalias() = Eigen::Map<const RowMajor>(scratch->jacobian_pointers[k],
-                                                term.rows, variable.size) *
-                     Eigen::Map<const RowMajor>(
-                         plus_jacobians_.data() + variable.plus_jacobian,
-                         variable.size, variable.tangent_size);
+    MakeTangent(term.rows, argument, scratch->jacobian_pointers[k],
+                plus_jacobians_.data() +
+                    problem_.variables()[argument.variable].plus_jacobian,
+                jacobians + argument.jacobian);
   }
   if (term.loss == nullptr) return true;
+  VectorMap r(residual, term.rows);
   const Correction correction(squared, rho);
   for (int k = 0; k < count; ++k) {
     const Argument& argument = problem_.arguments()[term.begin + k];
     if (argument.variable < 0) continue;
-    Eigen::Map<RowMajor> jacobian(
-        jacobians + argument.jacobian, term.rows,
-        problem_.variables()[argument.variable].tangent_size);
+    Eigen::Map<RowMajor> jacobian(jacobians + argument.jacobian, term.rows,
+                                  argument.tangent_size);
     if (correction.alpha != 0.0) {
       jacobian -= correction.alpha * r * (r.transpose() * jacobian).eval();
     }
@@ -226,26 +259,18 @@ bool FlatEvaluator::LinearizeTerm(const Term& term, const double* state,
   return true;
 }
 
-void FlatEvaluator::AddTerm(const Term& term, double* linearized,
+void FlatEvaluator::AddTerm(const Term& term, const double* linearized,
                             NormalMatrix* matrix, Eigen::VectorXd* gradient,
                             double* cost) {
   *cost += linearized[0];
   const double* const residual = linearized + 1;
-  double* const jacobians = linearized + 1 + term.rows;
+  const double* const jacobians = residual + term.rows;
   for (int i = term.begin; i < term.end; ++i) {
-    const Argument& argument = problem_.arguments()[i];
-    if (argument.variable < 0) continue;
-    double* const jacobian = jacobians + argument.jacobian;
-    added_pointers_[i - term.begin] = jacobian;
-    const int size = problem_.variables()[argument.variable].tangent_size;
-    double* const g = gradient->data() + matrix->ColumnOf(argument.variable);
-    for (int r = 0; r < term.rows; ++r) {
-      for (int c = 0; c < size; ++c) {
-        g[c] += jacobian[r * size + c] * residual[r];
-      }
-    }
+    added_pointers_[i - term.begin] =
+        jacobians + problem_.arguments()[i].jacobian;
   }
-  matrix->Add(problem_, term, added_pointers_.data());
+  matrix->Add(problem_, term, added_pointers_.data(), residual,
+              gradient->data());
 }
 
 // Terms from `begin` to `end`: threads linearize blocks of them as they come,
@@ -290,8 +315,9 @@ class FlatEvaluator::Pipeline {
   void ForTerms(std::size_t block, const Visit& visit) {
     const std::size_t first = begin_ + block * kBlock;
     const std::size_t last = std::min(end_, first + kBlock);
+    const std::vector<Term>& terms = evaluator_.problem_.terms();
     for (std::size_t t = first; t < last; ++t) {
-      const Term& term = evaluator_.problem_.terms()[t];
+      const Term& term = terms[t];
       if (term.num_variables == 0) continue;
       visit(term, &evaluator_.linearized_[(t - begin_) * evaluator_.stride_]);
     }
@@ -304,6 +330,8 @@ class FlatEvaluator::Pipeline {
     if (block >= is_done_.size()) return false;
     try {
       ForTerms(block, [&](const Term& term, double* linearized) {
+        FetchAhead(evaluator_.problem_.terms(),
+                   &term - evaluator_.problem_.terms().data());
         if (!evaluator_.LinearizeTerm(term, state_.data(), linearized,
                                       scratch)) {
           has_failed_ = true;
@@ -352,7 +380,9 @@ bool FlatEvaluator::Linearize(const Eigen::VectorXd& state,
   } else {
     if (!begin()) return false;
     linearized_.resize(stride_);
-    for (const Term& term : terms) {
+    for (std::size_t t = 0; t < terms.size(); ++t) {
+      FetchAhead(terms, t);
+      const Term& term = terms[t];
       if (term.num_variables == 0) continue;
       if (!LinearizeTerm(term, state.data(), linearized_.data(),
                          &scratch_[0])) {

@@ -53,16 +53,17 @@ class FlatEvaluator {
   };
   class Pipeline;
 
+  // Residual, its squared norm and its Jacobians (may be null).
   bool EvaluateTerm(const FlatProblem::Term& term, const double* state,
-                    double* residual, double** jacobians,
-                    Scratch* scratch) const;
+                    double* residual, double** jacobians, Scratch* scratch,
+                    double* squared) const;
   bool CostOf(const FlatProblem::Term& term, const double* state,
               Scratch* scratch, double* cost) const;
   bool ParallelCost(const Eigen::VectorXd& state, double* cost);
   bool FindPlusJacobians(const Eigen::VectorXd& state);
   bool LinearizeTerm(const FlatProblem::Term& term, const double* state,
                      double* linearized, Scratch* scratch) const;
-  void AddTerm(const FlatProblem::Term& term, double* linearized,
+  void AddTerm(const FlatProblem::Term& term, const double* linearized,
                NormalMatrix* matrix, Eigen::VectorXd* gradient, double* cost);
   bool IsLarge() const;
 
@@ -78,7 +79,7 @@ class FlatEvaluator {
   // respect to tangents, each where the FlatProblem has that of the block.
   std::size_t stride_ = 0;
   std::vector<double> linearized_;
-  std::vector<double*> added_pointers_;
+  std::vector<const double*> added_pointers_;
   // Of single terms, to be summed up in order.
   std::vector<double> costs_;
 };

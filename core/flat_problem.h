@@ -5,6 +5,7 @@
 #include <ceres/loss_function.h>
 #include <ceres/manifold.h>
 #include <ceres/problem.h>
+#include <plumbline/core/problem_changes.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -66,6 +67,7 @@ class FlatProblem {
   /// A parameter block of the problem.
   struct Block {
     double* user = nullptr;
+    int size = 0;
     bool is_constant = false;
     /// -1: does not vary.
     int variable = -1;
@@ -80,6 +82,7 @@ class FlatProblem {
     /// its tangent.
     int jacobian = 0;
     int size = 0;
+    int tangent_size = 0;
   };
 
   /// A residual block.
@@ -108,17 +111,24 @@ class FlatProblem {
     int jacobians = 0;
   };
 
-  /// The problem is not owned and must outlive this.
-  explicit FlatProblem(ceres::Problem* problem) : problem_(problem) {}
+  /// The problem is not owned and must outlive this. `may_have_bounds`: whether
+  /// parameters are to be asked for theirs.
+  explicit FlatProblem(ceres::Problem* problem, bool may_have_bounds = true)
+      : problem_(problem), may_have_bounds_(may_have_bounds) {}
 
   /// Reads the problem; empty when it can be solved, or why not. With
   /// `may_keep` variables are those of the last reading, in their order, where
-  /// the same parameter blocks vary.
-  std::string Read(bool may_keep);
+  /// the same parameter blocks vary. `changes` since the last reading may be
+  /// null: anything may have changed.
+  std::string Read(bool may_keep, const ProblemChanges* changes = nullptr);
 
   /// Reads it once more after Read(), and keeps nothing: what is found does not
   /// depend on what was before.
   std::string ReadAnew();
+
+  /// Whether nothing has changed since the last reading: all of it is as it
+  /// was.
+  bool is_unchanged() const { return is_unchanged_; }
 
   /// Whether variables are those of the last reading.
   bool has_same_variables() const { return has_same_variables_; }
@@ -154,28 +164,37 @@ class FlatProblem {
   const TermSizes& largest() const { return largest_; }
 
  private:
-  void ReadResiduals();
-  bool FindBlocks();
+  void ReadResiduals(bool may_keep, const ProblemChanges* changes);
+  void ReadResidual(Term* term);
+  bool FindBlocks(const ProblemChanges* changes);
+  bool HasSameBlocks() const;
   bool IsSame(const Term& term, const Term& old) const;
   void IndexBlocks();
-  bool IsVariable(const Block& block) const;
+  Variable VariableOf(const Block& block) const;
+  bool HasBounds(const Variable& variable) const;
   bool KeepVariables();
   std::string MakeVariables();
   void ReadTerms();
   void ReadTerm(Term* term);
 
   ceres::Problem* problem_;
+  bool may_have_bounds_;
   // Residual blocks, the parameter blocks of all one after the other, and what
   // is known of them; the same of the last reading, and which of its terms each
   // term is (-1: none).
   std::vector<ceres::ResidualBlockId> ids_;
   std::vector<double*> users_;
+  std::vector<double*> old_users_;
   std::vector<Term> terms_;
   std::vector<Argument> arguments_;
   std::vector<Term> old_terms_;
   std::vector<Argument> old_arguments_;
   std::vector<int> old_of_;
   bool keeps_terms_ = false;
+  bool is_unchanged_ = false;
+  std::vector<ceres::ResidualBlockId> last_ids_;
+  AddressIndex added_;
+  std::vector<double*> read_;
   bool has_same_variables_ = false;
   // Blocks by address.
   std::vector<Block> blocks_;

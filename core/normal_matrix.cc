@@ -2,6 +2,7 @@
 #include <suitesparse/cholmod.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 
 namespace plumbline {
@@ -10,6 +11,14 @@ namespace {
 using Argument = FlatProblem::Argument;
 using Term = FlatProblem::Term;
 using Variable = FlatProblem::Variable;
+
+// gradient += a' residual for a row-major Jacobian.
+template <int kRows, int kA>
+void AddGradient(const double* a, const double* residual, double* gradient) {
+  for (int r = 0; r < kRows; ++r) {
+    for (int i = 0; i < kA; ++i) gradient[i] += a[r * kA + i] * residual[r];
+  }
+}
 
 // destination (columns `stride` apart) += a' b for row-major Jacobians.
 template <int kRows, int kA, int kB>
@@ -24,32 +33,72 @@ void AddProduct(const double* a, const double* b, double* destination,
   }
 }
 
-template <int kRows>
-bool AddUsualProduct(int size_a, int size_b, const double* a, const double* b,
-                     double* destination, int stride) {
-  if (size_a == 3 && size_b == 3) {
-    AddProduct<kRows, 3, 3>(a, b, destination, stride);
-  } else if (size_a == 3 && size_b == 2) {
-    AddProduct<kRows, 3, 2>(a, b, destination, stride);
-  } else if (size_a == 2 && size_b == 3) {
-    AddProduct<kRows, 2, 3>(a, b, destination, stride);
-  } else if (size_a == 2 && size_b == 2) {
-    AddProduct<kRows, 2, 2>(a, b, destination, stride);
-  } else {
-    return false;
+// destination += a' a.
+template <int kRows, int kA>
+void AddSquare(const double* a, double* destination, int stride) {
+  for (int j = 0; j < kA; ++j) {
+    for (int i = 0; i <= j; ++i) {
+      double sum = 0.0;
+      for (int r = 0; r < kRows; ++r) sum += a[r * kA + i] * a[r * kA + j];
+      destination[j * stride + i] += sum;
+      if (i != j) destination[i * stride + j] += sum;
+    }
   }
-  return true;
 }
+
+// What a term of two variables adds: its Jacobians, and where the squares and
+// the product go.
+struct PairSums {
+  const double* a;
+  const double* b;
+  const double* residual;
+  double* gradient_a;
+  double* gradient_b;
+  double* square_a;
+  double* square_b;
+  double* product;
+  int stride_a;
+  int stride_b;
+  int stride;
+  bool is_turned;
+};
+
+template <int kRows, int kA, int kB>
+void AddPair(const PairSums& sums) {
+  AddGradient<kRows, kA>(sums.a, sums.residual, sums.gradient_a);
+  AddGradient<kRows, kB>(sums.b, sums.residual, sums.gradient_b);
+  AddSquare<kRows, kA>(sums.a, sums.square_a, sums.stride_a);
+  if (sums.is_turned) {
+    AddProduct<kRows, kB, kA>(sums.b, sums.a, sums.product, sums.stride);
+  } else {
+    AddProduct<kRows, kA, kB>(sums.a, sums.b, sums.product, sums.stride);
+  }
+  AddSquare<kRows, kB>(sums.b, sums.square_b, sums.stride_b);
+}
+
+// Sizes for which loops are of fixed length.
+constexpr int kUsualSize = 3;
+using AddPairFunction = void (*)(const PairSums&);
+
+template <int kRows, int kA>
+constexpr std::array<AddPairFunction, kUsualSize> PairsOf() {
+  return {&AddPair<kRows, kA, 1>, &AddPair<kRows, kA, 2>,
+          &AddPair<kRows, kA, 3>};
+}
+
+template <int kRows>
+constexpr std::array<std::array<AddPairFunction, kUsualSize>, kUsualSize>
+PairsOfRows() {
+  return {PairsOf<kRows, 1>(), PairsOf<kRows, 2>(), PairsOf<kRows, 3>()};
+}
+
+// By rows and by the sizes of both tangents, from one on.
+constexpr std::array<
+    std::array<std::array<AddPairFunction, kUsualSize>, kUsualSize>, kUsualSize>
+    kAddPair = {PairsOfRows<1>(), PairsOfRows<2>(), PairsOfRows<3>()};
 
 void AddProduct(int rows, int size_a, int size_b, const double* a,
                 const double* b, double* destination, int stride) {
-  const auto usual = rows == 3   ? &AddUsualProduct<3>
-                     : rows == 2 ? &AddUsualProduct<2>
-                     : rows == 1 ? &AddUsualProduct<1>
-                                 : nullptr;
-  if (usual != nullptr && usual(size_a, size_b, a, b, destination, stride)) {
-    return;
-  }
   for (int j = 0; j < size_b; ++j) {
     for (int i = 0; i < size_a; ++i) {
       double sum = 0.0;
@@ -172,20 +221,20 @@ bool NormalMatrix::is_analysed() const {
   return factorization_->factor != nullptr;
 }
 
-// Whether the block of two variables has those of `a` as rows.
-bool NormalMatrix::IsRow(int a, int b) const {
-  return a == b || (rank_[a] < rank_[b]) != is_lower_;
-}
-
-// Where the block of two variables begins in the values; -1: nowhere.
-int NormalMatrix::PlaceOf(int a, int b) const {
-  const int row = IsRow(a, b) ? rank_[a] : rank_[b];
-  const int column = IsRow(a, b) ? rank_[b] : rank_[a];
+// Of the products of two variables.
+NormalMatrix::Place NormalMatrix::PlaceOf(int a, int b) const {
+  Place place;
+  place.is_turned = a != b && (rank_[a] < rank_[b]) == is_lower_;
+  place.stride = stride_[place.is_turned ? a : b];
+  const int row = rank_[place.is_turned ? b : a];
+  const int column = rank_[place.is_turned ? a : b];
   const auto begin = block_rows_.begin() + block_begin_[column];
   const auto end = block_rows_.begin() + block_begin_[column + 1];
   const auto found = std::lower_bound(begin, end, row);
-  if (found == end || *found != row) return -1;
-  return block_places_[found - block_rows_.begin()];
+  if (found != end && *found == row) {
+    place.begin = block_places_[found - block_rows_.begin()];
+  }
+  return place;
 }
 
 // Finds the places of a term's products.
@@ -193,7 +242,7 @@ bool NormalMatrix::LookUp(const FlatProblem& problem, const Term& term) {
   bool has_all = true;
   ForProducts(problem, term, [&](int product, int a, int b) {
     places_[product] = PlaceOf(a, b);
-    has_all = has_all && places_[product] >= 0;
+    has_all = has_all && places_[product].begin >= 0;
   });
   return has_all;
 }
@@ -305,6 +354,7 @@ void NormalMatrix::LayOut(const FlatProblem& problem, bool has_lower) {
     }
   }
   values_.assign(rows_.size(), 0.0);
+  other_values_.resize(rows_.size());
   damped_.resize(rows_.size());
   places_.resize(problem.num_products());
   for (const Term& term : problem.terms()) LookUp(problem, term);
@@ -330,27 +380,53 @@ bool NormalMatrix::Analyse(const FlatProblem& problem) {
 void NormalMatrix::SetZero() { std::fill(values_.begin(), values_.end(), 0.0); }
 
 void NormalMatrix::Add(const FlatProblem& problem, const Term& term,
-                       double* const* jacobians) {
-  const std::vector<Argument>& arguments = problem.arguments();
-  const std::vector<Variable>& variables = problem.variables();
-  int product = term.products;
-  for (int i = term.begin; i < term.end; ++i) {
-    const int first = arguments[i].variable;
-    if (first < 0) continue;
-    const double* const jacobian = jacobians[i - term.begin];
-    const int size = variables[first].tangent_size;
-    for (int j = i; j < term.end; ++j) {
-      const int second = arguments[j].variable;
-      if (second < 0) continue;
-      const double* const other = jacobians[j - term.begin];
-      const int other_size = variables[second].tangent_size;
-      double* const place = values_.data() + places_[product++];
-      if (IsRow(first, second)) {
-        AddProduct(term.rows, size, other_size, jacobian, other, place,
-                   stride_[second]);
+                       const double* const* jacobians, const double* residual,
+                       double* gradient) {
+  const Argument* const arguments = &problem.arguments()[term.begin];
+  const Place* const places = &places_[term.products];
+  const int count = term.end - term.begin;
+  if (count == 2 && term.num_variables == 2 && term.rows <= kUsualSize &&
+      arguments[0].tangent_size <= kUsualSize &&
+      arguments[1].tangent_size <= kUsualSize) {
+    PairSums sums;
+    sums.a = jacobians[0];
+    sums.b = jacobians[1];
+    sums.residual = residual;
+    sums.gradient_a = gradient + column_[arguments[0].variable];
+    sums.gradient_b = gradient + column_[arguments[1].variable];
+    sums.square_a = &values_[places[0].begin];
+    sums.product = &values_[places[1].begin];
+    sums.square_b = &values_[places[2].begin];
+    sums.stride_a = places[0].stride;
+    sums.stride = places[1].stride;
+    sums.stride_b = places[2].stride;
+    sums.is_turned = places[1].is_turned;
+    kAddPair[term.rows - 1][arguments[0].tangent_size - 1]
+            [arguments[1].tangent_size - 1](sums);
+    return;
+  }
+  int product = 0;
+  for (int i = 0; i < count; ++i) {
+    if (arguments[i].variable < 0) continue;
+    const double* const jacobian = jacobians[i];
+    const int size = arguments[i].tangent_size;
+    double* const g = gradient + column_[arguments[i].variable];
+    for (int r = 0; r < term.rows; ++r) {
+      for (int c = 0; c < size; ++c) {
+        g[c] += jacobian[r * size + c] * residual[r];
+      }
+    }
+    for (int j = i; j < count; ++j) {
+      if (arguments[j].variable < 0) continue;
+      const int other_size = arguments[j].tangent_size;
+      const Place& place = places[product++];
+      double* const begin = &values_[place.begin];
+      if (place.is_turned) {
+        AddProduct(term.rows, other_size, size, jacobians[j], jacobian, begin,
+                   place.stride);
       } else {
-        AddProduct(term.rows, other_size, size, other, jacobian, place,
-                   stride_[first]);
+        AddProduct(term.rows, size, other_size, jacobian, jacobians[j], begin,
+                   place.stride);
       }
     }
   }
@@ -371,6 +447,11 @@ bool NormalMatrix::SolveDamped(const Eigen::VectorXd& scale,
   matrix.xtype = CHOLMOD_REAL;
   matrix.x = damped_.data();
   return factorization_->Factorize(matrix) && factorization_->Solve(right, y);
+}
+
+bool NormalMatrix::SolveAgain(const Eigen::VectorXd& right,
+                              Eigen::VectorXd* y) {
+  return factorization_->Solve(right, y);
 }
 
 double NormalMatrix::LeastPivot() {

@@ -40,9 +40,15 @@ class NormalMatrix {
   void SetZero();
 
   /// Adds the products of a term's Jacobians with respect to tangents, one for
-  /// each of its arguments (row by row; none for constant ones).
+  /// each of its arguments (row by row; none for constant ones), and to the
+  /// gradient J'r, which has a number for each column, those with its residual.
   void Add(const FlatProblem& problem, const FlatProblem::Term& term,
-           double* const* jacobians);
+           const double* const* jacobians, const double* residual,
+           double* gradient);
+
+  /// Exchanges the entries for a second set, which is there to be set to zero
+  /// and filled in while the first one may still be needed.
+  void SwapEntries() { values_.swap(other_values_); }
 
   /// An entry of the diagonal.
   double Diagonal(int column) const { return values_[diagonal_[column]]; }
@@ -52,14 +58,26 @@ class NormalMatrix {
   bool SolveDamped(const Eigen::VectorXd& scale, const Eigen::VectorXd& damping,
                    const Eigen::VectorXd& right, Eigen::VectorXd* y);
 
+  /// Solves with the last factorization, of whatever entries it was.
+  bool SolveAgain(const Eigen::VectorXd& right, Eigen::VectorXd* y);
+
   /// The least pivot of the last factorization over the largest.
   double LeastPivot();
 
  private:
   struct Factorization;
 
-  bool IsRow(int a, int b) const;
-  int PlaceOf(int a, int b) const;
+  // Where the product of two variables' Jacobians goes in the values.
+  struct Place {
+    // -1: nowhere.
+    int begin = -1;
+    // How far apart its columns are.
+    int stride = 0;
+    // Whether the second variable has the rows.
+    bool is_turned = false;
+  };
+
+  Place PlaceOf(int a, int b) const;
   bool LookUp(const FlatProblem& problem, const FlatProblem::Term& term);
   void BlockPattern(const FlatProblem& problem, bool has_lower);
   bool Order(const FlatProblem& problem);
@@ -77,15 +95,16 @@ class NormalMatrix {
   std::vector<int> column_begin_;
   std::vector<int> rows_;
   std::vector<double> values_;
+  std::vector<double> other_values_;
   std::vector<double> damped_;
   std::vector<int> diagonal_;
   std::vector<int> block_begin_;
   std::vector<int> block_rows_;
   std::vector<int> block_places_;
   std::vector<int> stride_;
-  // Where products begin in the values, now and at the last reading.
-  std::vector<int> places_;
-  std::vector<int> old_places_;
+  // Of products, now and at the last reading.
+  std::vector<Place> places_;
+  std::vector<Place> old_places_;
   std::unique_ptr<Factorization> factorization_;
   int num_analyses_ = 0;
 };

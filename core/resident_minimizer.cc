@@ -23,6 +23,15 @@ namespace {
 constexpr double kLeastPivot = 1e-12;
 // What a step may raise the cost to that is hoped to be made up for.
 constexpr double kLargestRise = 2.0;
+// Steps that promise less than this many times what ends a solve may be the
+// last one.
+constexpr double kMayBeLast = 10.0;
+// What the last factorization promises of another step, over the change that
+// ends a solve, below which none is made; how much of the cost the last step
+// may have changed then, and how far from its promise.
+constexpr double kNotWorthAStep = 0.5;
+constexpr double kSmallChange = 0.1;
+constexpr double kKeptPromise = 0.25;
 
 using Variable = FlatProblem::Variable;
 
@@ -85,12 +94,15 @@ class StepJudge {
 struct ResidentMinimizer::Impl {
   class Minimization;
 
-  explicit Impl(ceres::Problem* problem) : flat(problem), evaluator(&flat) {}
+  Impl(ceres::Problem* problem, bool may_have_bounds)
+      : flat(problem, may_have_bounds), evaluator(&flat) {}
 
   // Reads the problem as it is now; empty when it can be solved, or why not.
   // What is as it was at the last solve is taken over.
-  std::string Read() {
-    std::string fault = flat.Read(matrix.is_analysed() && !is_forgotten);
+  std::string Read(const ProblemChanges* changes) {
+    std::string fault =
+        flat.Read(matrix.is_analysed() && !is_forgotten, changes);
+    if (flat.is_unchanged()) return fault;
     has_places =
         fault.empty() && flat.has_same_variables() && matrix.FindPlaces(flat);
     if (fault.empty() && flat.has_same_variables() && !has_places) {
@@ -120,6 +132,21 @@ struct ResidentMinimizer::Impl {
       return has_places;
     };
     return evaluator.Linearize(state, analyse, &matrix, &gradient, cost);
+  }
+
+  // The same at another state, beside those of the state; exchanged for them by
+  // SwapLinearization().
+  bool LinearizeBeside(const Eigen::VectorXd& other, double* cost) {
+    SwapLinearization();
+    const bool is_done =
+        evaluator.Linearize(other, nullptr, &matrix, &gradient, cost);
+    SwapLinearization();
+    return is_done;
+  }
+
+  void SwapLinearization() {
+    matrix.SwapEntries();
+    gradient.swap(other_gradient);
   }
 
   bool Plus(const Eigen::VectorXd& x, const Eigen::VectorXd& delta,
@@ -173,16 +200,19 @@ struct ResidentMinimizer::Impl {
   Eigen::VectorXd state;
   Eigen::VectorXd moved;
   Eigen::VectorXd gradient;
+  Eigen::VectorXd other_gradient;
 };
 
 // One solve: the loop of Ceres' trust region minimizer, by the same names.
 class ResidentMinimizer::Impl::Minimization {
  public:
   // All must outlive it; `summary` is as it is made.
-  Minimization(const ceres::Solver::Options& options, Damping damping, Impl* m,
+  Minimization(const ceres::Solver::Options& options, Damping damping,
+               const ProblemChanges* changes, Impl* m,
                ceres::Solver::Summary* summary)
       : options_(options),
         damping_(damping),
+        changes_(changes),
         m_(*m),
         summary_(*summary),
         radius_(options.initial_trust_region_radius) {}
@@ -209,7 +239,7 @@ class ResidentMinimizer::Impl::Minimization {
     summary_.jacobian_evaluation_time_in_seconds = 0.0;
     std::string fault;
     m_.evaluator.SetNumThreads(options_.num_threads);
-    if (options_.IsValid(&fault)) fault = m_.Read();
+    if (options_.IsValid(&fault)) fault = m_.Read(changes_);
     if (!fault.empty()) return End(ceres::FAILURE, fault);
     m_.TakeState();
     summary_.fixed_cost = 0.0;
@@ -256,6 +286,7 @@ class ResidentMinimizer::Impl::Minimization {
     StartIteration(0);
     NoteLinearization();
     while (FinalizeIterationAndCheckIfMinimizerCanContinue()) {
+      if (IsAtTheEnd()) return;
       StartIteration(step_.iteration + 1);
       if (!ComputeStep()) {
         if (!HandleInvalidStep()) return;
@@ -342,6 +373,25 @@ class ResidentMinimizer::Impl::Minimization {
     return true;
   }
 
+  // Whether another step would change the cost by much less than what ends a
+  // solve, by the last factorization: after a step that kept its promise the
+  // matrix is nearly the same. It saves the factorization and the evaluation
+  // that would find it out.
+  bool IsAtTheEnd() {
+    if (!step_.step_is_successful || excursion_ > 0 ||
+        std::abs(step_.cost_change - model_change_) >
+            kKeptPromise * model_change_ ||
+        step_.cost_change > kSmallChange * cost_ ||
+        !m_.matrix.SolveAgain(-scaled_gradient_, &y_)) {
+      return false;
+    }
+    const double promised = -0.5 * scaled_gradient_.dot(y_);
+    if (!(promised <= kNotWorthAStep * options_.function_tolerance * cost_)) {
+      return false;
+    }
+    return !End(ceres::CONVERGENCE, "Function tolerance reached.");
+  }
+
   // False when it leads nowhere.
   bool ComputeStep() {
     const ScopedTimer timer(&summary_.linear_solver_time_in_seconds);
@@ -373,17 +423,31 @@ class ResidentMinimizer::Impl::Minimization {
   void ComputeCandidate() {
     invalid_steps_ = 0;
     const Eigen::VectorXd delta = scale_.cwiseProduct(y_);
-    {
-      const ScopedTimer timer(&summary_.residual_evaluation_time_in_seconds);
-      if (!m_.Plus(m_.state, delta, &candidate_) || !candidate_.allFinite() ||
-          !m_.evaluator.Cost(/*is_fixed=*/false, candidate_,
-                             &candidate_cost_)) {
-        candidate_cost_ = std::numeric_limits<double>::max();
-      }
-      ++summary_.num_residual_evaluations;
+    is_linearized_ = false;
+    if (!m_.Plus(m_.state, delta, &candidate_) || !candidate_.allFinite()) {
+      candidate_cost_ = std::numeric_limits<double>::max();
+    } else {
+      EvaluateCandidate();
     }
     step_.step_norm = (candidate_ - m_.state).norm();
     step_.cost_change = cost_ - candidate_cost_;
+  }
+
+  // Most steps are taken, and need the linearization as well as the cost: both
+  // come at once unless the step may be the last one.
+  void EvaluateCandidate() {
+    if (decrease_factor_ == kFirstDecrease &&
+        model_change_ > kMayBeLast * options_.function_tolerance * cost_) {
+      const ScopedTimer timer(&summary_.jacobian_evaluation_time_in_seconds);
+      ++summary_.num_jacobian_evaluations;
+      is_linearized_ = m_.LinearizeBeside(candidate_, &candidate_cost_);
+      if (is_linearized_) return;
+    }
+    const ScopedTimer timer(&summary_.residual_evaluation_time_in_seconds);
+    ++summary_.num_residual_evaluations;
+    if (!m_.evaluator.Cost(/*is_fixed=*/false, candidate_, &candidate_cost_)) {
+      candidate_cost_ = std::numeric_limits<double>::max();
+    }
   }
 
   bool ParameterToleranceReached() {
@@ -458,7 +522,10 @@ class ResidentMinimizer::Impl::Minimization {
     ++summary_.num_successful_steps;
     m_.state = candidate_;
     judge_->Accept(candidate_cost_, model_change_);
-    if (!Linearize()) {
+    if (is_linearized_) {
+      m_.SwapLinearization();
+      cost_ = candidate_cost_;
+    } else if (!Linearize()) {
       is_usable_ = false;
       return End(ceres::FAILURE,
                  "Residual and Jacobian evaluation failed after a step.");
@@ -470,7 +537,7 @@ class ResidentMinimizer::Impl::Minimization {
           radius_ /
               std::max(1.0 / 3.0,
                        1.0 - std::pow(2.0 * step_.relative_decrease - 1.0, 3)));
-      decrease_factor_ = 2.0;
+      decrease_factor_ = kFirstDecrease;
     }
     if (cost_ < best_cost_) {
       best_cost_ = cost_;
@@ -516,8 +583,13 @@ class ResidentMinimizer::Impl::Minimization {
     return false;
   }
 
+  // By what the radius is divided after a step that is not taken; after another
+  // one by its double, and so on.
+  static constexpr double kFirstDecrease = 2.0;
+
   const ceres::Solver::Options& options_;
   const Damping damping_;
+  const ProblemChanges* const changes_;
   Impl& m_;
   ceres::Solver::Summary& summary_;
   const Stopwatch watch_;
@@ -540,7 +612,7 @@ class ResidentMinimizer::Impl::Minimization {
   Eigen::VectorXd normal_diagonal_;
 
   double radius_;
-  double decrease_factor_ = 2.0;
+  double decrease_factor_ = kFirstDecrease;
   int invalid_steps_ = 0;
 
   // The step under way.
@@ -549,10 +621,13 @@ class ResidentMinimizer::Impl::Minimization {
   double model_change_ = 0.0;
   Eigen::VectorXd candidate_;
   double candidate_cost_ = 0.0;
+  // Whether the linearization at the candidate is there, beside the other one.
+  bool is_linearized_ = false;
 };
 
-ResidentMinimizer::ResidentMinimizer(ceres::Problem* problem)
-    : impl_(std::make_unique<Impl>(problem)) {}
+ResidentMinimizer::ResidentMinimizer(ceres::Problem* problem,
+                                     bool may_have_bounds)
+    : impl_(std::make_unique<Impl>(problem, may_have_bounds)) {}
 
 ResidentMinimizer::~ResidentMinimizer() = default;
 
@@ -563,10 +638,10 @@ int ResidentMinimizer::num_analyses() const {
 }
 
 void ResidentMinimizer::Solve(const ceres::Solver::Options& options,
-                              ceres::Solver::Summary* summary,
-                              Damping damping) {
+                              ceres::Solver::Summary* summary, Damping damping,
+                              const ProblemChanges* changes) {
   *summary = ceres::Solver::Summary();
-  Impl::Minimization(options, damping, impl_.get(), summary).Run();
+  Impl::Minimization(options, damping, changes, impl_.get(), summary).Run();
 }
 
 }  // namespace plumbline

@@ -3,6 +3,7 @@
 
 #include <ceres/problem.h>
 #include <ceres/solver.h>
+#include <plumbline/core/problem_changes.h>
 
 #include <memory>
 
@@ -21,12 +22,16 @@ namespace plumbline {
 /// Cost functions, losses, manifolds and constant parameter blocks are those of
 /// the problem, steps, radii and reasons to stop those of ceres::Solve() with
 /// LEVENBERG_MARQUARDT and SPARSE_NORMAL_CHOLESKY: both come to the same
-/// minimum.
+/// minimum. A last step that would but find out that nothing is left is not
+/// made where the factorization before it tells so: it would have been
+/// evaluated and not taken.
 class ResidentMinimizer {
  public:
   /// The problem is not owned and must outlive the minimizer. It may change
-  /// between solves.
-  explicit ResidentMinimizer(ceres::Problem* problem);
+  /// between solves. `may_have_bounds`: false where it is known that no
+  /// parameter has bounds, which are then not looked for.
+  explicit ResidentMinimizer(ceres::Problem* problem,
+                             bool may_have_bounds = true);
   ResidentMinimizer(const ResidentMinimizer&) = delete;
   ResidentMinimizer& operator=(const ResidentMinimizer&) = delete;
   ~ResidentMinimizer();
@@ -56,10 +61,12 @@ class ResidentMinimizer {
   /// (bounds that are set between two solves, when variables stay the same, are
   /// not noticed). Of `summary` it fills in what says how the solve ended:
   /// termination_type, message, costs, iterations, counts of steps and linear
-  /// solves, and times.
+  /// solves, and times. `changes` since the last call may be null: then the
+  /// whole problem is read anew.
   void Solve(const ceres::Solver::Options& options,
              ceres::Solver::Summary* summary,
-             Damping damping = Damping::kAsGiven);
+             Damping damping = Damping::kAsGiven,
+             const ProblemChanges* changes = nullptr);
 
   /// Has the next solve analyse the problem anew. To be called when a parameter
   /// block has been freed: another one may come to lie at its address, and

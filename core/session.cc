@@ -33,6 +33,8 @@ constexpr double kDenseWork = 3e5;
 // Steps in a row that may lead uphill on the way to a lower cost.
 constexpr int kUphillSteps = 3;
 constexpr int kUnknownRank = -1;
+// Residual blocks added, for each that there is, of which account is kept.
+constexpr std::size_t kAddedPerResidual = 4;
 // Constraints whose cost one thread computes at a time.
 constexpr std::size_t kCostsAtOnce = 1024;
 
@@ -181,6 +183,9 @@ struct Block {
   int residuals = 0;
   // As the problem has it.
   bool constant = false;
+  // As the feature was when the gauge was found.
+  bool fixed = false;
+  int level = 0;
 };
 
 struct Residual {
@@ -195,6 +200,15 @@ struct Residual {
   int degrees_of_freedom = kUnknownRank;
 };
 
+// A constraint as an edge, for the parts of the graph.
+struct Link {
+  bool is_live = false;
+  // The second is the first where it has one feature alone.
+  FeatureId first = 0;
+  FeatureId second = 0;
+  bool has_more = false;
+};
+
 }  // namespace
 
 struct SolverSession::Impl {
@@ -207,7 +221,8 @@ struct SolverSession::Impl {
     totals.usable = true;
     totals.converged = true;
     if (options.minimizer == "resident") {
-      resident = std::make_unique<ResidentMinimizer>(&problem);
+      resident = std::make_unique<ResidentMinimizer>(&problem,
+                                                     /*may_have_bounds=*/false);
     } else if (options.minimizer != "ceres") {
       throw PLUMBLINE_ERROR("unknown minimizer \"" + options.minimizer + "\"",
                             "ceres or resident");
@@ -234,12 +249,16 @@ struct SolverSession::Impl {
     if (blocks.size() <= index) blocks.resize(index + 1);
     blocks[index].feature = feature;
     blocks[index].type = InfoOf(feature->type);
+    has_gauge = false;
   }
 
   // Makes cost and loss; they are not in the problem yet.
   void AddConstraint(const Constraint& constraint) {
     const std::size_t index = static_cast<std::size_t>(constraint.id);
-    if (residuals.size() <= index) residuals.resize(index + 1);
+    if (residuals.size() <= index) {
+      residuals.resize(index + 1);
+      links.resize(index + 1);
+    }
     auto residual = std::make_unique<Residual>();
     residual->cost = MakeCost(constraint);
     if (constraint.kind == ConstraintClass::kStructure) {
@@ -252,6 +271,7 @@ struct SolverSession::Impl {
 
   void AddResidual(const Constraint& constraint) {
     Residual& residual = ResidualOf(constraint.id);
+    has_gauge = false;
     std::vector<double*> parameters;
     parameters.reserve(constraint.features.size());
     for (const FeatureId id : constraint.features) {
@@ -261,21 +281,42 @@ struct SolverSession::Impl {
                                   block.feature->type->size,
                                   block.type->manifold.get());
         block.constant = false;
+        changes.parameter_blocks = true;
       }
       parameters.push_back(block.feature->data());
     }
     residual.id = problem.AddResidualBlock(residual.cost.get(),
                                            residual.loss.get(), parameters);
+    NoteAdded(residual.id);
+    num_rows += constraint.type->residual_size;
+    Link& link = links[constraint.id];
+    link.is_live = true;
+    link.first = constraint.features.front();
+    link.second = constraint.features[constraint.features.size() > 1 ? 1 : 0];
+    link.has_more = constraint.features.size() > 2;
+  }
+
+  void NoteAdded(ceres::ResidualBlockId id) {
+    // Where small problems never come to the resident minimizer.
+    knows_changes = knows_changes &&
+                    changes.added.size() <=
+                        kAddedPerResidual * static_cast<std::size_t>(
+                                                problem.NumResidualBlocks());
+    if (knows_changes) changes.added.push_back(id);
   }
 
   void RemoveResidual(const Constraint& constraint) {
     Residual& residual = ResidualOf(constraint.id);
+    has_gauge = false;
     problem.RemoveResidualBlock(residual.id);
     residual.id = nullptr;
+    num_rows -= constraint.type->residual_size;
+    links[constraint.id].is_live = false;
     for (const FeatureId id : constraint.features) {
       Block& block = blocks[id];
       if (--block.residuals == 0) {
         problem.RemoveParameterBlock(block.feature->data());
+        changes.parameter_blocks = true;
       }
     }
   }
@@ -283,6 +324,7 @@ struct SolverSession::Impl {
   void SetConstant(Block* block, bool constant) {
     if (block->constant == constant) return;
     block->constant = constant;
+    changes.parameter_blocks = true;
     if (constant) {
       problem.SetParameterBlockConstant(block->feature->data());
     } else {
@@ -297,23 +339,26 @@ struct SolverSession::Impl {
   std::vector<Block*> GaugeBlocks() {
     DisjointSets parts(blocks.size());
     std::vector<bool> is_tied(blocks.size(), false);
-    for (std::size_t i = 0; i < residuals.size(); ++i) {
-      if (residuals[i] == nullptr || residuals[i]->id == nullptr) continue;
-      const std::vector<FeatureId>& features =
-          graph->FindConstraint(static_cast<ConstraintId>(i))->features;
-      if (features.size() == 1) is_tied[features[0]] = true;
-      for (std::size_t j = 1; j < features.size(); ++j) {
-        parts.Join(static_cast<std::size_t>(features[0]),
-                   static_cast<std::size_t>(features[j]));
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      const Link& link = links[i];
+      if (!link.is_live) continue;
+      if (link.first == link.second) is_tied[link.first] = true;
+      parts.Join(static_cast<std::size_t>(link.first),
+                 static_cast<std::size_t>(link.second));
+      if (!link.has_more) continue;
+      for (const FeatureId feature :
+           graph->FindConstraint(static_cast<ConstraintId>(i))->features) {
+        parts.Join(static_cast<std::size_t>(link.first),
+                   static_cast<std::size_t>(feature));
       }
     }
     std::vector<Block*> lowest(blocks.size(), nullptr);
-    std::vector<bool> has_gauge(blocks.size(), false);
+    std::vector<bool> is_held(blocks.size(), false);
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       Block& block = blocks[i];
       if (block.residuals == 0) continue;
       const std::size_t part = parts.Find(i);
-      if (block.feature->fixed || is_tied[i]) has_gauge[part] = true;
+      if (block.feature->fixed || is_tied[i]) is_held[part] = true;
       if (lowest[part] == nullptr ||
           block.feature->level < lowest[part]->feature->level) {
         lowest[part] = &block;
@@ -321,7 +366,7 @@ struct SolverSession::Impl {
     }
     std::vector<Block*> held;
     for (std::size_t i = 0; i < blocks.size(); ++i) {
-      if (lowest[i] != nullptr && !has_gauge[i]) held.push_back(lowest[i]);
+      if (lowest[i] != nullptr && !is_held[i]) held.push_back(lowest[i]);
     }
     return held;
   }
@@ -393,10 +438,15 @@ struct SolverSession::Impl {
         solver.max_consecutive_nonmonotonic_steps = kUphillSteps;
         resident->Solve(solver, &summary,
                         is_coarse ? ResidentMinimizer::Damping::kAsGiven
-                                  : ResidentMinimizer::Damping::kWhereNeeded);
+                                  : ResidentMinimizer::Damping::kWhereNeeded,
+                        knows_changes ? &changes : nullptr);
+        knows_changes = true;
+        changes.parameter_blocks = false;
+        changes.added.clear();
       } else {
         // Of a problem that is there but once.
-        ResidentMinimizer(solved).Solve(solver, &summary);
+        ResidentMinimizer(solved, /*may_have_bounds=*/false)
+            .Solve(solver, &summary);
       }
       report.usable = summary.IsSolutionUsable();
       report.converged = !stop_when_asked.has_stopped() &&
@@ -435,20 +485,40 @@ struct SolverSession::Impl {
   SolveReport SolveGlobal(double function_tolerance, double trust_region_radius,
                           bool is_coarse) {
     const Stopwatch watch;
-    for (Block& block : blocks) {
-      if (block.residuals > 0) SetConstant(&block, block.feature->fixed);
-    }
-    for (Block* block : GaugeBlocks()) SetConstant(block, true);
-    std::vector<Block*> variables;
-    int columns = 0;
-    for (Block& block : blocks) {
-      if (block.residuals == 0 || block.constant) continue;
+    if (!HasGauge()) HoldGauge();
+    return Solve(&problem, variables, problem.NumResidualBlocks(), num_rows,
+                 num_columns, options.num_threads, function_tolerance,
+                 trust_region_radius, is_coarse, watch);
+  }
+
+  // Whether what varies is known, and found from features as they are.
+  bool HasGauge() const {
+    return has_gauge &&
+           std::all_of(blocks.begin(), blocks.end(), [](const Block& block) {
+             return block.residuals == 0 ||
+                    (block.fixed == block.feature->fixed &&
+                     block.level == block.feature->level);
+           });
+  }
+
+  // Finds what varies, and has the problem hold the rest.
+  void HoldGauge() {
+    const std::vector<Block*> held = GaugeBlocks();
+    std::vector<char> is_held(blocks.size(), 0);
+    for (const Block* block : held) is_held[block - blocks.data()] = 1;
+    variables.clear();
+    num_columns = 0;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      Block& block = blocks[i];
+      if (block.residuals == 0) continue;
+      block.fixed = block.feature->fixed;
+      block.level = block.feature->level;
+      SetConstant(&block, block.fixed || is_held[i] != 0);
+      if (block.constant) continue;
       variables.push_back(&block);
-      columns += block.feature->type->size;
+      num_columns += block.feature->type->size;
     }
-    return Solve(&problem, variables, problem.NumResidualBlocks(),
-                 problem.NumResiduals(), columns, options.num_threads,
-                 function_tolerance, trust_region_radius, is_coarse, watch);
+    has_gauge = true;
   }
 
   void AddToTotals(const SolveReport& report) {
@@ -550,7 +620,18 @@ struct SolverSession::Impl {
   // Costs, losses and manifolds must outlive the problem: it comes last.
   std::map<const FeatureType*, TypeInfo> types;
   std::vector<Block> blocks;
+  // By the ids of constraints, both.
   std::vector<std::unique_ptr<Residual>> residuals;
+  std::vector<Link> links;
+  // Whether the blocks that vary are known; their number of parameters, and the
+  // rows of all residuals.
+  bool has_gauge = false;
+  std::vector<Block*> variables;
+  int num_columns = 0;
+  int num_rows = 0;
+  // Of the problem since the resident minimizer read it.
+  bool knows_changes = false;
+  ProblemChanges changes;
   std::function<bool()> stop;
   SolveReport totals;
   int num_solves = 0;
@@ -567,6 +648,7 @@ SolverSession::SolverSession(Graph* graph, const Registry& registry,
   // them again and again.
   const auto constraints = std::as_const(*graph).Constraints();
   impl_->residuals.reserve(constraints.size());
+  impl_->links.reserve(constraints.size());
   for (const Constraint* constraint : constraints) {
     impl_->AddConstraint(*constraint);
   }
@@ -729,6 +811,7 @@ void SolverSession::OnFeatureAdded(const Feature& feature) {
 
 void SolverSession::OnFeatureRemoved(const Feature& feature) {
   impl_->blocks[feature.id] = Block();
+  impl_->has_gauge = false;
   if (impl_->resident != nullptr) impl_->resident->Forget();
 }
 

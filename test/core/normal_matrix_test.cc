@@ -33,7 +33,8 @@ class FlatProblemTest : public ::testing::Test {
   }
 
   // Products of the Jacobians of all terms go into the matrix.
-  void Linearize(NormalMatrix* matrix) const {
+  Eigen::VectorXd Linearize(NormalMatrix* matrix) const {
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(flat_.num_columns());
     matrix->SetZero();
     for (const FlatProblem::Term& term : flat_.terms()) {
       std::vector<double> jacobians(2);
@@ -46,9 +47,10 @@ class FlatProblemTest : public ::testing::Test {
                                                              : &jacobians[k]);
       }
       double residual;
-      ASSERT_TRUE(term.cost->Evaluate(arguments, &residual, pointers.data()));
-      matrix->Add(flat_, term, pointers.data());
+      EXPECT_TRUE(term.cost->Evaluate(arguments, &residual, pointers.data()));
+      matrix->Add(flat_, term, pointers.data(), &residual, gradient.data());
     }
+    return gradient;
   }
 
   int VariableOf(const double* value) const {
@@ -110,6 +112,43 @@ TEST_F(FlatProblemTest, KeepsWhatIsAsItWas) {
   EXPECT_EQ(flat_.variables().size(), 2u);
 }
 
+TEST_F(FlatProblemTest, WhatDidNotChangeIsNotReadAgain) {
+  Tie(0, 1, 1.0);
+  const ceres::ResidualBlockId second = Tie(1, 2, 1.0);
+  ProblemChanges changes;
+  EXPECT_EQ(flat_.Read(false, &changes), "");
+  EXPECT_FALSE(flat_.is_unchanged());
+  changes.parameter_blocks = false;
+  EXPECT_EQ(flat_.Read(true, &changes), "");
+  EXPECT_TRUE(flat_.is_unchanged());
+  EXPECT_EQ(flat_.terms().size(), 2u);
+  // Nobody says what changed: it is looked for.
+  EXPECT_EQ(flat_.Read(true), "");
+  EXPECT_FALSE(flat_.is_unchanged());
+  EXPECT_NE(flat_.KeptFrom(1), nullptr);
+
+  // Another one where one was: that it has the same address says nothing.
+  changes.added = {second};
+  EXPECT_EQ(flat_.Read(true, &changes), "");
+  EXPECT_FALSE(flat_.is_unchanged());
+  EXPECT_TRUE(flat_.has_same_variables());
+  EXPECT_NE(flat_.KeptFrom(0), nullptr);
+
+  // What was taken out is noticed.
+  problem_.RemoveResidualBlock(second);
+  Tie(0, 2, 3.0);
+  std::vector<ceres::ResidualBlockId> ids;
+  problem_.GetResidualBlocks(&ids);
+  changes.added = {ids.back()};
+  EXPECT_EQ(flat_.Read(true, &changes), "");
+  ASSERT_EQ(flat_.terms().size(), 2u);
+  const FlatProblem::Term& last = flat_.terms().back();
+  EXPECT_EQ(flat_.blocks()[flat_.arguments()[last.begin].block].user,
+            &values_[0]);
+  EXPECT_EQ(flat_.blocks()[flat_.arguments()[last.begin + 1].block].user,
+            &values_[2]);
+}
+
 TEST_F(FlatProblemTest, BoundsAreRefused) {
   Tie(0, 1, 1.0);
   problem_.SetParameterUpperBound(&values_[1], 0, 9.0);
@@ -131,10 +170,14 @@ TEST_F(FlatProblemTest, NormalMatrixSolves) {
   EXPECT_FALSE(matrix.is_analysed());
   ASSERT_TRUE(matrix.Analyse(flat_));
   EXPECT_TRUE(matrix.is_analysed());
-  Linearize(&matrix);
+  const Eigen::VectorXd gradient = Linearize(&matrix);
   const auto column = [&](int i) {
     return matrix.ColumnOf(VariableOf(&values_[i]));
   };
+  // Residuals 2 (2 - 1) and 3 (4 - 2).
+  EXPECT_EQ(gradient[column(0)], -2.0 * 2.0);
+  EXPECT_EQ(gradient[column(1)], 2.0 * 2.0 - 3.0 * 6.0);
+  EXPECT_EQ(gradient[column(2)], 3.0 * 6.0);
   EXPECT_EQ(matrix.Diagonal(column(0)), 4.0);
   EXPECT_EQ(matrix.Diagonal(column(1)), 13.0);
   EXPECT_EQ(matrix.Diagonal(column(2)), 9.0);
@@ -147,6 +190,15 @@ TEST_F(FlatProblemTest, NormalMatrixSolves) {
   EXPECT_NEAR(y[column(1)], 275.0 / 135.0, 1e-12);
   EXPECT_NEAR(y[column(2)], 288.0 / 135.0, 1e-12);
   EXPECT_GT(matrix.LeastPivot(), 0.01);
+  // The factorization is there still, whatever becomes of the entries.
+  matrix.SwapEntries();
+  matrix.SetZero();
+  Eigen::VectorXd again(3);
+  ASSERT_TRUE(matrix.SolveAgain(2.0 * right, &again));
+  EXPECT_NEAR((again - 2.0 * y).norm(), 0.0, 1e-12);
+  EXPECT_EQ(matrix.Diagonal(column(1)), 0.0);
+  matrix.SwapEntries();
+  EXPECT_EQ(matrix.Diagonal(column(1)), 13.0);
   // Without damping the common shift is undetermined.
   EXPECT_FALSE(matrix.SolveDamped(Eigen::Vector3d::Ones(),
                                   Eigen::Vector3d::Zero(), right, &y) &&

@@ -55,6 +55,16 @@ struct Curve {
   }
 };
 
+// A residual that becomes steep at 1, beside one that is always 10.
+struct Kink {
+  template <typename T>
+  bool operator()(const T* x, T* residual) const {
+    residual[0] = x[0] > 1.0 ? 1000.0 * (x[0] - 1.0) + 1.0 : x[0];
+    residual[1] = T(10.0);
+    return true;
+  }
+};
+
 // A ring of poses with chords, its measurements off by noise and some by far.
 class Ring {
  public:
@@ -156,7 +166,8 @@ TEST(ResidentMinimizerTest, TakesTheStepsOfCeres) {
   ceres::Solver::Summary expected, summary;
   ceres::Solve(options, &b.problem, &expected);
   ResidentMinimizer(&a.problem).Solve(options, &summary);
-  EXPECT_EQ(summary.num_linear_solves, expected.num_linear_solves);
+  // The last one finds out that nothing is left.
+  EXPECT_EQ(summary.num_linear_solves, expected.num_linear_solves - 1);
   EXPECT_EQ(summary.termination_type, expected.termination_type);
   ASSERT_EQ(summary.iterations.size(), expected.iterations.size());
   for (std::size_t i = 0; i < summary.iterations.size(); ++i) {
@@ -166,6 +177,23 @@ TEST(ResidentMinimizerTest, TakesTheStepsOfCeres) {
                 expected.iterations[i].trust_region_radius,
                 1e-6 * expected.iterations[i].trust_region_radius);
   }
+}
+
+// The first step, from where the residual is steep, leads to where it is not:
+// by the matrix of before next to nothing would be left, which is one part in a
+// hundred of the cost.
+TEST(ResidentMinimizerTest, AStepThatBrokeItsPromiseIsNotTheLast) {
+  double x = 1.0005;
+  ceres::Problem problem;
+  problem.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<Kink, 2, 1>(new Kink), nullptr, &x);
+  ceres::Solver::Options options = Tight();
+  options.function_tolerance = 1e-6;
+  ceres::Solver::Summary summary;
+  ResidentMinimizer(&problem).Solve(options, &summary);
+  EXPECT_EQ(summary.termination_type, ceres::CONVERGENCE);
+  EXPECT_NEAR(x, 0.0, 1e-6);
+  EXPECT_NEAR(summary.final_cost, 50.0, 1e-9);
 }
 
 TEST(ResidentMinimizerTest, ComesToTheMinimumOfCeresWithEveryLoss) {
@@ -278,6 +306,66 @@ TEST(ResidentMinimizerTest, KeepsTheAnalysisWhileConstraintsComeAndGo) {
   EXPECT_EQ(minimizer.num_analyses(), 3);
   EXPECT_NEAR(summary.final_cost, expected.final_cost,
               1e-9 * expected.final_cost);
+}
+
+// Of two rings that change in the same way the one is told what changed, the
+// other finds it out.
+TEST(ResidentMinimizerTest, WhatIsToldOfChangesIsWhatIsFoundOut) {
+  Ring told(60), found(60);
+  ResidentMinimizer told_minimizer(&told.problem,
+                                   /*may_have_bounds=*/false);
+  ResidentMinimizer found_minimizer(&found.problem);
+  ProblemChanges changes;
+  const auto solve = [&] {
+    ceres::Solver::Summary summary, expected;
+    told_minimizer.Solve(Tight(), &summary,
+                         ResidentMinimizer::Damping::kAsGiven, &changes);
+    found_minimizer.Solve(Tight(), &expected);
+    EXPECT_EQ(summary.termination_type, ceres::CONVERGENCE);
+    EXPECT_EQ(summary.num_linear_solves, expected.num_linear_solves);
+    EXPECT_EQ(summary.final_cost, expected.final_cost);
+    EXPECT_EQ(told.poses, found.poses);
+    EXPECT_EQ(told_minimizer.num_analyses(), found_minimizer.num_analyses());
+    changes = {false, {}};
+  };
+  const auto add = [&](const Step& step, int a, int b) {
+    changes.added.push_back(told.Add(step, a, b));
+    found.Add(step, a, b);
+  };
+  const auto remove = [&](std::size_t index) {
+    for (Ring* const ring : {&told, &found}) {
+      std::vector<ceres::ResidualBlockId> ids;
+      ring->problem.GetResidualBlocks(&ids);
+      ring->problem.RemoveResidualBlock(ids[index]);
+    }
+  };
+  solve();
+  // Nothing but values.
+  for (Ring* const ring : {&told, &found}) ring->poses[9][1] += 0.2;
+  solve();
+  // Those that went make room for those that come: some of these are likely to
+  // have the address of one that was there.
+  for (const std::size_t index : {70u, 90u, 75u, 3u, 20u}) {
+    remove(index);
+    add({{0.9, 0.1, 0.2}}, 12, 10);
+    add({{0.4, 0.0, 0.1}}, 30, 31);
+    solve();
+  }
+  add({{0.5, 0.0, 0.1}}, 3, 4);
+  remove(100);
+  solve();
+  // A pair that had nothing in common.
+  add({{0.0, 0.0, 0.0}}, 3, 40);
+  solve();
+  // One that no longer varies.
+  for (Ring* const ring : {&told, &found}) {
+    ring->problem.SetParameterBlockConstant(ring->poses[7].data());
+  }
+  changes.parameter_blocks = true;
+  solve();
+  EXPECT_EQ(told_minimizer.num_analyses(), 3);
+  remove(5);
+  solve();
 }
 
 // Where the parameters lie in memory changes from run to run.

@@ -6,6 +6,8 @@
 #include <charconv>
 #include <cmath>
 #include <functional>
+#include <string>
+#include <type_traits>
 
 namespace plumbline {
 namespace {
@@ -26,6 +28,36 @@ void AppendSource(const std::string& source, std::string* text) {
     }
   }
 }
+
+// Hash of numbers and texts, one after the other.
+class ByteHash {
+ public:
+  ByteHash() { bytes_.reserve(kUsualSize); }
+
+  template <typename Number>
+  void Add(const Number& number) {
+    Add(&number, 1);
+  }
+  template <typename Number, typename Count>
+  void Add(const Number* numbers, Count count) {
+    static_assert(std::is_arithmetic_v<Number> || std::is_enum_v<Number>);
+    bytes_.append(reinterpret_cast<const char*>(numbers),
+                  sizeof(Number) * static_cast<std::size_t>(count));
+  }
+
+  // Of what was added since it was last asked for.
+  std::size_t Take() {
+    const std::size_t hash = std::hash<std::string>()(bytes_);
+    bytes_.clear();
+    return hash;
+  }
+
+ private:
+  // Of a relative pose.
+  static constexpr std::size_t kUsualSize = 120;
+
+  std::string bytes_;
+};
 
 }  // namespace
 
@@ -211,22 +243,35 @@ void AppendG2oAttributes(const Constraint& constraint, std::string* text) {
 }
 
 G2oFile::Fingerprint G2oFingerprintOf(const Feature& feature) {
-  std::string element;
-  AppendG2oVertex(feature, nullptr, 0, {}, &element);
-  std::string attributes;
-  AppendG2oAttributes(feature, 0, &attributes);
-  return {std::hash<std::string>()(element),
-          std::hash<std::string>()(attributes)};
+  G2oFile::Fingerprint fingerprint;
+  ByteHash hash;
+  hash.Add(feature.parameters.data(), feature.type->size);
+  fingerprint.element = hash.Take();
+  hash.Add(feature.level);
+  hash.Add(feature.is_virtual);
+  hash.Add(feature.anchor.data(), feature.type->written_anchor_size());
+  hash.Add(feature.extent_begin);
+  hash.Add(feature.extent_end);
+  hash.Add(feature.observations);
+  hash.Add(feature.source.data(), feature.source.size());
+  fingerprint.attributes = hash.Take();
+  return fingerprint;
 }
 
 G2oFile::Fingerprint G2oFingerprintOf(
     const Constraint& constraint, const std::vector<std::int64_t>& file_ids) {
-  std::string element;
-  AppendG2oEdge(constraint, nullptr, {}, file_ids, &element);
-  std::string attributes;
-  AppendG2oAttributes(constraint, &attributes);
-  return {std::hash<std::string>()(element),
-          std::hash<std::string>()(attributes)};
+  G2oFile::Fingerprint fingerprint;
+  ByteHash hash;
+  for (const FeatureId id : constraint.features) hash.Add(file_ids[id]);
+  hash.Add(constraint.expected.data(), constraint.expected.size());
+  hash.Add(constraint.information.data(), constraint.information.size());
+  fingerprint.element = hash.Take();
+  hash.Add(constraint.kind);
+  hash.Add(constraint.state);
+  hash.Add(constraint.delta);
+  hash.Add(constraint.source.data(), constraint.source.size());
+  fingerprint.attributes = hash.Take();
+  return fingerprint;
 }
 
 }  // namespace plumbline

@@ -582,6 +582,8 @@ class GraphAssembler {
   // Returns the edge of each constraint that it added.
   std::vector<const Edge*> AddConstraints(Transaction* transaction) {
     std::vector<const Edge*> added;
+    added.reserve(records_->edges.size());
+    transaction->added_constraints().reserve(records_->edges.size());
     for (Edge& edge : records_->edges) {
       const std::size_t index = static_cast<std::size_t>(edge.line - 1);
       bool known = true;

@@ -1,10 +1,10 @@
 #include <ceres/ceres.h>
-#include <dlfcn.h>
 #include <plumbline/core/disjoint_sets.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/information.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/resident_minimizer.h>
+#include <plumbline/core/serial_openmp.h>
 #include <plumbline/core/session.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/factors/angle.h>
@@ -37,33 +37,6 @@ constexpr int kUnknownRank = -1;
 constexpr std::size_t kAddedPerResidual = 4;
 // Constraints whose cost one thread computes at a time.
 constexpr std::size_t kCostsAtOnce = 1024;
-
-// Some builds of CHOLMOD start a hard-coded number of OpenMP threads whatever
-// the machine, which makes factorizations slower. While this lives, OpenMP
-// regions started by this thread run on this thread. OpenMP is looked up at run
-// time: it is there only if the linear algebra library brought it along.
-class SerialOpenMp {
- public:
-  SerialOpenMp() {
-    static const auto get = reinterpret_cast<int (*)()>(
-        dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"));
-    static const auto set = reinterpret_cast<void (*)(int)>(
-        dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
-    if (get == nullptr || set == nullptr) return;
-    set_ = set;
-    old_levels_ = get();
-    set_(0);
-  }
-  SerialOpenMp(const SerialOpenMp&) = delete;
-  SerialOpenMp& operator=(const SerialOpenMp&) = delete;
-  ~SerialOpenMp() {
-    if (set_ != nullptr) set_(old_levels_);
-  }
-
- private:
-  void (*set_)(int) = nullptr;
-  int old_levels_ = 0;
-};
 
 ceres::Problem::Options ProblemOptions(bool fast_removal) {
   ceres::Problem::Options options;
@@ -188,6 +161,17 @@ struct Block {
   int level = 0;
 };
 
+void AddParameterBlock(const Block& block, ceres::Problem* problem) {
+  double* const values = block.feature->data();
+  const int size = block.feature->type->size;
+  // Ceres takes longer over a manifold that is null than over none.
+  if (block.type->manifold == nullptr) {
+    problem->AddParameterBlock(values, size);
+  } else {
+    problem->AddParameterBlock(values, size, block.type->manifold.get());
+  }
+}
+
 struct Residual {
   std::unique_ptr<ceres::CostFunction> cost;
   // The cost itself once it has changed: what changes does so again and again.
@@ -277,9 +261,7 @@ struct SolverSession::Impl {
     for (const FeatureId id : constraint.features) {
       Block& block = blocks[id];
       if (block.residuals++ == 0) {
-        problem.AddParameterBlock(block.feature->data(),
-                                  block.feature->type->size,
-                                  block.type->manifold.get());
+        AddParameterBlock(block, &problem);
         block.constant = false;
         changes.parameter_blocks = true;
       }
@@ -691,8 +673,7 @@ SolveReport SolverSession::SolveLocal(const std::vector<FeatureId>& features) {
   ceres::Problem problem(ProblemOptions(/*fast_removal=*/false));
   for (const FeatureId id : ids) {
     const Block& block = impl_->blocks[id];
-    problem.AddParameterBlock(block.feature->data(), block.feature->type->size,
-                              block.type->manifold.get());
+    AddParameterBlock(block, &problem);
   }
   std::vector<FeatureId> neighbours;
   std::vector<double*> parameters;

@@ -98,6 +98,36 @@ void MakeTriangular(Matrix* matrix) {
   }
 }
 
+// Square root of a positive definite matrix of a size known at run time, where
+// it is one of the usual ones: without the room that such matrices ask for.
+// False for all others.
+template <int kSize, typename Matrix>
+bool SqrtOfSize(const Matrix& information, Matrix* root) {
+  using Fixed = Eigen::Matrix<double, kSize, kSize>;
+  const Fixed fixed = information;
+  if (!IsSymmetricInformation(fixed)) return false;
+  const Eigen::LLT<Fixed> llt(fixed);
+  if (llt.info() != Eigen::Success) return false;
+  *root = llt.matrixU();
+  return true;
+}
+
+template <typename Matrix>
+bool UsualSqrtInformation(const Matrix& information, Matrix* root) {
+  if constexpr (Matrix::SizeAtCompileTime == Eigen::Dynamic) {
+    if (information.rows() != information.cols()) return false;
+    switch (information.rows()) {
+      case 1:
+        return SqrtOfSize<1>(information, root);
+      case 2:
+        return SqrtOfSize<2>(information, root);
+      case 3:
+        return SqrtOfSize<3>(information, root);
+    }
+  }
+  return false;
+}
+
 [[noreturn]] inline void ThrowInvalidInformation() {
   throw std::invalid_argument(
       "information matrix: expected a finite, symmetric, positive "
@@ -153,6 +183,8 @@ internal::SquareMatrix<Derived> SqrtInformation(
     const Eigen::MatrixBase<Derived>& expression) {
   using Matrix = internal::SquareMatrix<Derived>;
   const auto& information = expression.eval();
+  Matrix definite;
+  if (internal::UsualSqrtInformation(information, &definite)) return definite;
   if (!internal::IsSymmetricInformation(information)) {
     internal::ThrowInvalidInformation();
   }

@@ -6,13 +6,13 @@
 //   ...]
 
 #include <ceres/ceres.h>
-#include <dlfcn.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/em.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/information.h>
 #include <plumbline/core/initial_guess.h>
+#include <plumbline/core/serial_openmp.h>
 #include <plumbline/core/session.h>
 #include <plumbline/factors/line_manifold.h>
 #include <plumbline/factors/point_line_distance.h>
@@ -54,14 +54,6 @@ const Registry& Builtins() {
     return made;
   }();
   return *registry;
-}
-
-// The same as the session does around its solves: some builds of CHOLMOD start
-// a hard-coded number of threads.
-void MakeOpenMpSerial() {
-  const auto set = reinterpret_cast<void (*)(int)>(
-      dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
-  if (set != nullptr) set(0);
 }
 
 PlainGraph MakePlain(const Graph& graph) {
@@ -450,7 +442,7 @@ int main(int argc, char** argv) {
       {"dlr", InitialGuessMethod::kFile},
       {"segway_lines", InitialGuessMethod::kFile}};
   try {
-    plumbline::MakeOpenMpSerial();
+    const plumbline::SerialOpenMp serial;
     for (const plumbline::Case& what : cases) {
       if (!names.empty() &&
           std::find(names.begin(), names.end(), what.name) == names.end()) {

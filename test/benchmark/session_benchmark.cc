@@ -4,9 +4,9 @@
 
 #include <benchmark/benchmark.h>
 #include <ceres/ceres.h>
-#include <dlfcn.h>
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/information.h>
+#include <plumbline/core/serial_openmp.h>
 #include <plumbline/core/session.h>
 
 #include <Eigen/CholmodSupport>
@@ -30,14 +30,6 @@ const Registry& Builtins() {
     return made;
   }();
   return *registry;
-}
-
-// The same as the session does around its solves: some builds of CHOLMOD start
-// a hard-coded number of threads.
-void MakeOpenMpSerial() {
-  const auto set = reinterpret_cast<void (*)(int)>(
-      dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
-  if (set != nullptr) set(0);
 }
 
 // The live constraints of a graph in a ceres::Problem of their own, and what
@@ -125,7 +117,7 @@ std::vector<FeatureId> AllSegments(const CorridorGraph& world) {
 // From drifted starts (cold), or from the solution with every segment moved by
 // a centimetre (warm, as EM steps find it).
 void SolveGlobal(benchmark::State& state, bool warm) {
-  MakeOpenMpSerial();
+  const SerialOpenMp serial;
   CorridorGraph world(Builtins(), static_cast<int>(state.range(0)));
   SolverSession session(&world.graph(), Builtins(), SessionOptions());
   Yardstick yardstick(&world.graph());
@@ -196,7 +188,7 @@ BENCHMARK(GlobalSolveWarm)
 // One corridor, alternately in a graph of the size asked for and in one of
 // 1000 segments.
 void LocalSolve(benchmark::State& state) {
-  MakeOpenMpSerial();
+  const SerialOpenMp serial;
   CorridorGraph small(Builtins(), 1000);
   CorridorGraph large(Builtins(), static_cast<int>(state.range(0)));
   SolverSession small_session(&small.graph(), Builtins(), SessionOptions());

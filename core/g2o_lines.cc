@@ -63,14 +63,18 @@ class ByteHash {
 
 void SplitG2oLine(std::string_view line,
                   std::vector<std::string_view>* fields) {
-  constexpr std::string_view kBlanks = " \t\r\v\f";
+  const auto is_blank = [](char c) {
+    return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+  };
   fields->clear();
-  std::size_t begin = line.find_first_not_of(kBlanks);
-  while (begin != std::string_view::npos) {
-    std::size_t end = line.find_first_of(kBlanks, begin);
-    if (end == std::string_view::npos) end = line.size();
+  std::size_t begin = 0;
+  while (true) {
+    while (begin < line.size() && is_blank(line[begin])) ++begin;
+    if (begin == line.size()) return;
+    std::size_t end = begin + 1;
+    while (end < line.size() && !is_blank(line[end])) ++end;
     fields->push_back(line.substr(begin, end - begin));
-    begin = line.find_first_not_of(kBlanks, end);
+    begin = end;
   }
 }
 
@@ -104,18 +108,6 @@ int RowPlace(const G2oEdgeFormat* format, int row) {
   return format == nullptr || format->row_places.empty()
              ? row
              : format->row_places[row];
-}
-
-std::vector<std::pair<int, int>> InformationOrder(const G2oEdgeFormat* format,
-                                                  int size) {
-  if (format != nullptr && !format->information_order.empty()) {
-    return format->information_order;
-  }
-  std::vector<std::pair<int, int>> order;
-  for (int i = 0; i < size; ++i) {
-    for (int j = i; j < size; ++j) order.emplace_back(i, j);
-  }
-  return order;
 }
 
 void TurnInformation(double angle, Eigen::MatrixXd* information) {
@@ -220,10 +212,10 @@ void AppendG2oEdge(const Constraint& constraint, const G2oEdgeFormat* format,
     *text += ' ';
     AppendNumber(values[i], text);
   }
-  for (const auto& [row, column] : InformationOrder(format, size)) {
+  ForInformation(format, size, [&](int row, int column) {
     *text += ' ';
     AppendNumber(entries(row, column), text);
-  }
+  });
 }
 
 bool IsPlainG2o(const Constraint& constraint) {

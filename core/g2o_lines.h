@@ -40,10 +40,20 @@ bool ParseG2oSource(std::string_view text, std::string* source);
 int FeaturePlace(const G2oEdgeFormat* format, int feature);
 /// The same of the rows of the residual.
 int RowPlace(const G2oEdgeFormat* format, int row);
-/// Rows and columns of the entries of an information matrix in the order of the
-/// line.
-std::vector<std::pair<int, int>> InformationOrder(const G2oEdgeFormat* format,
-                                                  int size);
+/// Calls visit(row, column) for the entries of an information matrix in the
+/// order of the line.
+template <typename Visit>
+void ForInformation(const G2oEdgeFormat* format, int size, const Visit& visit) {
+  if (format != nullptr && !format->information_order.empty()) {
+    for (const auto& [row, column] : format->information_order) {
+      visit(row, column);
+    }
+    return;
+  }
+  for (int i = 0; i < size; ++i) {
+    for (int j = i; j < size; ++j) visit(i, j);
+  }
+}
 
 /// Turns the information (3x3) of a relative pose by an angle, rad.
 void TurnInformation(double angle, Eigen::MatrixXd* information);

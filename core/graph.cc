@@ -119,7 +119,7 @@ struct Graph::Retired {
   std::vector<std::unique_ptr<Node>> dead_features;
 };
 
-TransactionResult Graph::Apply(Transaction transaction) {
+TransactionResult Graph::Apply(Transaction&& transaction) {
   // First everything is checked, then everything is changed: nothing below the
   // checks throws (out of memory apart).
   const Removals removals = CheckRemovals(transaction);

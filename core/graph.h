@@ -40,8 +40,13 @@ class Graph {
   /// its relation, sizes disagree, a number is not finite, the information is
   /// not symmetric positive semidefinite, a level is not in [0, kMaxLevel], or
   /// a feature to be removed is used by a live constraint that stays (the
-  /// message names both).
-  TransactionResult Apply(Transaction transaction);
+  /// message names both); a transaction that was to be moved then stays as it
+  /// was.
+  TransactionResult Apply(Transaction&& transaction);
+  /// The same with a copy.
+  TransactionResult Apply(const Transaction& transaction) {
+    return Apply(Transaction(transaction));
+  }
 
   /// Fills an empty graph with what another one had, under the same ids:
   /// features and constraints with their ids, ascending, live and broken, and

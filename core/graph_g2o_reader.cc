@@ -125,12 +125,13 @@ class LineFields {
     return source;
   }
 
-  void ExpectFields(std::size_t count, const std::string& what) const {
-    if (fields_.size() != count + 1) {
-      Fail(std::string(fields_[0]) + " has " +
-               std::to_string(fields_.size() - 1) + " fields",
-           std::to_string(count) + " (" + what + ")");
-    }
+  // `what()` says what they are.
+  template <typename What>
+  void ExpectFields(std::size_t count, const What& what) const {
+    if (fields_.size() == count + 1) return;
+    Fail(std::string(fields_[0]) + " has " +
+             std::to_string(fields_.size() - 1) + " fields",
+         std::to_string(count) + " (" + what() + ")");
   }
 
  private:
@@ -237,22 +238,27 @@ class LineReader {
   // The line that is being read.
   G2oLine& Line() { return file_->lines.back(); }
 
-  void ReadVertex(const VertexTag& tag) {
-    const FeatureType& type = *tag.type;
+  static std::string FieldsOf(const VertexTag& tag) {
     std::string what = "id";
     if (tag.format == nullptr) {
-      for (const Quantity& parameter : type.parameters) {
+      for (const Quantity& parameter : tag.type->parameters) {
         what += ", " + parameter.label();
       }
     } else {
-      what += ", " + std::to_string(type.size) + " numbers";
+      what += ", " + std::to_string(tag.type->size) + " numbers";
       for (const std::string& name : tag.format->extra_fields) {
         what += ", " + name;
       }
     }
+    return what;
+  }
+
+  void ReadVertex(const VertexTag& tag) {
+    const FeatureType& type = *tag.type;
     const std::size_t extra =
         tag.format == nullptr ? 0 : tag.format->extra_fields.size();
-    fields_.ExpectFields(static_cast<std::size_t>(type.size) + 1 + extra, what);
+    fields_.ExpectFields(static_cast<std::size_t>(type.size) + 1 + extra,
+                         [&tag] { return FieldsOf(tag); });
     const std::int64_t id = fields_.Id(fields_[1]);
     if (!records_->index.emplace(id, records_->features.size()).second) {
       fields_.Fail("id " + std::to_string(id) + " is taken",
@@ -294,10 +300,10 @@ class LineReader {
     // later.
     const int anchor_size =
         fields_.size() == 8 + kMaxAnchorSize ? kMaxAnchorSize : 2;
-    fields_.ExpectFields(
-        static_cast<std::size_t>(7 + anchor_size),
-        "id, level, virtual, anchor_x, anchor_y, extent_begin, "
-        "extent_end, observations, source");
+    fields_.ExpectFields(static_cast<std::size_t>(7 + anchor_size), [] {
+      return "id, level, virtual, anchor_x, anchor_y, extent_begin, "
+             "extent_end, observations, source";
+    });
     FeatureLine own;
     own.anchor_size = anchor_size;
     own.line = fields_.line();
@@ -351,11 +357,12 @@ class LineReader {
     const int arity = static_cast<int>(type.feature_types.size());
     const int size = type.residual_size;
     fields_.ExpectFields(
-        static_cast<std::size_t>(arity + size + size * (size + 1) / 2),
-        std::to_string(arity) + (arity == 1 ? " id, " : " ids, ") +
-            std::to_string(size) +
-            (size == 1 ? " expected value" : " expected values") +
-            ", the upper triangle of the information");
+        static_cast<std::size_t>(arity + size + size * (size + 1) / 2), [&] {
+          return std::to_string(arity) + (arity == 1 ? " id, " : " ids, ") +
+                 std::to_string(size) +
+                 (size == 1 ? " expected value" : " expected values") +
+                 ", the upper triangle of the information";
+        });
     Edge edge;
     edge.line = fields_.line();
     for (int i = 0; i < arity; ++i) {
@@ -375,10 +382,10 @@ class LineReader {
     }
     Eigen::MatrixXd entries(size, size);
     int field = 1 + arity + size;
-    for (const auto& [row, column] : InformationOrder(tag.format, size)) {
+    ForInformation(tag.format, size, [&](int row, int column) {
       entries(row, column) = fields_.Number(fields_[field++]);
       entries(column, row) = entries(row, column);
-    }
+    });
     constraint.information.resize(size, size);
     for (int i = 0; i < size; ++i) {
       for (int j = 0; j < size; ++j) {
@@ -395,7 +402,7 @@ class LineReader {
 
   // `above_` was an edge.
   void ReadConstraintLine() {
-    fields_.ExpectFields(4, "class, state, delta, source");
+    fields_.ExpectFields(4, [] { return "class, state, delta, source"; });
     Line().kind = G2oLine::Kind::kConstraintAttributes;
     records_->edges.back().has_attributes = true;
     Constraint& constraint = records_->edges.back().constraint;
@@ -462,9 +469,9 @@ class GraphAssembler {
     AddFeatures(&transaction);
     const std::vector<const Edge*> added = AddConstraints(&transaction);
     try {
-      graph_->Apply(transaction);
+      graph_->Apply(std::move(transaction));
     } catch (const Error&) {
-      // The graph knows what is wrong but not where.
+      // The graph knows what is wrong but not where. It has taken nothing.
       for (std::size_t i = 0; i < added.size(); ++i) {
         const ConstraintFault fault =
             FindFault(transaction.added_constraints()[i], transaction);

@@ -403,9 +403,9 @@ void ReadGraphJson(std::istream& input, const std::string& name,
         ReadConstraint(constraints.At(i), registry, feature_ids));
   }
   try {
-    graph->Apply(transaction);
+    graph->Apply(std::move(transaction));
   } catch (const Error&) {
-    // The graph knows what is wrong but not where.
+    // The graph knows what is wrong but not where. It has taken nothing.
     for (std::size_t i = 0; i < constraints.ArraySize(); ++i) {
       const ConstraintFault fault =
           FindFault(transaction.added_constraints()[i], transaction);

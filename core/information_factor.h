@@ -1,8 +1,9 @@
 #ifndef PLUMBLINE_CORE_INFORMATION_FACTOR_H_
 #define PLUMBLINE_CORE_INFORMATION_FACTOR_H_
 
+#include <plumbline/core/symmetric_ordering.h>
+
 #include <Eigen/Core>
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <vector>
 
@@ -56,9 +57,7 @@ class InformationFactor {
   InverseOnPattern InvertOnPattern() const;
 
   int size_ = 0;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower,
-                        Eigen::AMDOrdering<int>>
-      ldlt_;
+  SymmetricFactor<double> ldlt_;
 };
 
 extern template Eigen::MatrixXd InformationFactor::SolveAt(

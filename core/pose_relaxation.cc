@@ -1,8 +1,8 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/pose_relaxation.h>
+#include <plumbline/core/symmetric_ordering.h>
 #include <plumbline/factors/angle.h>
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -86,7 +86,7 @@ class LinearProblem {
       Scalar& diagonal = normal.coeffRef(i, i);
       diagonal += kPull * std::max(std::abs(diagonal), kPull * largest);
     }
-    Eigen::SimplicialLDLT<Eigen::SparseMatrix<Scalar>> factor(normal);
+    SymmetricFactor<Scalar> factor(normal);
     Values solution;
     if (factor.info() == Eigen::Success) solution = factor.solve(-gradient_);
     if (factor.info() != Eigen::Success || !solution.allFinite()) {

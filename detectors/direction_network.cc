@@ -90,8 +90,7 @@ void DirectionNetwork::SolveAngles() {
   Eigen::SparseMatrix<double> normal(n, n);
   normal.setFromTriplets(triplets.begin(), triplets.end());
   if (!is_analyzed_) {
-    ldlt_ =
-        std::make_unique<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>>();
+    ldlt_ = std::make_unique<SymmetricFactor<double>>();
     ldlt_->analyzePattern(normal);
     is_analyzed_ = true;
   }

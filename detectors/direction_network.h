@@ -1,8 +1,9 @@
 #ifndef PLUMBLINE_DETECTORS_DIRECTION_NETWORK_H_
 #define PLUMBLINE_DETECTORS_DIRECTION_NETWORK_H_
 
+#include <plumbline/core/symmetric_ordering.h>
+
 #include <Eigen/Core>
-#include <Eigen/SparseCholesky>
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -90,7 +91,7 @@ class DirectionNetwork {
   std::vector<double> estimate_;
   std::vector<double> variance_;
   // By pointer: a factorization cannot be moved.
-  std::unique_ptr<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>> ldlt_;
+  std::unique_ptr<SymmetricFactor<double>> ldlt_;
   // Whether the analysis in it is of the present nodes and links.
   bool is_analyzed_ = false;
 };

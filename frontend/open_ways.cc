@@ -1,12 +1,12 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/parallel_for.h>
+#include <plumbline/core/symmetric_ordering.h>
 #include <plumbline/frontend/open_ways.h>
 #include <plumbline/frontend/place_grid.h>
 #include <plumbline/frontend/way_lengths.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <array>
@@ -421,7 +421,7 @@ class Network {
   const OpenWayOptions& options_;
   std::vector<Eigen::Triplet<double>> entries_;
   Eigen::VectorXd bias_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
+  SymmetricFactor<double> solver_;
 };
 
 // Places along the way; nothing is known of them yet.

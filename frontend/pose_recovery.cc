@@ -2,12 +2,12 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/information.h>
 #include <plumbline/core/session.h>
+#include <plumbline/core/symmetric_ordering.h>
 #include <plumbline/frontend/place_chain.h>
 #include <plumbline/frontend/pose_recovery.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <array>
@@ -357,7 +357,7 @@ class Recovery {
     }
     Eigen::SparseMatrix<double> jacobian(num_rows, size);
     jacobian.setFromTriplets(triplets.begin(), triplets.end());
-    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> ldlt(
+    const SymmetricFactor<double> ldlt(
         Eigen::SparseMatrix<double>(jacobian.transpose() * jacobian));
     if (ldlt.info() != Eigen::Success) return false;
 

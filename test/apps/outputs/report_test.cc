@@ -530,12 +530,16 @@ TEST_F(ReportInBrowserTest, MeasuresAndShowsLayers) {
             "return n; })()")
         .get<int>();
   };
-  const auto click = [this](const std::string& id) {
-    browser_->Evaluate("document.getElementById('" + id + "').click()");
+  const auto wait_until_drawn = [this] {
     browser_->Evaluate(
         "new Promise((done) => requestAnimationFrame(() => "
         "requestAnimationFrame(() => done(1))))");
   };
+  const auto click = [&](const std::string& id) {
+    browser_->Evaluate("document.getElementById('" + id + "').click()");
+    wait_until_drawn();
+  };
+  wait_until_drawn();
   for (const char* layer : {"show-walls", "show-plan", "show-path"}) {
     const int before = ink();
     click(layer);

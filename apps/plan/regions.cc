@@ -28,6 +28,10 @@ constexpr double kLongestFurniture = 2.5;
 constexpr double kLeastDepth = 0.3;
 constexpr double kGoesOn = 0.3;
 constexpr double kSeenOfIt = 0.25;
+// Share of the border of what lies within a wall, between two rooms; and of
+// walls on the border, with what is no room, of what stands behind furniture.
+constexpr double kWithinRooms = 0.7;
+constexpr double kWalled = 0.8;
 // What was seen from the room behind its furniture, as a share: walls that
 // were seen there are the room's.
 constexpr double kGlimpse = 0.1;
@@ -708,6 +712,8 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
     std::map<std::pair<int, int>, Border> borders;
     std::map<int, double> around;
     std::map<int, Exposure> exposed;
+    // Wall around each pocket where it borders on no room.
+    std::map<int, double> walled;
     // Wall around each room and pocket, by line; and what was not seen of it.
     std::map<std::pair<int, int>, double> walls;
     std::map<std::pair<int, int>, double> hidden_walls;
@@ -733,6 +739,9 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
         }
         if (other == from) continue;
         around[from] += edge.length();
+        if (other >= 0 || room < 0) {
+          walled[from] += edge.lengths.Of(Mark::kWall);
+        }
         if (other < 0 && room < 0) {
           const double open =
               std::max(0.0, edge.length() - std::max(0.0, edge.lengths.holds));
@@ -749,10 +758,12 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
       }
     }
     // Rooms that a pocket has a door to: of two it is the way from one to the
-    // other.
+    // other. And what of its border is that of rooms.
     std::map<int, int> doors;
+    std::map<int, double> beside_rooms;
     for (const auto& [pair, border] : borders) {
       doors[pair.first] += border.all.Of(Mark::kDoor) >= kLeastOpening;
+      beside_rooms[pair.first] += border.all.length();
     }
     const auto length_on = [](const std::map<std::pair<int, int>, double>& of,
                               int line, int id) {
@@ -773,6 +784,19 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
       // Space beyond a wall is no part of what lies before it. Behind furniture
       // the walls of the room go on.
       double open = exposed[pair.first].all;
+      // Behind a wall that is longer than furniture, where nothing was seen and
+      // lines alone close it, the walls beside it do: where the outside of a
+      // building bends outwards.
+      if (seen[pair.first] < kGlimpse * areas[pair.first] &&
+          beside_rooms[pair.first] < kWithinRooms * around[pair.first] &&
+          walled[pair.first] <
+              kWalled * (around[pair.first] - beside_rooms[pair.first]) &&
+          std::any_of(border.of_line.begin(), border.of_line.end(),
+                      [](const auto& entry) {
+                        return entry.second.Of(Mark::kWall) > kLongestFurniture;
+                      })) {
+        continue;
+      }
       const bool is_furniture = std::none_of(
           border.of_line.begin(), border.of_line.end(), [&](const auto& entry) {
             const double front = entry.second.Of(Mark::kWall);

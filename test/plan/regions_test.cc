@@ -55,6 +55,20 @@ TEST(RegionsTest, NarrowSpaceBehindFurnitureBelongsToItsRoom) {
   EXPECT_EQ(FindRegions(desk), (std::vector<int>{0, 0}));
 }
 
+// Where outer walls bend outwards the next one goes on behind each of them:
+// nothing was seen there, and the lines alone close it.
+TEST(RegionsTest, UnseenSpaceBehindALongWallIsNoPocketWhereLinesAloneCloseIt) {
+  Arrangement arrangement = Stack({3.0, 0.7});
+  for (ArrangementEdge& edge : arrangement.edges) {
+    if (edge.left != 1) continue;
+    edge.lengths.metres = {};
+    edge.lengths.metres[static_cast<std::size_t>(Mark::kUnknown)] =
+        edge.length();
+    edge.lengths.holds = 0.9 * edge.length();
+  }
+  EXPECT_EQ(FindRegions(arrangement), (std::vector<int>{0, -1}));
+}
+
 // Nothing is known between the two upper faces: they are one space, and that is
 // no narrow one.
 TEST(RegionsTest, UnseenSpaceBehindAWallIsNoPocket) {

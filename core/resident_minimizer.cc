@@ -239,7 +239,12 @@ class ResidentMinimizer::Impl::Minimization {
     summary_.jacobian_evaluation_time_in_seconds = 0.0;
     std::string fault;
     m_.evaluator.SetNumThreads(options_.num_threads);
-    if (options_.IsValid(&fault)) fault = m_.Read(changes_);
+    if (options_.IsValid(&fault)) {
+      fault = m_.Read(changes_);
+    } else {
+      // Whoever tells of changes takes them for read.
+      m_.is_forgotten = true;
+    }
     if (!fault.empty()) return End(ceres::FAILURE, fault);
     m_.TakeState();
     summary_.fixed_cost = 0.0;

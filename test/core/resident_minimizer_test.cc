@@ -368,6 +368,29 @@ TEST(ResidentMinimizerTest, WhatIsToldOfChangesIsWhatIsFoundOut) {
   solve();
 }
 
+// Options that are refused: what has changed by then is told once, and is not
+// lost.
+TEST(ResidentMinimizerTest, WhatIsToldWithARefusedSolveIsNotLost) {
+  Ring ring(60);
+  ResidentMinimizer minimizer(&ring.problem);
+  ceres::Solver::Summary summary;
+  minimizer.Solve(Tight(), &summary);
+  ring.problem.SetParameterBlockConstant(ring.poses[7].data());
+  const Pose held = ring.poses[7];
+  ring.poses[8][0] += 0.5;
+  ceres::Solver::Options refused = Tight();
+  refused.function_tolerance = -1.0;
+  ProblemChanges changes;
+  minimizer.Solve(refused, &summary, ResidentMinimizer::Damping::kAsGiven,
+                  &changes);
+  EXPECT_EQ(summary.termination_type, ceres::FAILURE);
+  changes = {false, {}};
+  minimizer.Solve(Tight(), &summary, ResidentMinimizer::Damping::kAsGiven,
+                  &changes);
+  EXPECT_EQ(summary.termination_type, ceres::CONVERGENCE);
+  EXPECT_EQ(ring.poses[7], held);
+}
+
 // Where the parameters lie in memory changes from run to run.
 TEST(ResidentMinimizerTest, TheSameBytesWhereverTheParametersLie) {
   constexpr int kPoses = 80;

@@ -5,11 +5,12 @@ namespace plumbline {
 
 /// While one lives, OpenMP regions that its thread comes to run on that thread
 /// alone. CHOLMOD, as Debian builds it, opens several for each supernode, for a
-/// hard-coded number of threads; even of one thread each would allocate a team
-/// and make a system call, which takes as long as half the factorization. To
-/// avoid that the library stands before GOMP_parallel of GCC's OpenMP library,
-/// and passes on what other threads ask for. Where the linear algebra library
-/// does without OpenMP, there is nothing to do.
+/// hard-coded number of threads. With one thread, GCC's OpenMP library would
+/// still allocate a team for each region and make a system call at its end: a
+/// third of the time of factorizations with many small supernodes. To avoid
+/// that, GOMP_parallel is defined here as well, before the library's own, to
+/// which it passes on what other threads ask for. Where the linear algebra
+/// library does without OpenMP, there is nothing to do.
 class SerialOpenMp {
  public:
   SerialOpenMp();

@@ -54,16 +54,16 @@ plumbline_pkg_config(plumbline-core "Graph, plug-in registry, solver session, EM
 plumbline_pkg_config(plumbline-detectors "Structure detectors"
   "plumbline-core" "-L\${libdir} -lplumbline_detectors")
 plumbline_pkg_config(plumbline-frontend "Log readers and laser front-end"
-  "plumbline-core zlib libarchive sqlite3 liblz4 libzstd"
+  "plumbline-core zlib sqlite3 liblz4 libzstd"
   "-L\${libdir} -lplumbline_frontend -lbz2")
 plumbline_pkg_config(plumbline-pipeline "From scans or a graph to a map"
   "plumbline-detectors plumbline-frontend" "-L\${libdir} -lplumbline_pipeline")
 set(all plumbline-pipeline)
 if(PLUMBLINE_BUILD_OUTPUTS)
   plumbline_pkg_config(plumbline-plan "Rooms, doors and walls of what a robot saw"
-    "plumbline-core" "-L\${libdir} -lplumbline_plan -lgeos_c")
+    "plumbline-core" "-L\${libdir} -lplumbline_plan")
   plumbline_pkg_config(plumbline-outputs "Floor plans, grids, pictures and reports of a map"
-    "plumbline-detectors plumbline-frontend plumbline-plan cairo" "-L\${libdir} -lplumbline_outputs")
+    "plumbline-detectors plumbline-frontend plumbline-plan" "-L\${libdir} -lplumbline_outputs")
   string(APPEND all " plumbline-outputs")
 endif()
 plumbline_pkg_config(plumbline "All libraries of plumbline" "${all}" "")

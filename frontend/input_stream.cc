@@ -2,6 +2,7 @@
 #include <archive_entry.h>
 #include <fcntl.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/late_library.h>
 #include <plumbline/core/read_ahead.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/frontend/bzip2_decoder.h>
@@ -20,6 +21,22 @@
 
 namespace plumbline {
 namespace {
+
+// Loaded when a stream is compressed in a way of its own.
+LateLibrary archive_library("libarchive.so.13");
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_entry_filetype);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_error_string);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_data);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_free);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_new);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_next_header);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_open);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_support_filter_lz4);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_support_filter_xz);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_support_filter_zstd);
+PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_support_format_raw);
+PLUMBLINE_LATE_FUNCTION(archive_library,
+                        archive_read_support_format_zip_streamable);
 
 constexpr std::size_t kChunk = std::size_t{1} << 18;
 constexpr std::size_t kLeastChunk = std::size_t{1} << 12;
@@ -341,7 +358,7 @@ class InputStream::Unpacker::Archive : public Unpacker {
     try {
       if (!stored.Require(1)) return 0;
     } catch (const Error& error) {
-      archive_set_error(unpacker->archive_.get(), EIO, "%s", error.what());
+      unpacker->reading_failed_ = error.what();
       return -1;
     }
     unpacker->given_ = stored.size();
@@ -350,12 +367,16 @@ class InputStream::Unpacker::Archive : public Unpacker {
   }
 
   void Damage() {
-    const char* const why = archive_error_string(archive_.get());
     damage_ = "compressed data is corrupt or breaks off";
-    if (why != nullptr) damage_ += std::string(": ") + why;
+    if (!reading_failed_.empty()) {
+      damage_ += ": " + reading_failed_;
+    } else if (const char* why = archive_error_string(archive_.get())) {
+      damage_ += std::string(": ") + why;
+    }
   }
 
   std::unique_ptr<archive, Free> archive_;
+  std::string reading_failed_;
   bool is_zip_ = false;
   std::size_t given_ = 0;
   bool done_ = false;

@@ -1,4 +1,3 @@
-#include <cairo.h>
 #include <plumbline/apps/figures/line_plot.h>
 #include <plumbline/apps/figures/plot_canvas.h>
 #include <plumbline/core/atomic_file.h>
@@ -7,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 #include <ostream>
+#include <plumbline/outputs/late_cairo.inc>
 #include <string>
 
 namespace plumbline {

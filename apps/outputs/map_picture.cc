@@ -1,5 +1,3 @@
-#include <cairo-svg.h>
-#include <cairo.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/xml_text.h>
@@ -12,6 +10,7 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <plumbline/outputs/late_cairo.inc>
 #include <vector>
 
 namespace plumbline {

@@ -1,4 +1,3 @@
-#include <cairo.h>
 #include <plumbline/core/error.h>
 #include <plumbline/outputs/report_grid.h>
 
@@ -6,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <plumbline/outputs/late_cairo.inc>
 #include <string>
 #include <vector>
 

@@ -1,5 +1,6 @@
 #include <geos_c.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/late_library.h>
 #include <plumbline/plan/polygon.h>
 
 #include <algorithm>
@@ -9,6 +10,38 @@
 
 namespace plumbline {
 namespace {
+
+// Loaded when there is a plan to be made.
+LateLibrary geos_library("libgeos_c.so.1");
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSBufferWithStyle_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSContext_setErrorMessageHandler_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSCoordSeq_create_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSCoordSeq_getSize_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSCoordSeq_getXY_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSCoordSeq_setXY_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSCoverageUnion_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSDifferencePrec_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGeomTypeId_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGeom_createCollection_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGeom_createLineString_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGeom_createLinearRing_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGeom_createPolygon_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGeom_destroy_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGeom_getCoordSeq_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGetExteriorRing_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGetGeometryN_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGetInteriorRingN_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGetNumGeometries_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSGetNumInteriorRings_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSIntersectionPrec_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSMakeValid_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSMaximumInscribedCircle_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSPolygonize_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSUnaryUnionPrec_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOS_finish_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOS_init_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSisEmpty_r);
+PLUMBLINE_LATE_FUNCTION(geos_library, GEOSisValid_r);
 
 using Eigen::Vector2d;
 

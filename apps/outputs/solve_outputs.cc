@@ -480,6 +480,8 @@ WrittenOutputs WriteSolveOutputs(
   int done = 0;
   ParallelFor(order.size() + 1, threads, [&](std::size_t job) {
     if (job == 0) {
+      // It takes longest: who is done with the rest helps.
+      const ThreadsScope scope(threads);
       if (has_plan) BeginPlan(outcome);
       return;
     }

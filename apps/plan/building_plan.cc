@@ -305,12 +305,19 @@ struct Division {
   std::vector<int> region;
 };
 
-Division Divide(const std::vector<WallLine>& lines, const SpaceGrid& space,
+std::vector<DrawnLine> DrawAndMeasure(const std::vector<WallLine>& lines,
+                                      const SpaceGrid& space,
+                                      const BuildingPlanOptions& options) {
+  std::vector<DrawnLine> drawn = DrawLines(lines, options.reach);
+  MeasureLines(space, options.doors, &drawn);
+  return drawn;
+}
+
+Division Divide(std::vector<DrawnLine> drawn, const SpaceGrid& space,
                 const std::vector<Pose2>& path,
                 const BuildingPlanOptions& options) {
   Division division;
-  division.drawn = DrawLines(lines, options.reach);
-  MeasureLines(space, options.doors, &division.drawn);
+  division.drawn = std::move(drawn);
   division.arrangement = Arrange(division.drawn, space);
   division.region = FindRegions(division.arrangement, options.regions);
   JoinAcrossFurniture(division.arrangement, division.drawn, path,
@@ -708,34 +715,34 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
         .push_back(lines[i]);
   }
   lines = std::move(long_lines);
-  Division division = Divide(lines, space, path, options);
+  std::vector<DrawnLine> drawn_lines = DrawAndMeasure(lines, space, options);
+  const std::size_t count = lines.size();
   const Partitions partitions =
-      FindPartitions(short_lines, division.drawn, space, options.reach);
-  if (!partitions.sure.empty()) {
-    Append(partitions.sure, &lines);
-    division = Divide(lines, space, path, options);
-  }
+      FindPartitions(short_lines, drawn_lines, space, options.reach);
+  Append(partitions.sure, &lines);
   if (!partitions.likely.empty()) {
     std::vector<WallLine> with = lines;
     Append(partitions.likely, &with);
-    const Division trial = Divide(with, space, path, options);
-    const std::vector<int> kept = LinesBetweenRoomsWithDoors(
-        trial.arrangement, trial.region, static_cast<int>(lines.size()),
-        static_cast<int>(with.size()));
-    if (!kept.empty()) {
-      for (const int line : kept) {
-        lines.push_back(with[static_cast<std::size_t>(line)]);
-      }
-      division = Divide(lines, space, path, options);
+    const Division trial =
+        Divide(DrawAndMeasure(with, space, options), space, path, options);
+    for (const int line : LinesBetweenRoomsWithDoors(
+             trial.arrangement, trial.region, static_cast<int>(lines.size()),
+             static_cast<int>(with.size()))) {
+      lines.push_back(with[static_cast<std::size_t>(line)]);
     }
   }
+  if (lines.size() > count) {
+    drawn_lines = DrawAndMeasure(lines, space, options);
+  }
+  Division division = Divide(std::move(drawn_lines), space, path, options);
   for (int i = 0; i < kUnseenRounds; ++i) {
     const std::vector<WallLine> unseen =
         FindUnseenWalls(division.arrangement, division.region, division.drawn,
                         space, options.unseen);
     if (unseen.empty()) break;
     Append(unseen, &lines);
-    division = Divide(lines, space, path, options);
+    division =
+        Divide(DrawAndMeasure(lines, space, options), space, path, options);
   }
   const auto& [drawn, arrangement, region] = division;
 

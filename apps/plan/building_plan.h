@@ -110,7 +110,8 @@ struct BuildingPlan {
 /// `walls`: known faces; `directions`: of the building, rad, the most important
 /// first, empty when there are none; `path`: poses of the robot in the order of
 /// time. All in the map frame. A space without walls around it is not a room:
-/// the plan of an open field is empty.
+/// the plan of an open field is empty. Works on ThreadsHere() threads, on whose
+/// number the plan does not depend.
 ///
 /// Method: cells of an arrangement of wall lines with an energy minimization
 /// after Ochmann et al., "Automatic reconstruction of parametric building

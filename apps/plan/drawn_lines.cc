@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/plan/drawn_lines.h>
 
 #include <algorithm>
@@ -603,7 +604,8 @@ std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
 
 void MeasureLines(const SpaceGrid& space, const DoorOptions& options,
                   std::vector<DrawnLine>* drawn) {
-  for (DrawnLine& line : *drawn) Measure(space, &line);
+  ParallelFor(drawn->size(), ThreadsHere(),
+              [&](std::size_t i) { Measure(space, &(*drawn)[i]); });
   std::vector<WallProfile> shut;
   for (const DrawnLine& line : *drawn) {
     shut.push_back(WithDoorsShut(line.profile, options.narrow));

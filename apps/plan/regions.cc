@@ -1,4 +1,5 @@
 #include <plumbline/core/disjoint_sets.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/plan/min_cut.h>
 #include <plumbline/plan/regions.h>
 
@@ -191,14 +192,17 @@ class Regions {
         borders_(region_.size()),
         of_solids_(region_.size()),
         sides_(region_.size()),
-        extents_(region_.size()) {
+        extents_(region_.size()),
+        is_sliver_(region_.size()) {
     for (std::size_t i = 0; i < region_.size(); ++i) {
       if (is_inside[i]) region_[i] = static_cast<int>(i);
       extents_[i].area = arrangement.faces[i].Area();
       extents_[i].perimeter = arrangement.faces[i].Perimeter();
       extents_[i].free = arrangement.free[i];
-      is_sliver_.push_back(IsNarrow(arrangement.faces[i], kSliver));
     }
+    ParallelFor(region_.size(), ThreadsHere(), [&](std::size_t i) {
+      is_sliver_[i] = IsNarrow(arrangement.faces[i], kSliver);
+    });
     const std::vector<int> hidden = HiddenSpaces(arrangement, options, region_);
     for (const ArrangementEdge& edge : arrangement.edges) {
       if (edge.left == edge.right) continue;
@@ -361,7 +365,7 @@ class Regions {
   }
 
   bool IsSliver(int region) const {
-    return is_sliver_[static_cast<std::size_t>(region)];
+    return is_sliver_[static_cast<std::size_t>(region)] != 0;
   }
 
   // Both were seen, but nobody looked from one into the other: two rooms, even
@@ -464,11 +468,11 @@ class Regions {
   std::vector<LineLengths> sides_;
   std::vector<Extent> extents_;
   // Narrow faces that have not joined any others.
-  std::vector<bool> is_sliver_;
+  std::vector<char> is_sliver_;
 };
 
 // Which faces lie where their region is wider than a corridor.
-std::vector<bool> WideFaces(const Arrangement& arrangement,
+std::vector<char> WideFaces(const Arrangement& arrangement,
                             const std::vector<int>& region, double width) {
   std::map<int, std::vector<Polygon>> parts;
   for (std::size_t i = 0; i < region.size(); ++i) {
@@ -476,8 +480,12 @@ std::vector<bool> WideFaces(const Arrangement& arrangement,
     parts[region[i]].push_back(arrangement.faces[i]);
   }
   std::map<int, std::vector<Polygon>> wide;
-  for (const auto& [id, polygons] : parts) {
-    for (Polygon outline : UnionOf(polygons)) {
+  for (const auto& entry : parts) wide[entry.first];
+  const std::vector<std::pair<int, std::vector<Polygon>>> regions(parts.begin(),
+                                                                  parts.end());
+  ParallelFor(regions.size(), ThreadsHere(), [&](std::size_t i) {
+    std::vector<Polygon>& wide_here = wide.at(regions[i].first);
+    for (Polygon outline : UnionOf(regions[i].second)) {
       // Furniture makes no space narrower.
       outline.holes.erase(
           std::remove_if(outline.holes.begin(), outline.holes.end(),
@@ -487,22 +495,22 @@ std::vector<bool> WideFaces(const Arrangement& arrangement,
           outline.holes.end());
       for (const Polygon& core : Offset(outline, -0.5 * width)) {
         const std::vector<Polygon> grown = Offset(core, 0.5 * width);
-        wide[id].insert(wide[id].end(), grown.begin(), grown.end());
+        wide_here.insert(wide_here.end(), grown.begin(), grown.end());
       }
     }
-  }
-  std::vector<bool> is_wide(region.size(), false);
-  for (std::size_t i = 0; i < region.size(); ++i) {
-    if (region[i] < 0) continue;
+  });
+  std::vector<char> is_wide(region.size(), 0);
+  ParallelFor(region.size(), ThreadsHere(), [&](std::size_t i) {
+    if (region[i] < 0) return;
     const Polygon& face = arrangement.faces[i];
     double area = 0.0;
-    for (const Polygon& core : wide[region[i]]) {
+    for (const Polygon& core : wide.at(region[i])) {
       for (const Polygon& part : IntersectionOf(face, core)) {
         area += part.Area();
       }
     }
     is_wide[i] = area >= 0.5 * face.Area();
-  }
+  });
   return is_wide;
 }
 
@@ -538,7 +546,7 @@ double WidestChain(const std::vector<StraightPiece>& pieces) {
 // Makes regions of their own of corridors that open into wide spaces.
 void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
                   std::vector<int>* region) {
-  const std::vector<bool> is_wide =
+  const std::vector<char> is_wide =
       WideFaces(arrangement, *region, options.corridor_width);
   DisjointSets pieces(region->size());
   const auto is_within = [&](const ArrangementEdge& edge) {

@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/plan/polygon_cells.h>
 #include <plumbline/plan/unseen_walls.h>
 
@@ -5,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 namespace plumbline {
 namespace {
@@ -168,23 +170,28 @@ std::vector<WallLine> FindUnseenWalls(const Arrangement& arrangement,
   for (std::size_t i = 0; i < region.size(); ++i) {
     if (region[i] >= 0) faces[region[i]].push_back(i);
   }
-  std::vector<WallLine> lines;
-  // Of one region after the other, in the same memory.
-  std::vector<Cell> cells;
-  for (const auto& [id, directions] :
-       DirectionsOf(arrangement, region, drawn, options.min_wall)) {
-    cells.clear();
-    for (const std::size_t face : faces[id]) {
+  const std::map<int, std::vector<Vector2d>> found =
+      DirectionsOf(arrangement, region, drawn, options.min_wall);
+  const std::vector<std::pair<int, std::vector<Vector2d>>> regions(
+      found.begin(), found.end());
+  std::vector<std::vector<WallLine>> lines_of(regions.size());
+  ParallelFor(regions.size(), ThreadsHere(), [&](std::size_t i) {
+    const auto& [id, directions] = regions[i];
+    std::vector<Cell> cells;
+    for (const std::size_t face : faces.at(id)) {
       ForEachCell(arrangement.faces[face], space, [&](int column, int row) {
         cells.push_back({space.Middle(column, row), space.At(column, row)});
       });
     }
-    const std::size_t count = lines.size();
     for (const Vector2d& along : directions) {
-      FindAlong(cells, along, space.resolution, options, &lines);
+      FindAlong(cells, along, space.resolution, options, &lines_of[i]);
       // Other directions of what is left are for the parts.
-      if (lines.size() > count) break;
+      if (!lines_of[i].empty()) break;
     }
+  });
+  std::vector<WallLine> lines;
+  for (const std::vector<WallLine>& some : lines_of) {
+    lines.insert(lines.end(), some.begin(), some.end());
   }
   return lines;
 }

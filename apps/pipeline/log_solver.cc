@@ -69,6 +69,24 @@ void ShowScans(const std::vector<Scan>& scans, const ScanPointsOptions& points,
             detectors);
 }
 
+void AddNotesOn(const OdometryAgreement& odometry,
+                std::vector<std::string>* notes) {
+  if (odometry.turns_are_opposite) {
+    notes->push_back(
+        "the map turns left where odometry turns right: the beams come in the "
+        "other order (a laser upside down: the map is a mirror image), or the "
+        "sign of odometry's turns is wrong");
+  }
+  if (odometry.is_scale_disputed) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "a metre of odometry's is %.2f m in the map: its scale is "
+                  "wrong, or lengths of the map are",
+                  odometry.scale);
+    notes->push_back(text);
+  }
+}
+
 }  // namespace
 
 double LengthOfWalls(const Graph& graph) {
@@ -801,9 +819,11 @@ void LogSolver::CheckMap(Context* context) const {
   // The second map moves poses by centimetres: what is in sight stays the same.
   const bool tell_open_ways =
       context->may_have_open_ways || result.second_map_refused;
-  MapReview(context->scans, result.records, result.trajectory, options_.check,
-            options_.way_check, [context] { return context->IsStopped(); })
-      .Revise(map_.graph(), result.refined, tell_open_ways, &result.loose);
+  const MapReview review(context->scans, result.records, result.trajectory,
+                         options_.check, options_.way_check,
+                         [context] { return context->IsStopped(); });
+  review.Revise(map_.graph(), result.refined, tell_open_ways, &result.loose);
+  AddNotesOn(review.Odometry(), &result.notes);
 }
 
 void LogSolver::BeginClosing(Context* context) {

@@ -102,6 +102,18 @@ void AddOpenWays(const std::vector<OpenWay>& ways,
   }
 }
 
+void AddDisputedWays(const std::vector<DisputedWay>& ways,
+                     std::vector<LooseTrack>* loose) {
+  for (const DisputedWay& way : ways) {
+    char why[160];
+    std::snprintf(why, sizeof why,
+                  "odometry has %.1f m of way here, the map %.1f m: wheels "
+                  "slipped, or what the robot saw went along with it",
+                  way.by_odometry, way.by_map);
+    AddLoose(way.begin, way.end, why, loose);
+  }
+}
+
 // Of level 0.
 std::vector<Wall> WallsOf(const Graph& graph) {
   std::vector<Wall> walls;
@@ -162,6 +174,7 @@ void MapReview::Revise(const Graph& graph,
   AddContradictions(contradictions, loose);
   AddBlockedWays(blocked, loose);
   AddBlindRuns(FindBlindRuns(refined), check_.open_way, loose);
+  AddDisputedWays(Odometry().disputed, loose);
   if (tell_open_ways) AddOpenWays(OpenWays(), loose);
   std::stable_sort(loose->begin(), loose->end(),
                    [](const LooseTrack& a, const LooseTrack& b) {

@@ -5,6 +5,7 @@
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/map_check.h>
+#include <plumbline/frontend/odometry_check.h>
 #include <plumbline/frontend/odometry_refinement.h>
 #include <plumbline/frontend/open_ways.h>
 #include <plumbline/frontend/part_joining.h>
@@ -33,14 +34,19 @@ class MapReview {
   bool HasContradictions() const;
   /// Whether the length of a way hangs on odometry (FindOpenWays).
   bool HasOpenWays() const { return !OpenWays().empty(); }
+  /// How odometry agrees with the map.
+  OdometryAgreement Odometry() const {
+    return CompareWithOdometry(scans_, trajectory_, OdometryCheckOptions());
+  }
   /// How far the map agrees with itself.
   MapAgreement Agreement() const;
 
   /// Revises `loose`, the parts of the track that hang on the rest by a single
   /// match or a guess: adds those that contradict what was seen on other
   /// visits, ways through walls of `graph`, scans that odometry alone placed
-  /// while it missed much (`refined`, one per scan) and, with `tell_open_ways`,
-  /// ways whose length hangs on odometry; drops those that turn out to be
+  /// while it missed much (`refined`, one per scan), ways that odometry has
+  /// longer by far and, with `tell_open_ways`, ways whose length hangs on
+  /// odometry; drops those that turn out to be
   /// right. Ordered by their first scans.
   void Revise(const Graph& graph, const std::vector<RefinedScan>& refined,
               bool tell_open_ways, std::vector<LooseTrack>* loose) const;

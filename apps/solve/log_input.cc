@@ -8,6 +8,7 @@
 #include <plumbline/core/utf8.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/companions.h>
 #include <plumbline/frontend/range_offset.h>
 #include <plumbline/frontend/scan_odometry.h>
 
@@ -161,6 +162,41 @@ void UndoRangeOffset(const std::string& name, RunClock* clock, Log* log,
   Remark("%s: %s", name.c_str(), text);
 }
 
+// What goes along with the robot stands nowhere in the map.
+void LeaveOutCompanions(const std::string& name,
+                        const LogSolverOptions& solver_options, RunClock* clock,
+                        Log* log, Summary* summary) {
+  if (!solver_options.odometry.match_scans) return;
+  clock->Begin("what goes along with the robot");
+  CompanionOptions options;
+  options.points = solver_options.odometry.points;
+  const std::vector<Companion> companions =
+      TakeOutCompanions(options, &log->scans);
+  if (companions.empty()) return;
+  double way = 0.0;
+  std::int64_t returns = 0;
+  for (const Companion& companion : companions) {
+    const auto time_of = [&](int scan) {
+      return log->scans[static_cast<std::size_t>(scan)].timestamp;
+    };
+    Detail("%s: something went along with the robot from %.1f s to %.1f s",
+           name.c_str(), time_of(companion.begin), time_of(companion.end));
+    way += companion.way;
+    returns += companion.returns;
+  }
+  const int begin = companions.front().begin;
+  char text[200];
+  std::snprintf(
+      text, sizeof text,
+      "something went along with the robot for %.1f m in %zu stretches, the "
+      "first from %.1f s on: its %lld returns are left out",
+      way, companions.size(),
+      log->scans[static_cast<std::size_t>(begin)].timestamp,
+      static_cast<long long>(returns));
+  summary->notes.push_back(text);
+  Remark("%s: %s", name.c_str(), text);
+}
+
 }  // namespace
 
 ReadingProgress::ReadingProgress(InputStream* input, RunClock* clock)
@@ -221,6 +257,7 @@ void CompleteLog(const std::string& name, const LogSolverOptions& options,
     MatchScansAlone(name, options, clock, log, summary);
   } else {
     UndoSweeps(name, options, clock, log, summary);
+    LeaveOutCompanions(name, options, clock, log, summary);
   }
   if (options.range_offset) UndoRangeOffset(name, clock, log, summary);
 }

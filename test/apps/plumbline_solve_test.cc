@@ -2228,6 +2228,65 @@ TEST_F(SolveTest, GarbledGraphs) {
   EXPECT_TRUE(Files("out").empty());
 }
 
+// A board of 0.9 m, 1.2 m in front of the laser, for the second third.
+TEST_F(SolveTest, WhatGoesAlongWithTheRobotIsLeftOut) {
+  std::vector<std::string> lines = OfficeLines(1408);
+  int scan = 0;
+  for (std::string& line : lines) {
+    if (line.compare(0, 6, "FLASER") != 0 || scan++ / 470 != 1) continue;
+    std::istringstream fields(line);
+    std::vector<std::string> words{std::istream_iterator<std::string>(fields),
+                                   std::istream_iterator<std::string>()};
+    const int beams = std::stoi(words[1]);
+    for (int i = 0; i < beams; ++i) {
+      const double angle = -0.5 * kPi + i * kPi / 180.0;
+      std::string& range = words[static_cast<std::size_t>(i) + 2];
+      if (std::abs(angle) < std::atan(0.45 / 1.2) &&
+          std::stod(range) > 1.2 / std::cos(angle)) {
+        range = std::to_string(1.2 / std::cos(angle));
+      }
+    }
+    line.clear();
+    for (const std::string& word : words) line += word + " ";
+  }
+  std::ofstream(folder_ / "cart.clf") << Join(lines);
+  std::string output;
+  ASSERT_EQ(Solve((folder_ / "cart.clf").string(), "cart",
+                  "--outputs=trajectory.tum", &output),
+            0)
+      << output;
+  EXPECT_NE(output.find("something went along with the robot for "),
+            std::string::npos)
+      << output;
+  const RelationEvaluation evaluation =
+      EvaluateRelations(ReadTum((folder_ / "cart/trajectory.tum").string()),
+                        ReadRelations(std::string(PLUMBLINE_SOURCE_DIR) +
+                                      "/datasets/office.relations"));
+  EXPECT_LT(evaluation.translation.mean, 0.08);
+}
+
+TEST_F(SolveTest, BeamsInTheOtherOrderAreSaid) {
+  std::vector<std::string> lines = OfficeLines(400);
+  for (std::string& line : lines) {
+    if (line.compare(0, 6, "FLASER") != 0) continue;
+    std::istringstream fields(line);
+    std::vector<std::string> words{std::istream_iterator<std::string>(fields),
+                                   std::istream_iterator<std::string>()};
+    std::reverse(words.begin() + 2, words.begin() + 2 + std::stoi(words[1]));
+    line.clear();
+    for (const std::string& word : words) line += word + " ";
+  }
+  std::ofstream(folder_ / "mirrored.clf") << Join(lines);
+  std::string output;
+  ASSERT_EQ(Solve((folder_ / "mirrored.clf").string(), "mirrored",
+                  "--outputs=none", &output),
+            0)
+      << output;
+  EXPECT_NE(output.find("the map turns left where odometry turns right"),
+            std::string::npos)
+      << output;
+}
+
 TEST_F(SolveTest, NoOdometryAtAll) {
   std::string text;
   for (int i = 0; i < 60; ++i) {

@@ -119,6 +119,27 @@ TEST(MapReviewTest, TellsWhatOdometryMissed) {
   EXPECT_EQ(loose.size(), 1u);
 }
 
+TEST(MapReviewTest, TellsWaysThatOdometryHasLongerByFar) {
+  ReviewedDrive drive = RoundsOfAHall();
+  Pose2 odometry = Pose2::Zero();
+  Pose2 before = drive.scans.front().odometry;
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    Pose2 motion = Between(before, drive.scans[i].odometry);
+    before = drive.scans[i].odometry;
+    if (i >= 20 && i < 50) motion.head<2>() *= 2.0;
+    odometry = Compose(odometry, motion);
+    drive.scans[i].odometry = odometry;
+  }
+  std::vector<LooseTrack> loose;
+  drive.Review().Revise(Graph(), {}, true, &loose);
+  ASSERT_EQ(loose.size(), 1u);
+  EXPECT_NEAR(loose[0].begin, 19, 2);
+  EXPECT_NEAR(loose[0].end, 50, 3);
+  EXPECT_TRUE(loose[0].found);
+  EXPECT_EQ(loose[0].why.find("odometry has 1"), 0u) << loose[0].why;
+  EXPECT_FALSE(drive.Review().Odometry().is_scale_disputed);
+}
+
 TEST(MapReviewTest, WhereSomethingIsWrongNothingIsTakenForSure) {
   ReviewedDrive drive = RoundsOfAHall();
   for (std::size_t i = 80; i < drive.trajectory.size(); ++i) {

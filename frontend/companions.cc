@@ -1,0 +1,354 @@
+#include <plumbline/core/parallel_for.h>
+#include <plumbline/frontend/companions.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+// Neighbouring returns farther apart than this lie on two things, m.
+constexpr double kEnd = 0.2;
+// Beams over this angle go all around, rad.
+constexpr double kRound = 6.1;
+// Surfaces farther apart than this are not compared, m.
+constexpr double kGate = 0.3;
+// Steps of odometry longer than this between two scans are jumps, m.
+constexpr double kJump = 1.0;
+// While the robot stands what stood beside it before stands there still, m.
+constexpr double kStanding = 0.1;
+// No points are put between beams this far apart, rad.
+constexpr double kNoneBetween = 4.0;
+// Comparisons without it after which a companion is another one.
+constexpr int kMostMissed = 2;
+
+// Points by x, to find those near a place.
+class NearPoints {
+ public:
+  explicit NearPoints(const std::vector<ScanPoint>& points) {
+    for (const ScanPoint& point : points) places_.push_back(point.position);
+    std::sort(places_.begin(), places_.end(),
+              [](const Vector2d& a, const Vector2d& b) { return a[0] < b[0]; });
+  }
+
+  // Least distance from `place` along `normal` of points within the gate; along
+  // every direction where the normal is zero. The gate when there is none.
+  double DistanceTo(const Vector2d& place, const Vector2d& normal) const {
+    double least = kGate;
+    auto it =
+        std::lower_bound(places_.begin(), places_.end(), place[0] - kGate,
+                         [](const Vector2d& a, double x) { return a[0] < x; });
+    for (; it != places_.end() && (*it)[0] <= place[0] + kGate; ++it) {
+      const Vector2d apart = *it - place;
+      const double distance = apart.norm();
+      if (distance > kGate) continue;
+      least = std::min(
+          least, normal.isZero() ? distance : std::abs(normal.dot(apart)));
+    }
+    return least;
+  }
+
+ private:
+  std::vector<Vector2d> places_;
+};
+
+// What two scans say of what stands and what goes along.
+struct Comparison {
+  // Where things that go along are in the robot's frame, in groups.
+  std::vector<std::vector<Vector2d>> things;
+  // Returns that stand, and those that go along.
+  int witnesses = 0;
+  int along = 0;
+};
+
+// Whether what point `i` lies on ends before what lies beside it, in the order
+// of beams (`way` 1 or -1; around where the scan `is_round`).
+bool EndsFreely(const std::vector<ScanPoint>& points, std::size_t i, int way,
+                bool is_round, const CompanionOptions& options) {
+  double length = 0.0;
+  for (std::size_t steps = 0; steps < points.size(); ++steps) {
+    if (!is_round && (way > 0 ? i + 1 == points.size() : i == 0)) return false;
+    const std::size_t next = way > 0 ? (i + 1) % points.size()
+                                     : (i + points.size() - 1) % points.size();
+    const double apart = (points[next].position - points[i].position).norm();
+    if (apart > kEnd) {
+      return points[next].range >= points[i].range + options.min_depth;
+    }
+    length += apart;
+    if (length > options.max_length) return false;
+    i = next;
+  }
+  return false;
+}
+
+Comparison Compare(const std::vector<ScanPoint>& before,
+                   const std::vector<ScanPoint>& now, const Pose2& motion,
+                   bool is_round, const CompanionOptions& options) {
+  Comparison comparison;
+  const NearPoints near(before);
+  const PoseTransform transform(motion);
+  std::vector<Vector2d> thing;
+  std::size_t first = 0;
+  std::size_t last = 0;
+  const auto end_thing = [&] {
+    if (static_cast<int>(thing.size()) >= options.min_returns &&
+        EndsFreely(now, first, -1, is_round, options) &&
+        EndsFreely(now, last, 1, is_round, options)) {
+      comparison.things.push_back(thing);
+    }
+    thing.clear();
+  };
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const ScanPoint& point = now[i];
+    if (point.range > options.max_range || point.is_between) continue;
+    const Vector2d was = transform.Point(point.position);
+    const Vector2d shift = was - point.position;
+    const double says = point.normal.isZero()
+                            ? shift.norm()
+                            : std::abs(point.normal.dot(shift));
+    if (says < options.least_shift) continue;
+    const bool stays = near.DistanceTo(point.position, point.normal) <=
+                       std::min(kGate, options.stays * says);
+    const bool stands =
+        near.DistanceTo(was, transform.Direction(point.normal)) <=
+        options.stands;
+    comparison.witnesses += stands && !stays;
+    if (stands || !stays) continue;
+    ++comparison.along;
+    if (!thing.empty() &&
+        (point.position - thing.back()).norm() > options.gap) {
+      end_thing();
+    }
+    if (thing.empty()) first = i;
+    last = i;
+    thing.push_back(point.position);
+  }
+  end_thing();
+  return comparison;
+}
+
+Vector2d MiddleOf(const std::vector<Vector2d>& thing) {
+  Vector2d sum = Vector2d::Zero();
+  for (const Vector2d& place : thing) sum += place;
+  return sum / static_cast<double>(thing.size());
+}
+
+// A thing that goes along from one comparison to the next.
+struct Track {
+  // Comparison, and where it was seen.
+  std::vector<std::pair<int, std::vector<Vector2d>>> seen;
+  Vector2d middle = Vector2d::Zero();
+  // Of all its comparisons: returns that stand, and that go along on something
+  // else.
+  int witnesses = 0;
+  int others = 0;
+
+  int first() const { return seen.front().first; }
+  int last() const { return seen.back().first; }
+};
+
+class CompanionSearch {
+ public:
+  CompanionSearch(const CompanionOptions& options,
+                  const std::vector<Scan>& scans)
+      : options_(options), scans_(scans) {
+    for (int i = 0; i < static_cast<int>(scans.size()); ++i) {
+      const double step =
+          i == 0 ? 0.0
+                 : (scans[Index(i)].odometry - scans[Index(i - 1)].odometry)
+                       .head<2>()
+                       .norm();
+      way_.push_back((i == 0 ? 0.0 : way_.back()) +
+                     (step <= kJump ? step : 0.0));
+      if (stations_.empty() ||
+          way_.back() - way_[Index(stations_.back())] >= options.step) {
+        stations_.push_back(i);
+      }
+    }
+  }
+
+  std::vector<Track> Find() const {
+    const std::vector<Comparison> comparisons = CompareAll();
+    std::vector<Track> open, found;
+    for (int i = 0; i < static_cast<int>(comparisons.size()); ++i) {
+      const Comparison& comparison = comparisons[Index(i)];
+      std::vector<bool> taken(open.size(), false);
+      std::vector<Track> begun;
+      for (const std::vector<Vector2d>& thing : comparison.things) {
+        const Vector2d middle = MiddleOf(thing);
+        std::size_t best = open.size();
+        double least = options_.max_shift;
+        for (std::size_t k = 0; k < open.size(); ++k) {
+          const double apart = (open[k].middle - middle).norm();
+          if (taken[k] || apart > least) continue;
+          least = apart;
+          best = k;
+        }
+        if (best < open.size()) {
+          taken[best] = true;
+        } else {
+          begun.emplace_back();
+        }
+        Track& track = best < open.size() ? open[best] : begun.back();
+        track.seen.emplace_back(i, thing);
+        track.middle = middle;
+        track.witnesses += comparison.witnesses;
+        track.others += comparison.along - static_cast<int>(thing.size());
+      }
+      std::vector<Track> still_open = std::move(begun);
+      for (Track& track : open) {
+        (i - track.last() <= kMostMissed ? still_open : found)
+            .push_back(std::move(track));
+      }
+      open = std::move(still_open);
+    }
+    for (Track& track : open) found.push_back(std::move(track));
+    found.erase(std::remove_if(found.begin(), found.end(),
+                               [this](const Track& track) {
+                                 return !IsBelieved(track) ||
+                                        !IsSeenBetween(track);
+                               }),
+                found.end());
+    std::sort(found.begin(), found.end(), [](const Track& a, const Track& b) {
+      return std::make_pair(a.first(), a.last()) <
+             std::make_pair(b.first(), b.last());
+    });
+    return found;
+  }
+
+  // Whether the scans between those that were compared show it, too.
+  bool IsSeenBetween(const Track& track) const {
+    const double square = options_.reach_between * options_.reach_between;
+    double shown = 0.0;
+    double all = 0.0;
+    std::vector<ScanPoint> points;
+    for (const auto& [comparison, thing] : track.seen) {
+      const int end = stations_[Index(comparison + 1)];
+      for (int i = stations_[Index(comparison)] + 1; i < end; ++i) {
+        Returns(scans_[Index(i)], &points);
+        for (const Vector2d& place : thing) {
+          shown += std::any_of(
+              points.begin(), points.end(), [&](const ScanPoint& point) {
+                return (point.position - place).squaredNorm() <= square;
+              });
+        }
+        all += static_cast<double>(thing.size());
+      }
+    }
+    return shown >= options_.min_share_between * all;
+  }
+
+  // Takes the returns of `track` out of `scans`.
+  Companion TakeOut(const Track& track, std::vector<Scan>* scans) const {
+    Companion companion;
+    const int first = stations_[Index(track.first())];
+    companion.begin = first;
+    companion.end = stations_[Index(track.last() + 1)];
+    // The robot may have stood beside it before.
+    while (companion.begin > 0 &&
+           way_[Index(first)] - way_[Index(companion.begin - 1)] <= kStanding) {
+      --companion.begin;
+    }
+    companion.way = way_[Index(companion.end)] - way_[Index(companion.begin)];
+    const double square = options_.reach * options_.reach;
+    std::vector<ScanPoint> points;
+    std::size_t next = 0;
+    for (int i = companion.begin; i <= companion.end; ++i) {
+      // What was seen in the last comparison before this scan and in the next.
+      while (next < track.seen.size() &&
+             stations_[Index(track.seen[next].first + 1)] <= i) {
+        ++next;
+      }
+      const std::size_t begin = next == 0 ? 0 : next - 1;
+      const std::size_t end = std::min(track.seen.size(), next + 1);
+      Scan& scan = (*scans)[Index(i)];
+      Returns(scan, &points);
+      for (const ScanPoint& point : points) {
+        bool is_near = false;
+        for (std::size_t k = begin; k < end && !is_near; ++k) {
+          const std::vector<Vector2d>& thing = track.seen[k].second;
+          is_near = std::any_of(
+              thing.begin(), thing.end(), [&](const Vector2d& place) {
+                return (place - point.position).squaredNorm() <= square;
+              });
+        }
+        if (!is_near) continue;
+        scan.ranges[Index(point.beam)] = 0.0f;
+        ++companion.returns;
+      }
+    }
+    return companion;
+  }
+
+ private:
+  static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+  // Those of the beams alone, near enough.
+  void Returns(const Scan& scan, std::vector<ScanPoint>* points) const {
+    ScanPointsOptions options = options_.points;
+    options.max_beam_step = kNoneBetween;
+    options.usable_range = options_.max_range + options_.reach;
+    ExtractScanPoints(scan, options, points);
+  }
+
+  std::vector<Comparison> CompareAll() const {
+    const std::size_t count = stations_.empty() ? 0 : stations_.size() - 1;
+    std::vector<Comparison> comparisons(count);
+    std::vector<std::vector<ScanPoint>> points(stations_.size());
+    ParallelFor(stations_.size(), ThreadsHere(), [&](std::size_t i) {
+      ExtractScanPoints(scans_[Index(stations_[i])], options_.points,
+                        &points[i]);
+    });
+    ParallelFor(count, ThreadsHere(), [&](std::size_t i) {
+      const Pose2 motion = Between(scans_[Index(stations_[i])].odometry,
+                                   scans_[Index(stations_[i + 1])].odometry);
+      if (std::abs(motion[2]) > options_.max_turn ||
+          motion.head<2>().norm() < 0.5 * options_.step) {
+        return;
+      }
+      const Scan& scan = scans_[Index(stations_[i + 1])];
+      const bool is_round =
+          std::abs(scan.angle_step) * static_cast<double>(scan.ranges.size()) >
+          kRound;
+      comparisons[i] =
+          Compare(points[i], points[i + 1], motion, is_round, options_);
+    });
+    return comparisons;
+  }
+
+  bool IsBelieved(const Track& track) const {
+    const auto seen = static_cast<double>(track.seen.size());
+    const double span = track.last() - track.first() + 1.0;
+    return static_cast<int>(track.seen.size()) >= options_.min_steps &&
+           seen >= options_.min_share * span &&
+           track.witnesses >= options_.min_witnesses &&
+           track.witnesses >= options_.min_witnesses_per_step * seen &&
+           track.witnesses >= options_.min_ratio * track.others;
+  }
+
+  const CompanionOptions& options_;
+  const std::vector<Scan>& scans_;
+  // Way by odometry up to each scan, m.
+  std::vector<double> way_;
+  // Scans that are compared, each with the next.
+  std::vector<int> stations_;
+};
+
+}  // namespace
+
+std::vector<Companion> TakeOutCompanions(const CompanionOptions& options,
+                                         std::vector<Scan>* scans) {
+  const CompanionSearch search(options, *scans);
+  std::vector<Companion> companions;
+  for (const Track& track : search.Find()) {
+    companions.push_back(search.TakeOut(track, scans));
+  }
+  return companions;
+}
+
+}  // namespace plumbline

@@ -121,6 +121,24 @@ std::vector<DisputedWay> DisputedWays(const std::vector<Step>& steps,
   return disputed;
 }
 
+double CourseOf(const std::vector<Step>& steps, const std::vector<Scan>& scans,
+                const std::vector<Pose2>& trajectory,
+                const OdometryCheckOptions& options) {
+  double along = 0.0;
+  double aside = 0.0;
+  for (const Step& step : steps) {
+    const auto begin = static_cast<std::size_t>(step.begin);
+    const auto end = static_cast<std::size_t>(step.end);
+    const Pose2 by_odometry =
+        Between(scans[begin].odometry, scans[end].odometry);
+    const Pose2 by_map = Between(trajectory[begin], trajectory[end]);
+    if (std::abs(by_odometry[2]) > options.straight) continue;
+    along += by_odometry.head<2>().dot(by_map.head<2>());
+    aside += by_odometry[0] * by_map[1] - by_odometry[1] * by_map[0];
+  }
+  return std::atan2(aside, along);
+}
+
 bool AreTurnsOpposite(const std::vector<Scan>& scans,
                       const std::vector<Pose2>& trajectory,
                       const OdometryCheckOptions& options) {
@@ -166,6 +184,9 @@ OdometryAgreement CompareWithOdometry(const std::vector<Scan>& scans,
     agreement.scale = MedianScale(steps);
     agreement.is_scale_disputed = agreement.scale > options.max_scale ||
                                   agreement.scale * options.max_scale < 1.0;
+    agreement.course = CourseOf(steps, scans, trajectory, options);
+    agreement.is_course_disputed =
+        std::abs(agreement.course) > options.max_course;
   }
   // A scale that is nonsense is none to measure with.
   agreement.disputed =

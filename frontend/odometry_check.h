@@ -21,8 +21,12 @@ struct OdometryCheckOptions {
   /// A metre of odometry's that is this many times the map's, or its inverse,
   /// is disputed, ...
   double max_scale = 1.25;
-  /// ... where the robot went this far, m.
+  /// ... where the robot went this far, m; so is a direction of its way that is
+  /// this far from odometry's in its own frame, rad, where it goes straight on:
+  /// turns by less than this between two scans that are looked at, rad.
   double min_way = 10.0;
+  double max_course = 0.35;
+  double straight = 0.3;
   /// Scans that turn the other way than odometry do so in all turns between
   /// scans of this much and more, rad: the correlation is below minus this, and
   /// the turns add up to this, rad.
@@ -50,6 +54,10 @@ struct OdometryAgreement {
   double scale = 1.0;
   /// Whether that is far from 1.
   bool is_scale_disputed = false;
+  /// How far to the left of where odometry has it the robot goes in the map,
+  /// in its own frame, rad: what the mounting of the laser is off by.
+  double course = 0.0;
+  bool is_course_disputed = false;
   /// Whether the map turns left where odometry turns right: the order of the
   /// beams is another than the log says, or a sign of odometry's.
   bool turns_are_opposite = false;

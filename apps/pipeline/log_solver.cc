@@ -77,8 +77,17 @@ void AddNotesOn(const OdometryAgreement& odometry,
         "other order (a laser upside down: the map is a mirror image), or the "
         "sign of odometry's turns is wrong");
   }
+  char text[200];
+  if (odometry.is_course_disputed) {
+    std::snprintf(text, sizeof text,
+                  "the robot goes %.0f degrees to the %s of where odometry has "
+                  "it: the laser is mounted turned by as much against what the "
+                  "log says, or the map is wrong",
+                  RadToDeg(std::abs(odometry.course)),
+                  odometry.course > 0.0 ? "left" : "right");
+    notes->push_back(text);
+  }
   if (odometry.is_scale_disputed) {
-    char text[160];
     std::snprintf(text, sizeof text,
                   "a metre of odometry's is %.2f m in the map: its scale is "
                   "wrong, or lengths of the map are",

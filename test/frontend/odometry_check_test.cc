@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/error.h>
+#include <plumbline/factors/angle.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/odometry_check.h>
 
@@ -94,6 +95,21 @@ TEST(OdometryCheckTest, TurnsTheOtherWayAreTold) {
       Compare(ScansWithOdometry(poses, Pose2(1.0, 1.0, -0.95)), poses);
   EXPECT_TRUE(agreement.turns_are_opposite);
   EXPECT_FALSE(agreement.is_scale_disputed);
+}
+
+// A laser that looks to the left while the log says that it looks ahead.
+TEST(OdometryCheckTest, AWayToTheSideIsTold) {
+  const std::vector<Pose2> poses = Squares(6);
+  std::vector<Pose2> map = poses;
+  for (Pose2& pose : map) pose[2] = NormalizeAngle(pose[2] + 0.5 * kPi);
+  const std::vector<Scan> scans =
+      ScansWithOdometry(poses, Pose2(1.0, 1.0, 1.0));
+  const OdometryAgreement agreement = Compare(scans, map);
+  EXPECT_NEAR(agreement.course, -0.5 * kPi, 0.01);
+  EXPECT_TRUE(agreement.is_course_disputed);
+  EXPECT_FALSE(agreement.turns_are_opposite);
+  EXPECT_NEAR(Compare(scans, poses).course, 0.0, 1e-9);
+  EXPECT_FALSE(Compare(scans, poses).is_course_disputed);
 }
 
 TEST(OdometryCheckTest, JumpsOfOdometrySayNothing) {

@@ -5,6 +5,7 @@
 #include <plumbline/outputs/marginals_output.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <sstream>
@@ -22,6 +23,34 @@ bool HasLiveConstraint(const Graph& graph, FeatureId id) {
     }
   }
   return false;
+}
+
+// What of the selection has no covariance: types of which nothing was found, in
+// the order of their names, and numbers that are not among `ids`, which ascend.
+std::vector<std::string> WithoutFeatures(
+    const Graph& graph, const MarginalsSelection& selection,
+    const std::set<const FeatureType*>& found,
+    const std::vector<FeatureId>& ids) {
+  std::vector<std::string> missing;
+  for (const FeatureType* type : selection.types) {
+    if (found.count(type) == 0) {
+      missing.push_back("no " + type->name + " that was measured");
+    }
+  }
+  // Pointers have no order that is the same in every run.
+  std::sort(missing.begin(), missing.end());
+  if (selection.all && ids.empty()) {
+    missing.push_back("nothing that was measured");
+  }
+  for (const FeatureId id : selection.ids) {
+    if (std::binary_search(ids.begin(), ids.end(), id)) continue;
+    const Feature* feature = graph.FindFeature(id);
+    missing.push_back(feature == nullptr
+                          ? "no feature " + std::to_string(id)
+                          : "no live constraint on " + feature->type->name +
+                                " " + std::to_string(id));
+  }
+  return missing;
 }
 
 }  // namespace
@@ -92,24 +121,26 @@ void CheckGauge(const Graph& graph, const MarginalsSelection& selection) {
 FeatureCovariances ComputeMarginals(const Graph& graph,
                                     const SolverSession* session,
                                     const MarginalsSelection& selection,
-                                    bool hold_gauge) {
+                                    bool hold_gauge,
+                                    std::vector<std::string>* missing) {
   FeatureCovariances covariances;
   if (selection.empty()) return covariances;
   std::vector<FeatureId> ids;
-  for (const FeatureId id : selection.ids) {
-    if (graph.FindFeature(id) == nullptr) {
-      throw Error("--marginals", 0, "no feature " + std::to_string(id),
-                  "numbers of features as in map.json");
-    }
-  }
+  std::set<const FeatureType*> found;
   for (const Feature* feature : graph.Features()) {
-    const bool is_of_type =
-        selection.all || selection.types.count(feature->type) > 0;
-    if (selection.ids.count(feature->id) > 0 ||
-        (is_of_type && HasLiveConstraint(graph, feature->id))) {
-      ids.push_back(feature->id);
-    }
+    const bool is_selected = selection.all ||
+                             selection.types.count(feature->type) > 0 ||
+                             selection.ids.count(feature->id) > 0;
+    // A fixed feature is known without any constraint.
+    const bool is_known =
+        HasLiveConstraint(graph, feature->id) ||
+        (feature->fixed && selection.ids.count(feature->id) > 0);
+    if (!is_selected || !is_known) continue;
+    ids.push_back(feature->id);
+    found.insert(feature->type);
   }
+  *missing = WithoutFeatures(graph, selection, found, ids);
+  if (ids.empty()) return covariances;
   MarginalsOptions options;
   options.hold_gauge = hold_gauge;
   Marginals marginals = session == nullptr

@@ -33,15 +33,16 @@ MarginalsSelection ParseMarginalsSelection(const std::string& list,
 void CheckGauge(const Graph& graph, const MarginalsSelection& selection);
 
 /// Covariances of the features selected in the map frame, at the present state.
-/// `session` may be null: structure then counts by its delta. Types select the
-/// features that a live constraint speaks of; a number must be such a feature.
-/// With `hold_gauge` the lowest feature of a part that nothing ties to the
-/// plane is taken as known; otherwise asking for one of such a part throws
-/// Error.
+/// `session` may be null: structure then counts by its delta. Types and numbers
+/// select the features that a live constraint speaks of; what selects none is
+/// left out, and `missing` gets a few words on each: "no feature 17". With
+/// `hold_gauge` the lowest feature of a part that nothing ties to the plane is
+/// taken as known; otherwise asking for one of such a part throws Error.
 FeatureCovariances ComputeMarginals(const Graph& graph,
                                     const SolverSession* session,
                                     const MarginalsSelection& selection,
-                                    bool hold_gauge);
+                                    bool hold_gauge,
+                                    std::vector<std::string>* missing);
 
 /// Ellipses of this many standard deviations of the positions of those features
 /// that have one (parameters x and y first). Left out where the graph says

@@ -2,11 +2,14 @@
 #include <plumbline/apps/cli/progress.h>
 #include <plumbline/apps/solve/run_summary.h>
 #include <plumbline/apps/solve_flags.h>
+#include <plumbline/core/error.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/outputs/marginals_output.h>
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace plumbline {
 
@@ -46,10 +49,27 @@ void TellPhase(const EmPhase& phase) {
 
 void TakeMarginals(const SolverSession* session, SolveOutcome* outcome) {
   const Stopwatch watch;
-  outcome->covariances = ComputeMarginals(
-      *outcome->graph, session,
-      ParseMarginalsSelection(FLAGS_marginals, *outcome->registry),
-      FLAGS_marginals_hold_gauge);
+  std::vector<std::string> missing;
+  try {
+    outcome->covariances = ComputeMarginals(
+        *outcome->graph, session,
+        ParseMarginalsSelection(FLAGS_marginals, *outcome->registry),
+        FLAGS_marginals_hold_gauge, &missing);
+  } catch (const Error& error) {
+    // The map stands without them.
+    Remark("the map is written without covariances: %s", error.what());
+  }
+  if (!missing.empty()) {
+    std::string list;
+    for (const std::string& what : missing) {
+      list += (list.empty() ? "" : ", ") + what;
+    }
+    Remark(
+        "--marginals=%s: the map has %s%s; map.json names the types of "
+        "features and their numbers",
+        FLAGS_marginals.c_str(), list.c_str(),
+        outcome->covariances.empty() ? ", and so no covariances" : "");
+  }
   outcome->ellipse_sigmas = FLAGS_ellipse_sigmas;
   if (!outcome->covariances.empty()) {
     Detail("covariances of %zu features in %.1f s", outcome->covariances.size(),

@@ -1743,6 +1743,29 @@ TEST_F(SolveTest, MarginalsOfAGraph) {
   EXPECT_THAT(output, HasSubstr("--marginals"));
 }
 
+TEST_F(SolveTest, MarginalsThatTheMapDoesNotHave) {
+  // Nothing that was computed is lost for them.
+  const std::string log = Write("short.clf", Join(OfficeLines(120)));
+  std::string output;
+  ASSERT_EQ(Solve(log, "some", "--marginals=segment,circle,99999", &output), 0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("--marginals=segment,circle,99999: the map has "
+                                "no circle that was measured, no feature "
+                                "99999"));
+  ASSERT_EQ(Solve(log, "none", "--marginals=point,line", &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("and so no covariances"));
+  std::map<std::string, int> with;
+  for (const char* out : {"some", "none"}) {
+    const auto map = nlohmann::json::parse(Out(out, "map.json"));
+    for (const auto& feature : map["features"]) {
+      if (feature.contains("covariance")) ++with[out];
+    }
+  }
+  EXPECT_GT(with["some"], 0);
+  EXPECT_EQ(with["none"], 0);
+  EXPECT_EQ(Files("none"), FilesOfALog());
+}
+
 // The graphs that the field compares by, to the objective that a solve to
 // rounding reaches (README).
 TEST_F(SolveTest, PublicGraphs) {

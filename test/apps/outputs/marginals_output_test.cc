@@ -14,7 +14,9 @@
 namespace plumbline {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 class MarginalsOutputTest : public ::testing::Test {
  protected:
@@ -44,8 +46,9 @@ class MarginalsOutputTest : public ::testing::Test {
   }
 
   FeatureCovariances Compute(const std::string& list, bool hold_gauge = false) {
-    return ComputeMarginals(
-        graph_, nullptr, ParseMarginalsSelection(list, registry_), hold_gauge);
+    return ComputeMarginals(graph_, nullptr,
+                            ParseMarginalsSelection(list, registry_),
+                            hold_gauge, &missing_);
   }
   std::string Refusal(const std::string& list) {
     try {
@@ -58,6 +61,8 @@ class MarginalsOutputTest : public ::testing::Test {
 
   Registry registry_;
   Graph graph_;
+  // Of the last Compute().
+  std::vector<std::string> missing_;
 };
 
 TEST_F(MarginalsOutputTest, Selections) {
@@ -143,9 +148,22 @@ TEST_F(MarginalsOutputTest, GaugeIsCheckedBeforehand) {
 }
 
 TEST_F(MarginalsOutputTest, FeaturesThatHaveNone) {
+  // What can be had is there all the same.
   Make(/*fixed=*/true);
-  EXPECT_THAT(Refusal("99"), HasSubstr("--marginals: no feature 99"));
-  EXPECT_THAT(Refusal("2"), HasSubstr("no covariance"));
+  EXPECT_EQ(Compute("line,segment,1,2,99").size(), 1u);
+  EXPECT_THAT(
+      missing_,
+      ElementsAre("no line that was measured", "no segment that was measured",
+                  "no live constraint on point 2", "no feature 99"));
+  EXPECT_EQ(Compute("point,0").size(), 2u);
+  EXPECT_THAT(missing_, IsEmpty());
+  EXPECT_TRUE(Compute("circle").empty());
+  EXPECT_THAT(missing_, ElementsAre("no circle that was measured"));
+  EXPECT_TRUE(ComputeMarginals(Graph(), nullptr,
+                               ParseMarginalsSelection("all", registry_), false,
+                               &missing_)
+                  .empty());
+  EXPECT_THAT(missing_, ElementsAre("nothing that was measured"));
 }
 
 TEST_F(MarginalsOutputTest, MapJson) {

@@ -83,7 +83,9 @@ DEFINE_string(launcher_options, "",
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");
 DEFINE_string(minimize, "",
               "Figure by which the best setting is chosen: a column of "
-              "sweep.csv, as in evaluation.relations.translation_m.mean");
+              "sweep.csv, as in evaluation.relations.translation_m.mean. A "
+              "folder that is gone on with without a command keeps its "
+              "figure; empty: none");
 DEFINE_string(maximize, "", "The same, the most of it being best");
 DEFINE_string(figures, "",
               "Figures to draw, separated by commas: columns of sweep.csv, in "
@@ -380,6 +382,22 @@ std::string EstimateText(const Estimate& estimate, std::size_t trials) {
   return text;
 }
 
+bool IsGiven(const char* flag) {
+  return !gflags::GetCommandLineFlagInfoOrDie(flag).is_default;
+}
+
+// Keeps the question with the runs. Who only has the pages made anew asks the
+// one that was asked last.
+void TakeObjective(bool has_command, SweepDefinition* definition) {
+  if (has_command || IsGiven("minimize") || IsGiven("maximize")) {
+    definition->objective = Objective();
+    definition->maximize = !FLAGS_maximize.empty();
+  } else {
+    (definition->maximize ? FLAGS_maximize : FLAGS_minimize) =
+        definition->objective;
+  }
+}
+
 // Removes the best.flags of an earlier question, which would be taken for the
 // answer to this one; false when somebody else's is in its place, which stays.
 bool RemoveBest(SweepDefinition* definition, const std::string& folder) {
@@ -549,6 +567,7 @@ int Run(const std::vector<std::string>& command) {
                 "a folder that can be written to");
   }
   if (!old_one) CheckNewFolder(folder);
+  TakeObjective(!command.empty(), &definition);
   CheckObjectiveBeforehand(definition);
   CheckFlagsOfRuns(definition);
   const FolderLock lock(folder);
@@ -561,12 +580,16 @@ int Run(const std::vector<std::string>& command) {
   });
   TellRuns(result);
   WriteOverview(result, folder);
+  const std::string best = folder + "/best.flags";
+  const bool had_best = fs::exists(best, error);
   const bool may_write = RemoveBest(&definition, folder);
-  if (!FLAGS_minimize.empty() || !FLAGS_maximize.empty()) {
+  if (!Objective().empty()) {
     TellBest(result, may_write, &definition, folder);
   } else if (!may_write) {
-    Remark("%s/best.flags is not what this sweep wrote, and stays",
-           folder.c_str());
+    Remark("%s is not what this sweep wrote, and stays", best.c_str());
+  } else if (had_best) {
+    Remark("%s: removed: there is no --minimize or --maximize now",
+           best.c_str());
   }
   return TellFailures(result) && !InterruptRequested() ? kExitInput
                                                        : kExitSuccess;

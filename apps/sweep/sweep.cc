@@ -311,6 +311,8 @@ void WriteDefinition(const SweepDefinition& definition,
              {"working_directory", definition.working_directory},
              {"environment", std::move(environment)},
              {"time_limit", definition.time_limit},
+             {"objective", definition.objective},
+             {"maximize", definition.maximize},
              {"best_digest", definition.best_digest},
              {"made_in", PlaceOf(folder)}},
             folder + "/sweep.json");
@@ -394,6 +396,8 @@ std::optional<SweepDefinition> ReadDefinition(const std::string& folder) {
       definition.environment.emplace_back(name, value.get<std::string>());
     }
     definition.time_limit = json.at("time_limit").get<double>();
+    definition.objective = json.value("objective", "");
+    definition.maximize = json.value("maximize", false);
     definition.best_digest = json.value("best_digest", "");
     CheckDefinition(definition, path);
     return definition;

@@ -35,6 +35,10 @@ struct SweepDefinition {
   std::vector<std::pair<std::string, std::string>> environment;
   /// Most time of a run, command and evaluation, s; 0: no limit.
   double time_limit = 0.0;
+  /// Figure by which the best setting was chosen last, and whether the most of
+  /// it is best; empty: nobody asked.
+  std::string objective;
+  bool maximize = false;
   /// SHA-256 of best.flags as the sweep wrote it last; empty: it wrote none.
   std::string best_digest;
 };

@@ -155,10 +155,18 @@ TEST_F(SweepBinaryTest, ATableOfAllRuns) {
                                               "3 6", "4 5", "4 6"));
   EXPECT_EQ(Read("out/best.flags"), "--x=4\n");
 
-  // Without a command the sweep in the folder goes on, and without a question
-  // there is no answer of an earlier one.
+  // Without a command the sweep in the folder goes on, and its question with
+  // it.
   ASSERT_EQ(Run("--output_dir=" + folder_ + "/out", &output), 0);
   EXPECT_EQ(Notes().size(), 8u);
+  EXPECT_THAT(output, HasSubstr("best: --x=4"));
+  EXPECT_EQ(Read("out/best.flags"), "--x=4\n");
+  EXPECT_THAT(Read("out/sweep.html"), HasSubstr("Most y"));
+  // Without a question there is no answer of an earlier one.
+  ASSERT_EQ(Run("--minimize= --output_dir=" + folder_ + "/out", &output), 0);
+  EXPECT_THAT(output, HasSubstr("best.flags: removed"));
+  EXPECT_FALSE(fs::exists(folder_ + "/out/best.flags"));
+  ASSERT_EQ(Run("--output_dir=" + folder_ + "/out", &output), 0);
   EXPECT_FALSE(fs::exists(folder_ + "/out/best.flags"));
   EXPECT_EQ(Run("--figures=z --output_dir=" + folder_ + "/out", &output), 2);
   EXPECT_THAT(output, HasSubstr("--figures: no run has a figure 'z'"));

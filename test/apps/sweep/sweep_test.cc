@@ -73,6 +73,8 @@ TEST_F(SweepTest, DefinitionsComeBackFromTheirFile) {
   definition_.axes = {{"x", {"1", "a,b"}}, {"y", {""}}};
   definition_.one_at_a_time = true;
   definition_.best_digest = "abc";
+  definition_.objective = "cost.total";
+  definition_.maximize = true;
   definition_.trials = 7;
   definition_.first_seed = 18446744073709551000u;
   definition_.seed_flag = "";
@@ -88,6 +90,9 @@ TEST_F(SweepTest, DefinitionsComeBackFromTheirFile) {
   EXPECT_THAT(read->axes[0].values, ElementsAre("1", "a,b"));
   EXPECT_THAT(read->axes[1].values, ElementsAre(""));
   EXPECT_TRUE(read->one_at_a_time);
+  EXPECT_EQ(read->objective, "cost.total");
+  EXPECT_TRUE(read->maximize);
+  EXPECT_EQ(read->best_digest, "abc");
   EXPECT_EQ(read->trials, 7);
   EXPECT_EQ(read->first_seed, 18446744073709551000u);
   EXPECT_EQ(read->seed_flag, "");

@@ -17,6 +17,8 @@ struct MapWithoutStructure {
   std::map<FeatureId, Feature> features;
   /// One pose per scan (map frame).
   std::vector<Pose2> path;
+  /// Empty because somebody said that it was time to stop.
+  bool interrupted = false;
 };
 
 /// The map moved rigidly. Throws Error as Moved of a feature does.

@@ -49,6 +49,8 @@ namespace {
 volatile std::sig_atomic_t interrupted = 0;
 // Whether messages go to one.
 volatile std::sig_atomic_t has_terminal = 0;
+// TellWhole() was called.
+bool is_whole = false;
 
 extern "C" void HandleInterrupt(int) { interrupted = 1; }
 
@@ -314,8 +316,14 @@ int RunMain(const std::function<int()>& run) {
       throw Error("standard output", 0, "cannot be written", "");
     }
     if (status == kExitSuccess && InterruptRequested()) {
-      std::fprintf(stderr, "interrupted: what was done so far is written\n");
-      status = kExitInterrupted;
+      if (is_whole) {
+        std::fprintf(stderr,
+                     "interrupted when all was done: what is written is "
+                     "whole\n");
+      } else {
+        std::fprintf(stderr, "interrupted: what was done so far is written\n");
+        status = kExitInterrupted;
+      }
     }
   } catch (const Interruption&) {
     std::fprintf(stderr, "interrupted\n");
@@ -339,6 +347,8 @@ int RunMain(const std::function<int()>& run) {
 }
 
 bool InterruptRequested() { return interrupted != 0; }
+
+void TellWhole() { is_whole = true; }
 
 std::string ReadTextInput(const std::string& path, std::size_t limit) {
   std::string text = ReadTextFile(path, limit, InterruptRequested);

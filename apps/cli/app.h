@@ -96,6 +96,11 @@ auto ForFlag(const std::string& name, const Function& function)
 /// the process at once.
 bool InterruptRequested();
 
+/// Says that all work is done: an interrupt that came meanwhile, or comes yet,
+/// came too late to cut anything short. RunMain then says so and returns what
+/// it would have returned without it.
+void TellWhole();
+
 /// What --help says of a flag of this project.
 struct FlagDescription {
   std::string name;

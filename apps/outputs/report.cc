@@ -386,6 +386,9 @@ Json DataToJson(const Report& report) {
   json["input"] = summary.input;
   json["seed"] = summary.seed;
   json["version"] = kVersion;
+  json["partial"] = summary.partial
+                        ? Json{{"scans_in_log", summary.scans_in_log}}
+                        : Json(nullptr);
   json["delta_threshold"] = Rounded(report.delta_threshold, 1e9);
   json["counts"] = Json::parse(CountsAsJson(summary));
   json["cost"] = {{"initial", Digits(summary.initial_cost)},

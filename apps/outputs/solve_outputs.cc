@@ -17,6 +17,7 @@
 #include <plumbline/outputs/solve_outputs.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -113,6 +114,10 @@ class SharedParts {
     return are_rooms_found_ ? &plan_.building : nullptr;
   }
 
+  // An interrupt kept something out of a file that is there.
+  void TellCut() { is_cut_ = true; }
+  bool is_cut() const { return is_cut_; }
+
   // Why the plan of a log has no rooms; empty when they were looked for.
   const std::string& no_rooms() const { return no_rooms_; }
 
@@ -141,6 +146,7 @@ class SharedParts {
   FloorPlan plan_;
   bool are_rooms_found_ = false;
   std::string no_rooms_;
+  std::atomic<bool> is_cut_ = false;
 };
 
 namespace {
@@ -174,6 +180,11 @@ Report MakeReport(const SolveOutcome& outcome) {
   for (const EmPhase& phase : outcome.trace)
     report.trace.push_back({phase, {}});
   report.summary = outcome.summary;
+  if (report.before.interrupted) {
+    // Also where the interrupt came only now.
+    report.summary.partial = true;
+    outcome.parts->TellCut();
+  }
   report.flags = outcome.flags;
   report.delta_threshold = outcome.delta_threshold;
   report.title = outcome.title;
@@ -514,6 +525,7 @@ WrittenOutputs WriteSolveOutputs(
     throw Error("no file is replaced", 0, failure, "");
   }
   std::sort(written.files.begin(), written.files.end());
+  written.is_cut = outcome.parts->is_cut();
   return written;
 }
 

@@ -90,6 +90,9 @@ struct WrittenOutputs {
   std::map<std::string, std::string> digests;
   /// A line for each that made no sense, with why.
   std::vector<std::string> reasons;
+  /// An interrupt came while they were written, and something is missing in
+  /// one of them.
+  bool is_cut = false;
 };
 
 /// Names of all files that these writers write, further ones included.

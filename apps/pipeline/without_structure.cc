@@ -75,7 +75,10 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
   points_options.ScaleToNoise(result.noise_scale);
   std::vector<ScanPoint> points;
   for (const KeyScanRecord& record : result.records) {
-    if (is_stopped()) return map;
+    if (is_stopped()) {
+      map.interrupted = true;
+      return map;
+    }
     const Scan& scan = scans[static_cast<std::size_t>(record.scan)];
     const RefinedScan& refined =
         result.refined[static_cast<std::size_t>(record.scan)];
@@ -95,7 +98,9 @@ MapWithoutStructure ReplayWithoutStructure(const std::vector<Scan>& scans,
   }
   SolverSession session(&graph, registry, options.session);
   session.SetStop(is_stopped);
-  if (!session.SolveGlobal().usable || is_stopped()) return map;
+  const bool usable = session.SolveGlobal().usable;
+  map.interrupted = is_stopped();
+  if (!usable || map.interrupted) return map;
 
   std::vector<Pose2> keys;
   if (!places.empty()) {

@@ -28,7 +28,8 @@ std::map<FeatureId, Feature> SolveWithoutStructure(const Graph& graph,
 /// It begins at the pose at which that map does. `options` are those that gave
 /// `result`, whose fields refined, records and trajectory are read. Empty when
 /// there is nothing to compare: no scans, no structure asked for, a solve that
-/// fails, or once `stop` (may be null) says so. Throws Error when the scans
+/// fails, or once `stop` (may be null) says so, which `interrupted` then tells.
+/// Throws Error when the scans
 /// cannot be found again on the map. Costs the front-end without scan matching,
 /// one global solve and one relocalization.
 MapWithoutStructure ReplayWithoutStructure(

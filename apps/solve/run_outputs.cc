@@ -153,6 +153,7 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
     for (const std::string& reason : written.reasons) {
       Remark("%s", reason.c_str());
     }
+    if (written.is_cut) outcome->summary.partial = true;
     outcome->summary.files = std::move(written.files);
     outcome->summary.digests = written.digests;
     outcome->summary.write_seconds = watch.Seconds();
@@ -173,6 +174,7 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
 void FinishRun(const RunContext& run, std::size_t num_maps,
                SolveOutcome* outcome) {
   WriteOutputs(outcome, run.clock, run.folder);
+  if (!outcome->summary.partial) TellWhole();
   RemoveMapsFrom(num_maps, run.registry);
   run.live->Finish(*outcome);
   TellEnd(*outcome, run.clock);

@@ -161,8 +161,10 @@ int SolveGraph(InputStream* input, const RunContext& run) {
   if (!InterruptRequested()) TakeMarginals(&solver.session(), &outcome);
   outcome.g2o = &*g2o;
   outcome.without_structure = [&] {
-    if (InterruptRequested()) return MapWithoutStructure();
-    return MapWithoutStructure{SolveWithoutStructure(graph, registry), {}};
+    MapWithoutStructure map;
+    map.interrupted = InterruptRequested();
+    if (!map.interrupted) map.features = SolveWithoutStructure(graph, registry);
+    return map;
   };
   outcome.title = TitleOf(input->name());
   FinishRun(run, 1, &outcome);

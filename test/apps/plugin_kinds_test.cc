@@ -110,6 +110,27 @@ TEST_F(PluginKindsTest, WhateverOneThrowsEndsTheRunWithAMessage) {
   EXPECT_THAT(output, HasSubstr("an exception of an unknown type"));
 }
 
+// The exit status and what is written agree.
+TEST_F(PluginKindsTest, AnInterruptWhileFilesAreWritten) {
+  const auto solve = [&](const std::string& outputs, std::string* output) {
+    return Solve("--input=" PLUMBLINE_SOURCE_DIR
+                 "/datasets/office.clf.gz --num_threads=1 --outputs=" +
+                     outputs + " --output_dir=" + (folder_ / "out").string(),
+                 output);
+  };
+  // The trajectory has all that it has without.
+  std::string output;
+  EXPECT_EQ(solve("trajectory.tum,interrupt.txt", &output), 0) << output;
+  EXPECT_THAT(output, HasSubstr("interrupted when all was done"));
+  EXPECT_THAT(Read("out/summary.json"), HasSubstr("\"partial\": false"));
+  // The report has no map without structure.
+  EXPECT_EQ(solve("interrupt.txt,report.html", &output), 130) << output;
+  EXPECT_THAT(output, HasSubstr("what was done so far is written"));
+  EXPECT_THAT(Read("out/summary.json"), HasSubstr("\"partial\": true"));
+  EXPECT_THAT(Read("out/report.html"),
+              HasSubstr("\"partial\":{\"scans_in_log\":"));
+}
+
 TEST_F(PluginKindsTest, AreListedUnderTheirFlags) {
   std::string output;
   ASSERT_EQ(Solve("--list_plugins", &output), 0) << output;

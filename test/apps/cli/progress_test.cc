@@ -224,20 +224,23 @@ TEST_F(ParseFlagsDeathTest, PassesArgumentsOn) {
 }
 
 TEST_F(ParseFlagsDeathTest, FirstCtrlCIsARequestAndTheSecondAnEnd) {
-  const auto parse_and_raise = [](int times) {
+  const auto parse_and_raise = [](int times, bool is_whole = false) {
     AppInfo info;
     info.name = "plumbline_test";
     char name[] = "plumbline_test";
     char* argv[] = {name, nullptr};
     ParseFlags(info, 1, argv);
-    std::exit(RunMain([times] {
+    std::exit(RunMain([times, is_whole] {
       for (int i = 0; i < times; ++i) std::raise(SIGINT);
+      if (is_whole) TellWhole();
       return InterruptRequested() ? 0 : 50;
     }));
   };
   EXPECT_EXIT(parse_and_raise(0), ::testing::ExitedWithCode(50), "");
   EXPECT_EXIT(parse_and_raise(1), ::testing::ExitedWithCode(130),
               "interrupted");
+  EXPECT_EXIT(parse_and_raise(1, /*is_whole=*/true),
+              ::testing::ExitedWithCode(0), "interrupted when all was done");
   EXPECT_EXIT(parse_and_raise(2), ::testing::KilledBySignal(SIGINT), "");
 }
 

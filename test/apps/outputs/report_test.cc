@@ -285,6 +285,15 @@ TEST_F(ReportTest, DataOfTheMap) {
   EXPECT_EQ(run["phase_seconds"].size(), 3u);
 }
 
+TEST_F(ReportTest, DataOfAnInterruptedRun) {
+  MakeCorridor(3);
+  Report report = MakeReport();
+  EXPECT_TRUE(Script(Text(report), "data")["partial"].is_null());
+  report.summary.partial = true;
+  report.summary.scans_in_log = 400;
+  EXPECT_EQ(Script(Text(report), "data")["partial"]["scans_in_log"], 400);
+}
+
 TEST_F(ReportTest, DataOfTheRooms) {
   MakeCorridor(3);
   Report report = MakeReport();
@@ -570,6 +579,25 @@ TEST_F(ReportInBrowserTest, MeasuresAndShowsLayers) {
   EXPECT_LE(
       browser_->Evaluate("document.documentElement.scrollWidth").get<int>(),
       420);
+  EXPECT_THAT(browser_->complaints(), IsEmpty());
+}
+
+TEST_F(ReportInBrowserTest, SaysWhatIsToBeKnownAtItsTop) {
+  MakeCorridor(3);
+  Report report = MakeReport();
+  const auto head = [this] {
+    return browser_->Evaluate("document.querySelector('header').textContent")
+        .get<std::string>();
+  };
+  Open(report);
+  EXPECT_THAT(head(), Not(HasSubstr("interrupted")));
+  report.summary.partial = true;
+  report.summary.scans = 30;
+  report.summary.scans_in_log = 400;
+  Open(report);
+  EXPECT_THAT(head(), HasSubstr("The run was interrupted: this is what was "
+                                "done until then"));
+  EXPECT_THAT(head(), HasSubstr(" 30 of 400 scans."));
   EXPECT_THAT(browser_->complaints(), IsEmpty());
 }
 

@@ -1,11 +1,15 @@
 // A plug-in with a log reader: "#plain" on the first line, then one scan per
 // line, number of ranges, ranges, odometry (x y theta), time; beams over 180
 // degrees.
+#include <plumbline/core/atomic_file.h>
 #include <plumbline/core/plugin.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/log_reader.h>
+#include <plumbline/frontend/output_writer.h>
 
+#include <csignal>
 #include <cstddef>
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -52,4 +56,19 @@ PLUMBLINE_PLUGIN(registry) {
   };
   type.read = ReadPlainLog;
   registry->Register(std::move(type));
+
+  // Ctrl-C while files are written, for certain.
+  plumbline::OutputWriterType interrupt;
+  interrupt.name = "interrupt.txt";
+  interrupt.description = "Interrupts the run";
+  interrupt.by_default = false;
+  interrupt.write = [](const plumbline::SolvedRun&,
+                       const std::filesystem::path& folder) {
+    std::raise(SIGINT);
+    plumbline::WriteFileAtomically(
+        folder / "interrupt.txt",
+        [](std::ostream& output) { output << "interrupted\n"; });
+    return std::string();
+  };
+  registry->Register(std::move(interrupt));
 }

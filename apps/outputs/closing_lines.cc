@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <set>
 
 namespace plumbline {
 namespace {
@@ -95,6 +96,18 @@ void AppendUncertain(const Summary& summary, std::string* list) {
                     [](const auto& log) { return !log.uncertain.empty(); }));
   if (uncertain > 0) {
     Append(Counted(uncertain, "log") + " may be of another building", list);
+  }
+  std::int64_t apart = 0;
+  std::set<std::string> folders;
+  for (const Summary::LogInput& log : summary.logs) {
+    if (log.why_apart.empty()) continue;
+    ++apart;
+    folders.insert(log.map);
+  }
+  if (apart > 0) {
+    std::string names;
+    for (const std::string& folder : folders) Append(folder, &names);
+    Append(Counted(apart, "log") + " kept apart (" + names + ")", list);
   }
   const auto candidates = static_cast<std::int64_t>(
       std::count_if(summary.logs.begin(), summary.logs.end(),

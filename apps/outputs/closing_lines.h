@@ -11,9 +11,9 @@ namespace plumbline {
 /// The last words of a run, two lines or three: what is in the map in `folder`
 /// (walls, shared directions, rooms and doors where they were looked for,
 /// closures), what is worth a look, if anything (a run that was interrupted or
-/// did not converge, a weakly tied track, rooms without a door, long walls that
-/// their direction was refuted for), and which file shows it. The outputs have
-/// been written.
+/// did not converge, a weakly tied track, logs that were kept apart, rooms
+/// without a door, long walls that their direction was refuted for), and which
+/// file shows it. The outputs have been written.
 std::vector<std::string> ClosingLines(const SolveOutcome& outcome,
                                       const std::string& folder);
 

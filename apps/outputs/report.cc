@@ -4,6 +4,7 @@
 #include <plumbline/core/information.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/version.h>
+#include <plumbline/factors/angle.h>
 #include <plumbline/factors/chi_square.h>
 #include <plumbline/outputs/map_drawing.h>
 #include <plumbline/outputs/report.h>
@@ -414,6 +415,22 @@ Json DataToJson(const Report& report) {
   for (const Summary::LogInput& log : summary.logs) {
     if (log.uncertain.empty()) continue;
     json["uncertain"].push_back({{"input", log.input}, {"why", log.uncertain}});
+  }
+  json["apart"] = Json::array();
+  for (std::size_t i = 0; i < summary.logs.size(); ++i) {
+    const Summary::LogInput& log = summary.logs[i];
+    if (log.why_apart.empty()) continue;
+    Json candidate = nullptr;
+    if (log.candidate) {
+      const Pose2& pose = *log.candidate;
+      candidate = {Rounded(pose[0]), Rounded(pose[1]),
+                   Rounded(RadToDeg(pose[2]))};
+    }
+    json["apart"].push_back({{"number", i + 1},
+                             {"input", log.input},
+                             {"map", log.map},
+                             {"why", log.why_apart},
+                             {"candidate", std::move(candidate)}});
   }
   // Colours are those of the map.
   const MapDrawing drawing = DrawingFromGraph(*report.graph, report.path);

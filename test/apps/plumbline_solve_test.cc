@@ -1009,7 +1009,8 @@ TEST_F(SolveTest, SeveralLogs) {
                   "--outputs=trajectory.tum --start_pose=2:30,40,180", &output),
             0)
       << output;
-  EXPECT_THAT(output, HasSubstr("kept apart"));
+  EXPECT_THAT(output, HasSubstr("kept apart, in "));
+  EXPECT_THAT(output, HasSubstr("1 log kept apart (map_2)"));
   EXPECT_EQ(Files("both"),
             (std::set<std::string>{"map_2", "summary.json", "trajectory.tum",
                                    "trajectory_1.tum"}));

@@ -93,6 +93,22 @@ TEST_F(ClosingLinesTest, WhatMayBeAnotherBuildingAndLengthsThatAreOpen) {
             "worth a look: 1 log may be of another building");
 }
 
+TEST_F(ClosingLinesTest, LogsThatWereKeptApart) {
+  outcome_.summary.logs.resize(4);
+  outcome_.summary.logs[1].why_apart = "it fits in two places";
+  outcome_.summary.logs[1].map = "map_2";
+  EXPECT_EQ(ClosingLines(outcome_, "out")[1],
+            "worth a look: 1 log kept apart (map_2)");
+  for (const int i : {2, 3}) {
+    outcome_.summary.logs[i] = outcome_.summary.logs[1];
+    outcome_.summary.logs[i].map = "map_3";
+  }
+  outcome_.summary.logs[3].candidate = Pose2::Zero();
+  EXPECT_EQ(ClosingLines(outcome_, "out")[1],
+            "worth a look: 3 logs kept apart (map_2, map_3), 1 log kept apart "
+            "may be of the first one's building");
+}
+
 // A wall that has another direction in its place is fine.
 TEST_F(ClosingLinesTest, ADirectionInPlaceOfTheOneThatWasBroken) {
   Break(0);

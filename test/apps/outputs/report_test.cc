@@ -594,7 +594,17 @@ TEST_F(ReportInBrowserTest, SaysWhatIsToBeKnownAtItsTop) {
   report.summary.partial = true;
   report.summary.scans = 30;
   report.summary.scans_in_log = 400;
+  report.summary.logs.resize(3);
+  report.summary.logs[1].input = "b.clf";
+  report.summary.logs[1].map = "map_2";
+  report.summary.logs[1].why_apart = "no part of it looks like a part";
+  report.summary.logs[2] = report.summary.logs[1];
+  report.summary.logs[2].input = "c.clf";
+  report.summary.logs[2].candidate = Pose2(1.0, -2.5, DegToRad(90.0));
   Open(report);
+  EXPECT_THAT(head(), HasSubstr("b.clf was kept apart, in the folder map_2: no "
+                                "part of it looks like a part.c.clf"));
+  EXPECT_THAT(head(), HasSubstr("--start_pose=3:1.00,-2.50,90.0 puts it"));
   EXPECT_THAT(head(), HasSubstr("The run was interrupted: this is what was "
                                 "done until then"));
   EXPECT_THAT(head(), HasSubstr(" 30 of 400 scans."));

@@ -105,7 +105,8 @@ DEFINE_double(ellipse_sigmas, 0.0,
               "map.png around the positions of --marginals; 0: none");
 PLUMBLINE_FLAG_RANGE(ellipse_sigmas, 0.0, 1000.0);
 DEFINE_string(align, "none",
-              "Frame of all outputs: none (the robot starts at the origin); "
+              "Frame of all outputs: none (that of odometry: the first pose is "
+              "as the log has it); "
               "building (turned and shifted so that the walls run along x and "
               "y and lie in the first quadrant; summary.json has the "
               "transform)");

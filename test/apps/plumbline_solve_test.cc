@@ -453,6 +453,26 @@ TEST_F(SolveTest, Office) {
 
 // Whatever the number of threads.
 // All files in the frame of the building, and nothing else about them changed.
+// As --help says of --align=none.
+TEST_F(SolveTest, TheFrameIsThatOfOdometry) {
+  std::vector<std::string> lines;
+  for (int i = 0; i < 30; ++i) {
+    lines.push_back(Flaser(RoomRanges(0.1 * i, 181), 5.0 + 0.1 * i, 100.0 + i));
+  }
+  std::string output;
+  ASSERT_EQ(Solve(Write("room.log", Join(lines)), "out",
+                  "--outputs=trajectory.tum", &output),
+            0)
+      << output;
+  const std::vector<TimedPose> poses =
+      ReadTum((folder_ / "out/trajectory.tum").string());
+  ASSERT_EQ(poses.size(), 30u);
+  EXPECT_NEAR(poses[0].pose[0], 5.0, 1e-9);
+  EXPECT_EQ(Run("--help", &output), 0);
+  EXPECT_THAT(output, HasSubstr("that of odometry"));
+  EXPECT_THAT(output, Not(HasSubstr("starts at the origin")));
+}
+
 TEST_F(SolveTest, AlignedToTheBuilding) {
   std::string output;
   const std::string outputs =

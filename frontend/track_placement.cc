@@ -1,4 +1,5 @@
 #include <plumbline/core/error.h>
+#include <plumbline/factors/angle.h>
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/track_placement.h>
 #include <plumbline/frontend/track_windows.h>
@@ -234,7 +235,7 @@ class Search {
     Candidate* best = FindBest();
     untold_rival_ = 0.0;
     if (best == nullptr) {
-      placement.why_not = "no part of it looks like a part of the map";
+      placement.why_not = WhyNothing();
       return placement;
     }
     placement.pose = best->pose;
@@ -278,6 +279,18 @@ class Search {
   }
 
  private:
+  // Why no place is worth a thought.
+  std::string WhyNothing() const {
+    if (!start_) return "no part of it looks like a part of the map";
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "within %.3g m and %.3g degrees of where --start_pose says "
+                  "that it starts, no part of it looks like a part of the map; "
+                  "it was not looked for elsewhere",
+                  options_.start_distance, RadToDeg(options_.start_turn));
+    return text;
+  }
+
   // The place that most speaks for. Of places that it speaks for nearly as
   // much one where the building is not another is rather its place.
   Candidate* FindBest() {

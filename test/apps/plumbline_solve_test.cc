@@ -1116,6 +1116,9 @@ TEST_F(SolveTest, AnEarlierMap) {
   EXPECT_EQ(Solve(second, "none", flag + " --start_pose=1:30,40,180", &output),
             4);
   EXPECT_THAT(output, HasSubstr("second.clf fits nowhere in"));
+  EXPECT_THAT(output, HasSubstr("within 3 m and 45 degrees of where "
+                                "--start_pose says"));
+  EXPECT_THAT(output, HasSubstr("it was not looked for elsewhere"));
   EXPECT_FALSE(fs::exists(folder_ / "none/summary.json"));
 
   const auto refuses = [&](const std::string& flags, const char* why,

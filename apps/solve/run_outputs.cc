@@ -6,11 +6,13 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/core/utf8.h>
+#include <plumbline/frontend/output_writer.h>
 #include <plumbline/outputs/checkpoint_file.h>
 #include <plumbline/outputs/closing_lines.h>
 #include <plumbline/pipeline/several_logs.h>
 
 #include <cstdio>
+#include <set>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -44,6 +46,29 @@ void TellChanges(const OutputFolder::Changes& changes, const Summary& summary) {
           : "";
   Remark("%s: holds a part of the run%s%s", folder, scans.c_str(),
          changes.replaced_whole_run ? " in place of a whole one" : "");
+}
+
+// Why a run does not have files that were asked for by their names. Of those
+// that a word such as "default" stands for nobody waits.
+void TellOutputsLeftOut(const SolveOutcome& outcome) {
+  const Registry& registry = *outcome.registry;
+  const std::set<std::string> selected = SelectOutputs(FLAGS_outputs, registry);
+  const std::set<std::string> written = OutputsFromFlags(registry);
+  std::istringstream words(FLAGS_outputs);
+  std::set<std::string> told;
+  std::string name;
+  while (std::getline(words, name, ',')) {
+    if (selected.count(name) == 0 || !told.insert(name).second) continue;
+    if (written.count(name) == 0) {
+      Remark("%s not written: --localize leaves the map as it is",
+             name.c_str());
+    } else if (registry.Get<OutputWriterType>(name).of_scans &&
+               outcome.trajectory.empty()) {
+      Remark("%s not written: %s", name.c_str(),
+             outcome.scans == nullptr ? "a graph has no scans"
+                                      : "there are no scans");
+    }
+  }
 }
 
 // Removes the maps of logs that an earlier run kept apart, from this one on:
@@ -153,6 +178,7 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
     for (const std::string& reason : written.reasons) {
       Remark("%s", reason.c_str());
     }
+    TellOutputsLeftOut(*outcome);
     if (written.is_cut) outcome->summary.partial = true;
     outcome->summary.files = std::move(written.files);
     outcome->summary.digests = written.digests;

@@ -1107,10 +1107,13 @@ TEST_F(SolveTest, AnEarlierMap) {
   EXPECT_EQ(Lines(Out("both", "trajectory_1.tum")).size(), 250u);
   // And so on.
   ASSERT_EQ(Solve(first, "three",
-                  "--localize --map=" + (folder_ / "both/map.json").string(),
+                  "--localize --outputs=map.json,map.svg --map=" +
+                      (folder_ / "both/map.json").string(),
                   &output),
             0)
       << output;
+  EXPECT_THAT(output, HasSubstr("map.json not written: --localize leaves the "
+                                "map as it is"));
 
   // A start where it is not: another place.
   EXPECT_EQ(Solve(second, "none", flag + " --start_pose=1:30,40,180", &output),
@@ -1393,6 +1396,23 @@ TEST_F(SolveTest, Graph) {
 // A way of four legs of one metre and left turns, all poses at the origin in
 // the file; the last relation closes the loop. Then the same, one part beside
 // the other without a link.
+TEST_F(SolveTest, FilesThatAGraphDoesNotHave) {
+  const std::string input = Write("small.g2o", kGraph);
+  std::string output;
+  ASSERT_EQ(
+      Solve(input, "out", "--outputs=occupancy.pgm,rooms.csv,map.svg", &output),
+      0)
+      << output;
+  EXPECT_THAT(output,
+              HasSubstr("occupancy.pgm not written: a graph has no scans"));
+  EXPECT_THAT(output, HasSubstr("rooms.csv not written: a graph has no scans"));
+  EXPECT_THAT(output, Not(HasSubstr("trajectory.tum")));
+  EXPECT_EQ(Files("out"), (std::set<std::string>{"map.svg", "summary.json"}));
+  // Nobody asked for them.
+  ASSERT_EQ(Solve(input, "out", "--outputs=all,-map.png", &output), 0);
+  EXPECT_THAT(output, Not(HasSubstr("not written")));
+}
+
 TEST_F(SolveTest, StartsOfAGraph) {
   std::string graph;
   for (const int first : {0, 10}) {

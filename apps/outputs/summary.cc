@@ -171,7 +171,8 @@ Json FrontendToJson(const Summary& summary) {
 
 Json LogToJson(const Summary::LogInput& log) {
   return {{"input", log.input},
-          {"trajectory", log.trajectory},
+          {"trajectory",
+           log.trajectory.empty() ? Json(nullptr) : Json(log.trajectory)},
           {"scans", log.scans},
           {"map", log.map},
           {"parts", log.parts},

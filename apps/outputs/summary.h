@@ -167,7 +167,8 @@ struct Summary {
 
   /// One of several logs that were solved together.
   struct LogInput {
-    /// The file, and its trajectory among the outputs.
+    /// The file, and its trajectory among the outputs; empty when that was not
+    /// written.
     std::string input;
     std::string trajectory;
     std::int64_t scans = 0;
@@ -245,7 +246,7 @@ std::string CountsAsJson(const Summary& summary);
 /// [text]}, tracking {pieces, loose [{begin, end, why}]}, where the outputs
 /// were moved alignment {kind, x, y, theta_deg} (m and degrees), and where
 /// there were several logs
-/// [{input, trajectory, scans, map, parts, agreeing, contradicting,
+/// [{input, trajectory (or null), scans, map, parts, agreeing, contradicting,
 /// changed_places, uncertain (why it may be another building; or null),
 /// why_apart (or null), candidate ([x, y, degrees] that --start_pose takes; or
 /// null)}]. Numbers that are not finite become null.

@@ -52,14 +52,21 @@ std::string StartThatPlaces(std::size_t log, const Pose2& start) {
 // What became of each log.
 std::vector<Summary::LogInput> DescribeLogs(
     const std::vector<std::unique_ptr<OpenInput>>& inputs,
-    const SeveralLogsResult& solved) {
+    const SeveralLogsResult& solved, const Registry& registry) {
+  const bool has_trajectories =
+      OutputsFromFlags(registry).count("trajectory.tum") > 0;
   std::vector<Summary::LogInput> logs;
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     const LogInMap& in_map = solved.logs[i];
     const TrackPlacement& placement = in_map.placement;
     Summary::LogInput log;
     log.input = inputs[i]->log.name;
-    log.trajectory = "trajectory_" + std::to_string(i + 1) + ".tum";
+    if (has_trajectories) {
+      // Of one log that was only localized nothing else is in that file.
+      log.trajectory = FLAGS_localize && inputs.size() == 1
+                           ? "trajectory.tum"
+                           : "trajectory_" + std::to_string(i + 1) + ".tum";
+    }
     log.scans = static_cast<std::int64_t>(in_map.end - in_map.begin);
     log.map = FolderOfMap(in_map.map);
     log.parts = placement.windows;
@@ -199,10 +206,13 @@ void TellElsewhere(const std::vector<std::unique_ptr<OpenInput>>& inputs,
 
 // Writes where the robot was in the earlier map.
 void WriteLocalized(const EarlierMap& earlier, const std::string& title,
-                    const MapOfLogs& map, Summary summary,
+                    const SeveralLogsResult& solved, Summary summary,
                     const RunContext& run) {
+  const MapOfLogs& map = solved.maps.front();
   SolveOutcome outcome;
   outcome.summary = std::move(summary);
+  // No structure is looked for: there is nothing that could yet converge.
+  outcome.summary.em_termination = EmTermination::kConvergence;
   TellOfTrack(title, map.scans, map.result, &outcome.summary);
   const auto begin =
       static_cast<std::ptrdiff_t>(earlier.key_scans.scans.size());
@@ -212,6 +222,13 @@ void WriteLocalized(const EarlierMap& earlier, const std::string& title,
   outcome.summary.scans = outcome.summary.scans_in_log =
       static_cast<std::int64_t>(poses.size());
   outcome.trajectory = TimedTrajectory(scans, poses);
+  if (map.logs.size() > 1) {
+    const auto before = static_cast<std::size_t>(begin);
+    for (const std::size_t i : map.logs) {
+      const LogInMap& log = solved.logs[i];
+      outcome.logs.push_back({i + 1, log.begin - before, log.end - before});
+    }
+  }
   outcome.graph = &earlier.graph;
   outcome.registry = &run.registry;
   outcome.scans = &scans;
@@ -282,10 +299,10 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
     TellElsewhere(inputs, solved);
     return kExitElsewhere;
   }
-  common.logs = DescribeLogs(inputs, solved);
+  common.logs = DescribeLogs(inputs, solved, run.registry);
   if (FLAGS_localize) {
-    WriteLocalized(*earlier, TitleOf(inputs.front()->log.name),
-                   solved.maps.front(), std::move(common), run);
+    WriteLocalized(*earlier, TitleOf(inputs.front()->log.name), solved,
+                   std::move(common), run);
     return kExitSuccess;
   }
 

@@ -1095,6 +1095,8 @@ TEST_F(SolveTest, AnEarlierMap) {
             (std::set<std::string>{"map.png", "map.svg", "summary.json",
                                    "trajectory.tum"}));
   EXPECT_EQ(Lines(Out("found", "trajectory.tum")).size(), 250u);
+  EXPECT_EQ(SummaryOf("found")["logs"][0]["trajectory"], "trajectory.tum");
+  EXPECT_EQ(SummaryOf("found")["em"]["converged"], true);
   EXPECT_EQ(Out("first", "map.json"), map);
 
   ASSERT_EQ(Solve(second, "both", flag + " --outputs=map.json,trajectory.tum",
@@ -1114,6 +1116,15 @@ TEST_F(SolveTest, AnEarlierMap) {
       << output;
   EXPECT_THAT(output, HasSubstr("map.json not written: --localize leaves the "
                                 "map as it is"));
+  EXPECT_TRUE(SummaryOf("three")["logs"][0]["trajectory"].is_null());
+  // What the summary names is there, of several logs, too.
+  ASSERT_EQ(Solve(second + "," + first, "two",
+                  flag + " --localize --outputs=trajectory.tum", &output),
+            0)
+      << output;
+  EXPECT_EQ(Out("two", "trajectory.tum"),
+            Out("two", "trajectory_1.tum") + Out("two", "trajectory_2.tum"));
+  EXPECT_EQ(SummaryOf("two")["logs"][1]["trajectory"], "trajectory_2.tum");
 
   // A start where it is not: another place.
   EXPECT_EQ(Solve(second, "none", flag + " --start_pose=1:30,40,180", &output),

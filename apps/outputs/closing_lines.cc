@@ -174,8 +174,9 @@ std::vector<std::string> ClosingLines(const SolveOutcome& outcome,
   const Summary::Closures& closures = outcome.summary.closures;
   if (closures.proposed > 0) {
     line += ", " + Counted(closures.live, "closure");
+    // They are not among those that hold.
     if (closures.broken > 0) {
-      line += " (" + std::to_string(closures.broken) + " broken)";
+      line += ", " + std::to_string(closures.broken) + " more broken";
     }
   }
   std::vector<std::string> lines = {line};

@@ -72,7 +72,7 @@ TEST_F(ClosingLinesTest, WhatIsWorthALook) {
   EXPECT_EQ(
       ClosingLines(outcome_, "out"),
       (std::vector<std::string>{
-          "out: 2 walls, 1 shared direction, 3 closures (2 broken)",
+          "out: 2 walls, 1 shared direction, 3 closures, 2 more broken",
           "worth a look: the search for structure did not converge, the map "
           "hangs by a thread in 1 place, 1 long wall off every direction (up "
           "to 8.0 m)",

@@ -591,6 +591,9 @@ TEST_F(ReportInBrowserTest, SaysWhatIsToBeKnownAtItsTop) {
   };
   Open(report);
   EXPECT_THAT(head(), Not(HasSubstr("interrupted")));
+  // The summary, which is written last, has more of both.
+  EXPECT_THAT(head(), HasSubstr("sbefore writing files"));
+  EXPECT_THAT(head(), HasSubstr("MBmemory before writing files"));
   report.summary.partial = true;
   report.summary.scans = 30;
   report.summary.scans_in_log = 400;

@@ -1,4 +1,5 @@
 #include <plumbline/core/error.h>
+#include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/log_reader.h>
 
 namespace plumbline {
@@ -39,6 +40,9 @@ Log ReadLog(const std::string& path, const Registry& registry,
   InputStream input(path, options.stop);
   const LogReaderType* reader =
       RecognizeLog(registry, input.Peek(kRecognizedBytes));
+  if (reader == nullptr && LooksLikeG2o(input.Peek(kRecognizedBytes))) {
+    throw Error(input.name(), 0, "is a graph (g2o), not a log", "a log");
+  }
   if (reader == nullptr) {
     std::string names;
     for (const LogReaderType* known : registry.All<LogReaderType>()) {

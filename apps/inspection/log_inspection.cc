@@ -2,6 +2,8 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/input_stream.h>
 #include <plumbline/frontend/scan.h>
 
 #include <algorithm>
@@ -9,8 +11,11 @@
 #include <cstdarg>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -18,6 +23,8 @@ namespace plumbline {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr char kGraphFormat[] = "graph (g2o)";
 
 // A rate from a number of messages and the time they took.
 std::optional<double> RateOf(std::int64_t messages, double seconds) {
@@ -131,12 +138,33 @@ Json OdometryOf(const Log& log) {
           {"scans_without_motion", standing}};
 }
 
+// Whether plumbline_solve takes the file for a graph. What can be read once
+// only is left to the readers.
+bool IsGraph(const std::string& path, const Registry& readers,
+             const LaserOptions& options) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error) ||
+      RecognizeLogPath(readers, path) != nullptr) {
+    return false;
+  }
+  constexpr std::size_t kShown = std::size_t{1} << 16;
+  InputStream input(path, options.stop);
+  const std::string_view prefix = input.Peek(kShown);
+  return RecognizeLog(readers, prefix) == nullptr && LooksLikeG2o(prefix);
+}
+
 Json Inspect(const std::string& path, const Registry& readers,
              LaserOptions options) {
   Json result = {{"input", path}};
   std::vector<LogTopic> topics;
   options.on_topics = [&](const std::vector<LogTopic>& t) { topics = t; };
   try {
+    if (IsGraph(path, readers, options)) {
+      result["format"] = kGraphFormat;
+      result["topics"] = Json::array();
+      result["refused"] = nullptr;
+      return result;
+    }
     const Log log = ReadLog(path, readers, options);
     if (topics.empty()) {
       for (const auto& [name, count] : log.messages) {
@@ -219,6 +247,12 @@ std::string TextOf(const Json& result) {
   AppendTopics(result["topics"], &text);
   if (!result["refused"].is_null()) {
     AppendText(&text, "\nrefused: %s\n", Text(result["refused"]).c_str());
+    return text;
+  }
+  if (!result.contains("scans")) {
+    AppendText(&text,
+               "\nIt is no log: there are no scans in it. plumbline_solve "
+               "takes it as --input\n");
     return text;
   }
   const Json& scans = result["scans"];

@@ -19,7 +19,8 @@ struct LogInspection {
 };
 
 /// Inspects the log `path` with the log readers of `readers`. A log that is
-/// refused is no error: LogInspection::is_refused.
+/// refused is no error: LogInspection::is_refused. Of a graph, which is solved
+/// though it is no log, only that is said.
 LogInspection InspectLog(const std::string& path, const Registry& readers,
                          const LaserOptions& options);
 

@@ -171,6 +171,23 @@ TEST_F(InspectTest, TopicsAndWhatIsUsedOfThem) {
   EXPECT_THAT(text, HasSubstr("\nodometry   none: scan matching alone"));
 }
 
+// plumbline_solve takes them, and so they are not refused.
+TEST_F(InspectTest, GraphsAreSaidToBeGraphs) {
+  const std::string graph = Write("two.g2o",
+                                  "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n"
+                                  "EDGE_SE2 0 1 1 0 0 4 0 0 9 0 16\n");
+  const nlohmann::json json = Json(graph);
+  EXPECT_EQ(json["format"], "graph (g2o)");
+  EXPECT_TRUE(json["refused"].is_null());
+  std::string text;
+  EXPECT_EQ(Inspect(graph, &text), 0);
+  EXPECT_THAT(text, StartsWith(graph + ": graph (g2o)\n"));
+  EXPECT_THAT(text, HasSubstr("plumbline_solve takes it as --input"));
+  // Of what can be read once only that is the reason.
+  EXPECT_EQ(Inspect("- <" + graph, &text), 2);
+  EXPECT_THAT(text, HasSubstr("is a graph (g2o), not a log"));
+}
+
 TEST_F(InspectTest, RefusalsSayWhatIsThere) {
   const std::string bag = Drive("mcap");
   // A topic that is not there: those that are, with their counts.

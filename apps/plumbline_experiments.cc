@@ -80,8 +80,8 @@ Json ToJson(const ExperimentResult& result) {
         {"value", claim.measured.value},
         {"low", claim.measured.low},
         {"high", claim.measured.high},
-        {"holds", claim.holds},
-        {"open", claim.is_open}};
+        {"holds", IsKnown(claim) ? Json(claim.holds) : Json(nullptr)},
+        {"open", IsKnown(claim) ? Json(claim.is_open) : Json(nullptr)}};
   }
   Json means = Json::object();
   for (const SummaryRow& row : Summarize(result)) {
@@ -169,8 +169,12 @@ int Run() {
       std::cout << "  skipped: " << result.skipped << '\n';
     }
     for (const Claim& claim : result.claims) {
-      std::cout << "  " << Verdict(claim) << "  " << claim.text << ": "
-                << claim.measured.value << " [" << claim.measured.low << ", "
+      std::cout << "  " << Verdict(claim) << "  " << claim.text << ": ";
+      if (!IsKnown(claim)) {
+        std::cout << "no trial is whole, required " << claim.required << '\n';
+        continue;
+      }
+      std::cout << claim.measured.value << " [" << claim.measured.low << ", "
                 << claim.measured.high << "], required " << claim.required
                 << '\n';
     }

@@ -66,7 +66,10 @@ void WriteTrials(const ExperimentResult& result, std::ostream& output) {
   }
 }
 
+bool IsKnown(const Claim& claim) { return !std::isnan(claim.measured.value); }
+
 const char* Verdict(const Claim& claim) {
+  if (!IsKnown(claim)) return "not known";
   return claim.holds ? "holds" : claim.is_open ? "open " : "FAILS";
 }
 

@@ -64,7 +64,11 @@ struct Claim {
   bool is_open = false;
 };
 
-/// "holds", "open" or "FAILS".
+/// Whether anything was measured: of a run that was cut short, no trial may be
+/// whole.
+bool IsKnown(const Claim& claim);
+
+/// "holds", "open ", "FAILS" or, without any trial, "not known".
 const char* Verdict(const Claim& claim);
 
 /// All that an experiment gives.

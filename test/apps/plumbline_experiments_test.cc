@@ -19,6 +19,7 @@ namespace plumbline {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class ExperimentsBinaryTest : public ::testing::Test {
  protected:
@@ -75,6 +76,30 @@ TEST_F(ExperimentsBinaryTest, WritesTablesAndFigures) {
     EXPECT_LE(claim["low"], claim["value"]);
   }
   EXPECT_FALSE(summary["S6"]["means"].empty());
+}
+
+TEST_F(ExperimentsBinaryTest, WhatAnInterruptLeftUntestedIsNotKnown) {
+  std::string output;
+  EXPECT_EQ(RunInShell("timeout --foreground --preserve-status --signal=INT "
+                       "1 " PLUMBLINE_BIN_DIR
+                       "/plumbline_experiments --experiment=S6 "
+                       "--trials=100000 --output_dir=" +
+                           folder_ + "/out",
+                       &output),
+            130)
+      << output;
+  EXPECT_THAT(output, HasSubstr("  not known  "));
+  EXPECT_THAT(output, HasSubstr("no trial is whole"));
+  EXPECT_THAT(output, Not(HasSubstr("nan")));
+  const nlohmann::json summary =
+      nlohmann::json::parse(Read("out/summary.json"));
+  EXPECT_EQ(summary["S6"]["interrupted"], true);
+  int unknown = 0;
+  for (const auto& claim : summary["S6"]["claims"]) {
+    EXPECT_EQ(claim["value"].is_null(), claim["holds"].is_null());
+    unknown += claim["holds"].is_null();
+  }
+  EXPECT_GT(unknown, 0);
 }
 
 // That of plumbline_solve tells which files are its own.

@@ -204,6 +204,14 @@ TEST_F(ExperimentsTest, EndsWhenAsked) {
   EXPECT_THAT(Text(result), HasSubstr("Cut short"));
   options.stop = [] { return true; };
   EXPECT_TRUE(RunExperiment("S2", options, &registry_).trials.empty());
+  // What no trial speaks of neither holds nor fails.
+  const ExperimentResult nothing = RunExperiment("S6", options, &registry_);
+  ASSERT_FALSE(nothing.claims.empty());
+  for (const Claim& claim : nothing.claims) {
+    EXPECT_FALSE(IsKnown(claim)) << claim.text;
+    EXPECT_STREQ(Verdict(claim), "not known") << claim.text;
+  }
+  EXPECT_THAT(Text(nothing), Not(HasSubstr("FAILS")));
 }
 
 TEST_F(ExperimentsTest, SkipsLogsThatAreNotThere) {

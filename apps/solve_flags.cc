@@ -113,7 +113,8 @@ DEFINE_string(align, "none",
 PLUMBLINE_FLAG_CHOICES(align, "none", "building");
 DEFINE_double(
     grid_resolution, 0.05,
-    "Side of a cell of occupancy.pgm, m; at least 0.1 when interrupted");
+    "Side of a cell of occupancy.pgm, m; at least 0.1 when interrupted. A map "
+    "of more than 100000000 such cells, width times height, gets no grid");
 PLUMBLINE_FLAG_RANGE(grid_resolution, 0.001, 10.0);
 
 DEFINE_double(

@@ -1211,6 +1211,11 @@ TEST_F(SolveTest, GridThatIsTooLarge) {
   expected.erase("occupancy.yaml");
   expected.erase("rooms.csv");
   EXPECT_EQ(Files("out"), expected);
+  // As --help has it.
+  ASSERT_EQ(Run("--help | tr -s '\\n ' ' '", &output), 0);
+  EXPECT_THAT(output, HasSubstr("more than " +
+                                std::to_string(OccupancyOptions().max_cells) +
+                                " such cells"));
 }
 
 TEST_F(SolveTest, WithoutStructure) {

@@ -108,6 +108,21 @@ bool MoveFile(const fs::path& from, const fs::path& target) {
   return true;
 }
 
+// Those of a folder and the folders that it lies in that are not there, the
+// innermost first.
+std::vector<fs::path> MissingFolders(const fs::path& folder) {
+  std::vector<fs::path> missing;
+  std::error_code error;
+  fs::path path = fs::absolute(folder, error).lexically_normal();
+  // "out/" is "out".
+  if (path.filename().empty()) path = path.parent_path();
+  while (fs::symlink_status(path, error).type() == fs::file_type::not_found) {
+    missing.push_back(path);
+    path = path.parent_path();
+  }
+  return missing;
+}
+
 }  // namespace
 
 // What summary.json says of the files beside it.
@@ -155,6 +170,7 @@ OutputFolder::OutputFolder(fs::path folder, std::set<std::string> own_names,
       inputs_(std::move(inputs)) {
   own_names_.insert(kSummary);
   std::error_code error;
+  made_ = MissingFolders(folder_);
   fs::create_directories(folder_, error);
   if (error || !fs::is_directory(folder_)) {
     throw Error(folder_.string(), 0,
@@ -171,7 +187,12 @@ OutputFolder::OutputFolder(fs::path folder, std::set<std::string> own_names,
   CleanUp();
 }
 
-OutputFolder::~OutputFolder() { RemoveStaging(); }
+OutputFolder::~OutputFolder() {
+  RemoveStaging();
+  // Only those that are empty go.
+  std::error_code ignored;
+  for (const fs::path& path : made_) fs::remove(path, ignored);
+}
 
 void OutputFolder::RemoveStaging() {
   if (staging_descriptor_ < 0) return;

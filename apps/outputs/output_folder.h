@@ -47,7 +47,8 @@ class OutputFolder {
   /// folder cannot be made or written to.
   OutputFolder(std::filesystem::path folder, std::set<std::string> own_names,
                std::vector<std::filesystem::path> inputs);
-  /// Removes the staging folder.
+  /// Removes the staging folder, and folders that the constructor made and that
+  /// nothing came into.
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
@@ -98,6 +99,8 @@ class OutputFolder {
   std::filesystem::path folder_;
   std::set<std::string> own_names_;
   std::vector<std::filesystem::path> inputs_;
+  // Folders that were not there, the innermost first.
+  std::vector<std::filesystem::path> made_;
   std::filesystem::path staging_;
   int staging_descriptor_ = -1;
   std::vector<std::string> cleaned_;

@@ -102,6 +102,24 @@ class OutputFolderTest : public ::testing::Test {
   fs::path root_, folder_;
 };
 
+TEST_F(OutputFolderTest, NothingIsLeftOfARunThatWroteNothing) {
+  // Who made it has it.
+  { const OutputFolder out(folder_, kOwn, {}); }
+  EXPECT_TRUE(fs::exists(folder_));
+  {
+    OutputFolder out(folder_ / "new/deep/", kOwn, {});
+    std::ofstream(out.staging() / "a.txt") << "never put in place";
+    EXPECT_TRUE(fs::exists(folder_ / "new/deep"));
+  }
+  EXPECT_EQ(Files(), Names());
+  {
+    const OutputFolder out(folder_ / "new/deep", kOwn, {});
+    Write("new/notes.txt", "mine");
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "new/deep"));
+  EXPECT_EQ(Read("new/notes.txt"), "mine");
+}
+
 TEST_F(OutputFolderTest, LaterRunsReplaceEarlierOnes) {
   EXPECT_FALSE(RunOnce({{"a.txt", "1"}, {"b.txt", "1"}}).replaced_whole_run);
   EXPECT_EQ(Files(), (Names{"a.txt", "b.txt", "summary.json"}));

@@ -202,6 +202,7 @@ void RegisterRelations(Registry* registry) {
   AddRelationOnce<PoseSegmentCollinearityClamped>(registry);
   AddRelationOnce<PoseSegmentPoints>(registry);
   AddRelationOnce<SegmentSegmentCollinearity>(registry);
+  AddRelationOnce<SegmentSegmentOffset>(registry);
   AddRelationOnce<LineOrientation>(registry);
   AddRelationOnce<SegmentOrientation>(registry);
   AddRelationOnce<SegmentRectangle>(registry);

@@ -71,6 +71,28 @@ class SegmentSegmentCollinearity {
   PoseSegmentCollinearity second_on_first_;
 };
 
+/// SegmentSegmentCollinearity between two walls that stay two: the same
+/// residual, for what is said of how walls lie to each other (parallel, at
+/// right angles, a distance apart, in line on both sides of a door), of which
+/// nobody may make one.
+///
+///   residual, blocks, frames, unit, chi-square, degenerate: as
+///               SegmentSegmentCollinearity
+///   source:     ours; de la Puente and Rodriguez-Losada 2014, Eq. 20, with an
+///               expected value of any size
+class SegmentSegmentOffset : public SegmentSegmentCollinearity {
+ public:
+  static constexpr char kName[] = "segment_segment_offset";
+  static constexpr char kG2oTag[] = "PLUMBLINE_SEGMENT_SEGMENT_OFFSET";
+  static constexpr char kDescription[] =
+      "segment_segment_collinearity of two segments that are not one wall; m, "
+      "rad (Eq. 20)";
+  static constexpr RelationRole kRole = RelationRole::kOther;
+
+  /// As SegmentSegmentCollinearity.
+  using SegmentSegmentCollinearity::SegmentSegmentCollinearity;
+};
+
 /// Information of a SegmentSegmentCollinearity whose offset and direction are
 /// independent at the point that lies `lever` (m) from the second segment's
 /// reference point along its direction: standard deviations `sigma_offset` (m)

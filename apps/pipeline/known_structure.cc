@@ -313,8 +313,10 @@ const KnownStructureBinder::MapWall* KnownStructureBinder::WallAt(
 
 void KnownStructureBinder::AddStatements() {
   const std::vector<MapWall> walls = Walls();
+  // Not the relation by which two walls are one: what is in line, parallel or
+  // some distance apart stays two.
   const RelationType& relation =
-      registry_.GetRelation("segment_segment_collinearity");
+      registry_.GetRelation("segment_segment_offset");
   for (const WallStatement& statement : known_.statements) {
     const MapWall* const first = WallAt(walls, statement.first);
     const MapWall* const second = WallAt(walls, statement.second);

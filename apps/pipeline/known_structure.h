@@ -94,7 +94,7 @@ struct KnownStructure {
 /// Reads statements: a line each, # begins a comment. Points are x,y in the map
 /// frame, m.
 ///
-///     same 1.5,2 30,2.1             the walls at these points are one
+///     same 1.5,2 30,2.1             the walls there lie on one line
 ///     distance 1.5,2 1.5,14.4 12.40 they are parallel, 12.40 m apart
 ///     parallel 1.5,2 8,14
 ///     right_angle 1.5,2 8,14

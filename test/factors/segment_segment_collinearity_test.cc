@@ -60,6 +60,20 @@ TEST(SegmentSegmentCollinearityTest, JacobiansMatchDifferences) {
   }
 }
 
+TEST(SegmentSegmentOffsetTest, HasTheResidualButDoesNotMakeOneWall) {
+  const Eigen::Vector2d expected(12.5, kPi);
+  const Eigen::Matrix2d weight = Eigen::Vector2d(2.0, 3.0).asDiagonal();
+  const double first[3] = {1.0, 2.0, 0.5};
+  const double second[3] = {4.0, 9.0, -2.5};
+  double offset[2];
+  double collinearity[2];
+  SegmentSegmentOffset(expected, weight)(first, second, offset);
+  SegmentSegmentCollinearity(expected, weight)(first, second, collinearity);
+  EXPECT_EQ(offset[0], collinearity[0]);
+  EXPECT_EQ(offset[1], collinearity[1]);
+  EXPECT_NE(SegmentSegmentOffset::kRole, RelationRole::kSameWall);
+}
+
 TEST(SegmentSegmentCollinearityTest, SameFarFromTheOrigin) {
   const std::unique_ptr<ceres::CostFunction> cost(
       SegmentSegmentCollinearity::Create(Eigen::Vector2d::Zero(),

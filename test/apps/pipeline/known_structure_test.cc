@@ -8,7 +8,10 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/session.h>
 #include <plumbline/detectors/builtins.h>
+#include <plumbline/detectors/merged_walls.h>
 #include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/outputs/map_drawing.h>
+#include <plumbline/outputs/summary.h>
 #include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/plan_placement.h>
@@ -160,6 +163,29 @@ TEST_F(StatementTest, WhatMeasurementsContradictBreaksUnlessItIsHard) {
   EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 5.0, 1e-3);
   EXPECT_TRUE(Solve("distance 0,0 0,5 6 hard sigma=0.001\n").empty());
   EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 6.0, 0.01);
+}
+
+// Whatever is said of them, and whether it holds.
+TEST_F(StatementTest, WallsThatAreSpokenOfStayTwo) {
+  for (const char* const text :
+       {"parallel 0,0 0,5\n", "distance 0,0 0,5 5\n",
+        "distance 0,0 0,5 5 hard\n", "distance 0,0 0,5 7\n",
+        "right_angle 0,0 7,0\n", "same 0,0 0,5\n"}) {
+    SCOPED_TRACE(text);
+    MakeWalls({Pose2(0.0, 0.0, 0.0), Pose2(0.0, 5.0, 0.0),
+               Pose2(7.0, 0.0, 0.5 * kPi)},
+              0.02);
+    Solve(text);
+    EXPECT_EQ(MergeWalls(graph_).size(), walls_.size());
+    EXPECT_TRUE(DrawingFromGraph(graph_, {}).closures.empty());
+    Summary summary;
+    CountGraph(graph_, &summary);
+    EXPECT_EQ(summary.closures.proposed, 0);
+  }
+  // On both sides of a door.
+  MakeWalls({Pose2(0.0, 0.0, 0.0), Pose2(5.0, 0.03, 0.0)}, 0.02);
+  EXPECT_TRUE(Solve("same 0,0 5,0\n").empty());
+  EXPECT_EQ(MergeWalls(graph_).size(), 2u);
 }
 
 TEST_F(StatementTest, SaysWhereThereIsNoWall) {

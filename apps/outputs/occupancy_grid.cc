@@ -351,7 +351,7 @@ OccupancyGrid GatherOccupancyGrid(const std::vector<Scan>& scans,
   if (scans.size() < poses.size()) {
     throw PLUMBLINE_ERROR(std::to_string(poses.size()) + " poses for " +
                               std::to_string(scans.size()) + " scans",
-                          "one scan per pose");
+                          "a scan for each pose");
   }
   const auto threads =
       static_cast<std::size_t>(std::max(1, options.num_threads));
@@ -396,6 +396,11 @@ OccupancyGrid GatherOccupancyGrid(const std::vector<Scan>& scans,
 OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
                                 const std::vector<Pose2>& poses,
                                 const OccupancyOptions& options) {
+  if (scans.size() != poses.size()) {
+    throw PLUMBLINE_ERROR(std::to_string(poses.size()) + " poses for " +
+                              std::to_string(scans.size()) + " scans",
+                          "one pose per scan");
+  }
   OccupancyGrid grid = GatherOccupancyGrid(scans, poses, options);
   grid.ForgetUnreachable();
   return grid;

@@ -179,14 +179,17 @@ class OccupancyGrid {
 };
 
 /// What all scans have seen, or OccupancyOptions::max_scans of them, one pose
-/// (map frame) per scan; poses that are not finite are passed over. Throws as
-/// the constructor does, also when there is nothing to be seen.
+/// (map frame) per scan; poses that are not finite are passed over. Scans
+/// without a pose may follow, as of a run that was interrupted. Throws as the
+/// constructor does, also when there is nothing to be seen or a pose has no
+/// scan.
 OccupancyGrid GatherOccupancyGrid(const std::vector<Scan>& scans,
                                   const std::vector<Pose2>& poses,
                                   const OccupancyOptions& options);
 
 /// GatherOccupancyGrid, and what cannot be reached is forgotten
-/// (ForgetUnreachable).
+/// (ForgetUnreachable). Throws Error also when there are more scans than poses:
+/// then the two are not of one run.
 OccupancyGrid MakeOccupancyGrid(const std::vector<Scan>& scans,
                                 const std::vector<Pose2>& poses,
                                 const OccupancyOptions& options);

@@ -134,8 +134,11 @@ class SharedParts {
       return;
     }
     options.resolution = kPlanResolution;
-    AddRooms(MakeOccupancyGrid(*outcome.scans, Poses(outcome), options),
-             Poses(outcome), &plan_);
+    // Of a run that was interrupted the last scans have no pose.
+    OccupancyGrid grid =
+        GatherOccupancyGrid(*outcome.scans, Poses(outcome), options);
+    grid.ForgetUnreachable();
+    AddRooms(grid, Poses(outcome), &plan_);
   }
 
   std::once_flag grid_begun_;

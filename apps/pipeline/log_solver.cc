@@ -15,6 +15,7 @@
 #include <plumbline/pipeline/log_solver_state.h>
 #include <plumbline/pipeline/map_review.h>
 #include <plumbline/pipeline/second_map.h>
+#include <plumbline/pipeline/usable_input.h>
 
 #include <algorithm>
 #include <cmath>
@@ -96,6 +97,11 @@ void AddNotesOn(const OdometryAgreement& odometry,
   }
 }
 
+const LogSolverOptions& Usable(const LogSolverOptions& options) {
+  RequireUsable(options);
+  return options;
+}
+
 }  // namespace
 
 double LengthOfWalls(const Graph& graph) {
@@ -165,7 +171,7 @@ struct LogSolver::Processed {
 LogSolver::LogSolver(const Registry& registry, const LogSolverOptions& options)
     : registry_(registry),
       profile_(ProfileOf(options.features)),
-      options_(WithProfile(profile_, options)),
+      options_(WithProfile(profile_, Usable(options))),
       map_(registry_, options_.session, options_.em),
       refiner_(options_.odometry) {
   map_.Renew(StructureDetectors());
@@ -209,6 +215,8 @@ void LogSolver::RequireFresh() const {
 
 Pose2 LogSolver::AddScan(Scan scan) {
   RequireUnfinished();
+  // Before anything of it is taken: who catches the Error goes on.
+  RequireUsable(scan, scans_.size());
   scans_.push_back(std::move(scan));
   TakeScan(scans_, Process(scans_.back(), nullptr));
   if (builder_->records().empty()) return refined_.back().pose;
@@ -418,12 +426,14 @@ std::vector<Pose2> LogSolver::Trajectory() const {
 
 LogSolverResult LogSolver::Run(const Log& log, const RunControl& control) {
   RequireFresh();
+  RequireUsable(log.scans);
   TakeScans(log.scans, control);
   return FinishWith(log.scans, Stage::kEnd, control);
 }
 
 LogSolverResult LogSolver::RunFirst(const Log& log, const RunControl& control) {
   RequireFresh();
+  RequireUsable(log.scans);
   TakeScans(log.scans, control);
   LogSolverResult result = FinishWith(log.scans, Stage::kAdjustPoses, control);
   result.closures =
@@ -440,6 +450,7 @@ LogSolverResult LogSolver::GoOn(const std::vector<Scan>& scans,
         "a first map of " + std::to_string(first.refined.size()) + " scans",
         std::to_string(scans.size()));
   }
+  RequireUsable(scans);
   // A solver that made the first map allows for the noise already.
   if (!is_finished_) ScaleToNoise(first.noise_scale);
   is_finished_ = true;
@@ -466,6 +477,7 @@ LogSolverResult LogSolver::Resume(const Log& log, const std::string& state,
   if (!refined_.empty()) {
     throw PLUMBLINE_ERROR("scans were added before Resume", "a new solver");
   }
+  RequireUsable(log.scans);
   Context context(log.scans, control, this);
   Stage stage = Stage::kTakeScans;
   StateReader reader(state);

@@ -195,6 +195,9 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
 ///
 /// Run does all of it for a log in memory. A solver solves one log.
 ///
+/// Scans are looked at as they come in (RequireUsable in usable_input.h): one
+/// with a pose, time, angle or range that is not finite is an Error.
+///
 /// A run that was killed can be resumed. The state between two stages is small:
 /// the map, what the front-end made of the scans, and counts; the minimizer and
 /// EM start anew in each stage, whether the run was resumed or not. So a stage
@@ -206,13 +209,15 @@ KeyScan MakeKeyScan(int index, const Scan& scan, const RefinedScan& refined,
 class LogSolver {
  public:
   /// The registry must outlive the solver and have the built-ins. Throws Error
-  /// when options do not fit.
+  /// when options do not fit, are no numbers, or are counts below 0.
   LogSolver(const Registry& registry, const LogSolverOptions& options);
   ~LogSolver();
 
   /// Takes the next scan and returns the robot's pose as it is known now (map
   /// frame). The cost does not depend on the size of the map. A copy of the
-  /// scan is kept until Finish. Throws Error after Finish or Run.
+  /// scan is kept until Finish. Throws Error after Finish or Run, and for a
+  /// scan that cannot be used, of which nothing is kept: the next one may
+  /// follow.
   Pose2 AddScan(Scan scan);
 
   /// The pose of every scan so far, found again on the present map (with
@@ -224,7 +229,8 @@ class LogSolver {
   LogSolverResult Finish(const RunControl& control = {});
 
   /// AddScan for each scan of the log, which is not copied, then Finish: the
-  /// same bytes. Throws Error when scans were added before.
+  /// same bytes. Throws Error when scans were added before, or one of the log's
+  /// cannot be used.
   LogSolverResult Run(const Log& log, const RunControl& control = {});
 
   /// Goes on where RunControl::checkpoint made `state`, in a solver with the

@@ -487,6 +487,13 @@ TEST(OccupancyGridTest, NonsenseIsRefused) {
   EXPECT_THROW(OccupancyGrid(Vector2d(1, 0), Vector2d(0, 1), options), Error);
   EXPECT_THROW(MakeOccupancyGrid({}, {}, options), Error);
   EXPECT_THROW(MakeOccupancyGrid({}, {Pose2(0, 0, 0)}, options), Error);
+  Scan scan;
+  scan.ranges = {1.0f};
+  const std::vector<Pose2> one = {Pose2(0, 0, 0)};
+  EXPECT_NO_THROW(MakeOccupancyGrid({scan}, one, options));
+  EXPECT_THROW(MakeOccupancyGrid({scan, scan}, one, options), Error);
+  // Of an interrupted run there are poses as far as it came.
+  EXPECT_NO_THROW(GatherOccupancyGrid({scan, scan}, one, options));
   options.resolution = 0.0;
   EXPECT_THROW(OccupancyGrid(Vector2d(0, 0), Vector2d(1, 1), options), Error);
 }

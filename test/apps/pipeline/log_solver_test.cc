@@ -18,6 +18,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -26,7 +27,10 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "refusal.h"
 
 namespace plumbline {
 namespace {
@@ -778,6 +782,79 @@ TEST_F(LogSolverTest, ScansWithoutAnyReturn) {
   // Odometry is all that there is.
   for (std::size_t i = 0; i < 40; ++i) {
     EXPECT_LT((result.trajectory[i] - log.scans[i].odometry).norm(), 1e-6) << i;
+  }
+}
+
+TEST_F(LogSolverTest, AScanThatCannotBeUsedIsRefusedAndTheNextOneTaken) {
+  const Log log = Office(30);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinite = std::numeric_limits<double>::infinity();
+  const std::vector<std::pair<std::string, std::function<void(Scan*)>>> faults =
+      {
+          {"odometry", [&](Scan* scan) { scan->odometry[0] = nan; }},
+          {"odometry", [&](Scan* scan) { scan->odometry[2] = infinite; }},
+          {"odometry", [&](Scan* scan) { scan->odometry[1] = 1e300; }},
+          {"laser_offset", [&](Scan* scan) { scan->laser_offset[1] = nan; }},
+          {"timestamp", [&](Scan* scan) { scan->timestamp = nan; }},
+          {"start_angle", [&](Scan* scan) { scan->start_angle = nan; }},
+          {"angle_step", [&](Scan* scan) { scan->angle_step = infinite; }},
+          {"angle_step is 0", [&](Scan* scan) { scan->angle_step = 0.0; }},
+          {"range 7 is nan",
+           [&](Scan* scan) { scan->ranges[7] = static_cast<float>(nan); }},
+          {"range 0 is infinite",
+           [&](Scan* scan) { scan->ranges[0] = static_cast<float>(infinite); }},
+          {"3 bearings", [&](Scan* scan) { scan->bearings.resize(3); }},
+          {"bearing",
+           [&](Scan* scan) {
+             scan->bearings.assign(scan->ranges.size(),
+                                   static_cast<float>(nan));
+           }},
+      };
+  LogSolver whole(registry_, {});
+  const LogSolverResult expected = whole.Run(log);
+  LogSolver solver(registry_, {});
+  for (std::size_t i = 0; i < log.scans.size(); ++i) {
+    if (i == 10) {
+      for (const auto& [what, make] : faults) {
+        Log broken = log;
+        make(&broken.scans[i]);
+        const std::string one =
+            Refusal([&] { solver.AddScan(broken.scans[i]); });
+        EXPECT_NE(one.find("scan 10: "), std::string::npos) << one;
+        EXPECT_NE(one.find(what), std::string::npos) << one;
+        const std::string all =
+            Refusal([&] { LogSolver(registry_, {}).Run(broken); });
+        EXPECT_NE(all.find(what), std::string::npos) << all;
+      }
+    }
+    solver.AddScan(log.scans[i]);
+  }
+  EXPECT_EQ(solver.Finish().trajectory, expected.trajectory);
+  EXPECT_EQ(Json(solver.graph()), Json(whole.graph()));
+}
+
+TEST_F(LogSolverTest, OptionsThatAreNoneAreRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::pair<std::string, LogSolverOptions>> faults = [&] {
+    std::vector<std::pair<std::string, LogSolverOptions>> all(6);
+    all[0].first = "em_every is -1: expected 0 or more";
+    all[0].second.em_every = -1;
+    all[1].first = "small_map is -5";
+    all[1].second.small_map = -5;
+    all[2].first = "closing_break_share is nan: expected a number";
+    all[2].second.closing_break_share = nan;
+    all[3].first = "em.delta_threshold is nan";
+    all[3].second.em.delta_threshold = nan;
+    all[4].first = "session.function_tolerance is nan";
+    all[4].second.session.function_tolerance = nan;
+    all[5].first = "odometry.noise.rotation is nan";
+    all[5].second.odometry.noise.rotation = nan;
+    return all;
+  }();
+  for (const auto& [what, options] : faults) {
+    const std::string why =
+        Refusal([&, &options = options] { LogSolver(registry_, options); });
+    EXPECT_NE(why.find(what), std::string::npos) << why;
   }
 }
 

@@ -124,7 +124,9 @@ DEFINE_double(
     "there after the process was killed. 0: none is written or read");
 PLUMBLINE_FLAG_RANGE(checkpoint_every, 0.0, 1e9);
 
-DEFINE_bool(structure, true, "Find structure; false: measurements only");
+DEFINE_bool(structure, true,
+            "Find structure; false: measurements only, also of a graph that "
+            "has structure");
 DEFINE_string(hierarchy, "",
               "Detectors by level, levels separated by /, detectors of a level "
               "by commas; empty: by input (segments: "

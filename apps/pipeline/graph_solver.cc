@@ -3,6 +3,7 @@
 #include <plumbline/pipeline/raw_features.h>
 
 #include <algorithm>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,7 +42,37 @@ EmOptions EmOf(const GraphSolverOptions& options, const Graph& graph) {
   return em;
 }
 
+// The graph with what it is solved with.
+Graph* WithoutUnwanted(const GraphSolverOptions& options, Graph* graph) {
+  if (!options.structure) LeaveOutStructure(graph);
+  return graph;
+}
+
 }  // namespace
+
+LeftOutStructure LeaveOutStructure(Graph* graph) {
+  const Graph& from = *graph;
+  Transaction transaction;
+  LeftOutStructure left_out;
+  std::set<FeatureId> measured;
+  for (const Constraint* constraint : from.Constraints()) {
+    if (constraint->kind == ConstraintClass::kStructure) {
+      transaction.RemoveConstraint(constraint->id);
+      ++left_out.constraints;
+    } else {
+      measured.insert(constraint->features.begin(), constraint->features.end());
+    }
+  }
+  for (const int level : from.VirtualLevels()) {
+    for (const FeatureId id : from.VirtualFeatures(level)) {
+      if (measured.count(id) > 0) continue;
+      transaction.RemoveFeature(id);
+      ++left_out.features;
+    }
+  }
+  if (!transaction.empty()) graph->Apply(std::move(transaction));
+  return left_out;
+}
 
 Hierarchy MakeGraphHierarchy(const GraphSolverOptions& options,
                              const Graph& graph, const Registry& registry) {
@@ -63,7 +94,7 @@ GraphSolver::GraphSolver(const Registry& registry,
 GraphSolver::GraphSolver(const Registry& registry,
                          const GraphSolverOptions& options, Hierarchy hierarchy,
                          Graph* graph)
-    : session_(graph, registry, SessionOf(options)),
+    : session_(WithoutUnwanted(options, graph), registry, SessionOf(options)),
       initial_cost_(session_.Cost()),
       em_(graph, &session_, registry, std::move(hierarchy),
           EmOf(options, *graph)) {}

@@ -8,6 +8,7 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/core/session.h>
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <optional>
@@ -18,7 +19,8 @@ namespace plumbline {
 
 /// Options of solving a graph.
 struct GraphSolverOptions {
-  /// Find structure. False: measurements only.
+  /// Find structure. False: measurements only; what the graph has of structure
+  /// is taken out of it (LeaveOutStructure).
   bool structure = true;
   /// Detectors by level; empty: DefaultHierarchy of the raw features.
   HierarchySpec hierarchy;
@@ -30,6 +32,18 @@ struct GraphSolverOptions {
   /// EmOptions::full_weight_test; unset: that of the raw features' profile.
   std::optional<bool> full_weight_test;
 };
+
+/// How much of a graph was taken out of it.
+struct LeftOutStructure {
+  /// Structure constraints, live and broken.
+  std::int64_t constraints = 0;
+  /// Virtual features.
+  std::int64_t features = 0;
+};
+
+/// Takes structure out of a graph, as one that was solved with it has it: its
+/// structure constraints, and the virtual features that no measurement names.
+LeftOutStructure LeaveOutStructure(Graph* graph);
 
 /// The detectors that a graph is solved with; none without structure. Throws
 /// Error when the hierarchy asked for does not fit the graph's raw features.
@@ -53,8 +67,9 @@ struct GraphSolverResult {
 /// them).
 class GraphSolver {
  public:
-  /// The registry and graph must outlive the solver. Throws Error when options
-  /// do not fit the graph.
+  /// The registry and graph must outlive the solver. Without
+  /// GraphSolverOptions::structure the graph loses its structure. Throws Error
+  /// when options do not fit the graph, which stays as it is then.
   GraphSolver(const Registry& registry, const GraphSolverOptions& options,
               Graph* graph);
 

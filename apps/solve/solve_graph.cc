@@ -45,6 +45,19 @@ std::optional<G2oFile> ReadGraph(InputStream* input, const Registry& registry,
   return ReadG2o(text, input->name(), registry, graph, G2oOptionsFromFlags());
 }
 
+// Without --structure, what the file has of it is no part of the graph either:
+// the map and graph.g2o have the measurements only.
+void LeaveOutStructureOf(const InputStream& input, Graph* graph) {
+  if (FLAGS_structure) return;
+  const LeftOutStructure left_out = LeaveOutStructure(graph);
+  if (left_out.constraints == 0 && left_out.features == 0) return;
+  Remark(
+      "%s: --structure=false leaves out its structure, %lld constraints and "
+      "%lld virtual features: what is written has measurements only",
+      input.name().c_str(), static_cast<long long>(left_out.constraints),
+      static_cast<long long>(left_out.features));
+}
+
 // Places the features where --initial_guess says.
 void PlaceStart(const InputStream& input, const G2oFile& g2o, Graph* graph,
                 Summary::Solver* figures) {
@@ -110,6 +123,7 @@ int SolveGraph(InputStream* input, const RunContext& run) {
            input->name().c_str(), tag.second, PrintableUtf8(tag.first).c_str());
   }
 
+  LeaveOutStructureOf(*input, &graph);
   if (!FLAGS_marginals_hold_gauge) {
     CheckGauge(graph, ParseMarginalsSelection(FLAGS_marginals, registry));
   }

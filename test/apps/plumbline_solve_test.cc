@@ -1911,6 +1911,17 @@ TEST_F(SolveTest, GraphOfPoints) {
   ASSERT_EQ(Solve(input, "without", "--structure=false", &output), 0) << output;
   EXPECT_EQ(SummaryOf("without")["counts"]["features"].size(), 1u);
   EXPECT_EQ(SummaryOf("without")["cost"]["structure"], 0.0);
+  EXPECT_THAT(output, Not(HasSubstr("leaves out")));
+  // So has the graph that was written with structure, and the run says so.
+  ASSERT_EQ(Solve((folder_ / "out/graph.g2o").string(), "measured",
+                  "--structure=false", &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("--structure=false leaves out its structure"));
+  EXPECT_EQ(SummaryOf("measured")["counts"]["features"].size(), 1u);
+  EXPECT_EQ(SummaryOf("measured")["counts"]["features"]["point"]["0"], 572);
+  EXPECT_EQ(SummaryOf("measured")["cost"]["structure"], 0.0);
+  EXPECT_THAT(Out("measured", "graph.g2o"), Not(HasSubstr(" structure ")));
 }
 
 // Table 1, row 4: rooms, in all that is written.

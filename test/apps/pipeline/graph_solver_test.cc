@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
+#include <plumbline/core/constraint.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/default_hierarchy.h>
 #include <plumbline/pipeline/graph_solver.h>
 
+#include <Eigen/Core>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include "detectors/point_world.h"
 
@@ -93,6 +96,38 @@ TEST_F(GraphSolverTest, WithoutStructure) {
   EXPECT_EQ(CountVirtual(graph), 0);
   EXPECT_LT(result.final_cost.total(), result.initial_cost.total());
   EXPECT_EQ(result.final_cost.structure, 0.0);
+}
+
+// A graph that was solved with structure has it.
+TEST_F(GraphSolverTest, WithoutStructureThatOfTheGraphIsLeftOut) {
+  Graph measured;
+  Build(&measured);
+  Graph graph;
+  Build(&graph);
+  GraphSolver(registry_, {}, &graph).Run();
+  // What a measurement names stays, virtual or not.
+  Feature center;
+  center.type = &registry_.GetFeature("point");
+  center.parameters = {1.0, 2.0};
+  center.level = 2;
+  center.is_virtual = true;
+  Transaction transaction;
+  transaction.AddConstraint(MakeMeasurement(
+      registry_.GetRelation("point_prior"), {transaction.AddFeature(center)},
+      Eigen::Vector2d(1.0, 2.0), Eigen::Matrix2d::Identity(), "survey"));
+  graph.Apply(std::move(transaction));
+  GraphSolverOptions options;
+  options.structure = false;
+  const GraphSolverResult result =
+      GraphSolver(registry_, options, &graph).Run();
+  EXPECT_EQ(CountVirtual(graph), 1);
+  EXPECT_EQ(graph.num_features(), measured.num_features() + 1);
+  EXPECT_EQ(graph.num_constraints(), measured.num_constraints() + 1);
+  EXPECT_EQ(result.initial_cost.structure, 0.0);
+  EXPECT_EQ(result.final_cost.structure, 0.0);
+  const LeftOutStructure again = LeaveOutStructure(&graph);
+  EXPECT_EQ(again.constraints, 0);
+  EXPECT_EQ(again.features, 0);
 }
 
 TEST_F(GraphSolverTest, StopsEarly) {

@@ -301,7 +301,10 @@ struct EmOrchestrator::Impl final : public GraphListener {
   }
 
   EmTermination Termination(bool has_converged) const {
-    if (has_converged) return EmTermination::kConvergence;
+    // A graph that stands still because its solves end early is not there yet.
+    if (has_converged && schedule.has_converged()) {
+      return EmTermination::kConvergence;
+    }
     if (is_stopped) return EmTermination::kUserStop;
     return schedule.is_usable() ? EmTermination::kNoConvergence
                                 : EmTermination::kFailure;

@@ -44,9 +44,11 @@ struct EmPhase {
 
 /// Why a run of EM ended, as ceres::TerminationType says it of a solve.
 enum class EmTermination {
-  /// Next to nothing came or went, and the cost stood still.
+  /// Next to nothing came or went, the cost stood still, and the last solve of
+  /// the whole graph reached its tolerance or EmOptions::cost_tolerance.
   kConvergence,
-  /// After EmOptions::max_iterations, with something still coming or going.
+  /// After EmOptions::max_iterations, with something still coming or going, or
+  /// with a last solve that ended on its way.
   kNoConvergence,
   /// The last solve failed: its state proves nothing.
   kFailure,

@@ -3,6 +3,7 @@
 #include <plumbline/core/stopwatch.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace plumbline {
@@ -18,7 +19,8 @@ SolveSchedule::SolveSchedule(Graph* graph, SolverSession* session,
     : graph_(graph),
       session_(session),
       loop_tolerance_(options.loop_tolerance),
-      loop_radius_(options.loop_trust_region_radius) {}
+      loop_radius_(options.loop_trust_region_radius),
+      em_cost_tolerance_(options.cost_tolerance) {}
 
 void SolveSchedule::BeginRun(bool may_be_coarse) {
   is_dirty_ = true;
@@ -83,9 +85,15 @@ double SolveSchedule::cost_tolerance() const {
 }
 
 void SolveSchedule::SolveWhole() {
-  is_usable_ = (is_coarse_ ? session_->SolveGlobal(tolerance_, radius_)
-                           : session_->SolveGlobal())
-                   .usable;
+  const SolveReport report = is_coarse_
+                                 ? session_->SolveGlobal(tolerance_, radius_)
+                                 : session_->SolveGlobal();
+  is_usable_ = report.usable;
+  has_converged_ = report.usable &&
+                   (report.converged ||
+                    std::abs(report.initial_cost - report.final_cost) <=
+                        em_cost_tolerance_ *
+                            std::max(report.initial_cost, report.final_cost));
   is_dirty_ = false;
   unsettled_.clear();
   for (const int level : graph_->VirtualLevels()) {

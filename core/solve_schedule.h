@@ -67,6 +67,10 @@ class SolveSchedule {
   bool is_coarse() const { return is_coarse_; }
   /// False when the last solve failed: its residuals prove nothing.
   bool is_usable() const { return is_usable_; }
+  /// False when the last solve of the whole graph ended on its way: before it
+  /// reached its tolerance, and with a cost that had changed by more than
+  /// EmOptions::cost_tolerance.
+  bool has_converged() const { return has_converged_; }
   /// Time of all solves so far.
   double seconds() const { return seconds_; }
 
@@ -79,6 +83,7 @@ class SolveSchedule {
   SolverSession* session_;
   double loop_tolerance_;
   double loop_radius_;
+  double em_cost_tolerance_;
 
   bool is_coarse_ = false;
   // Relative change of the cost at which coarse solves end, and the radius of
@@ -89,6 +94,7 @@ class SolveSchedule {
   // The graph or a weight changed since the last solve of the whole.
   bool is_dirty_ = true;
   bool is_usable_ = true;
+  bool has_converged_ = true;
   // Virtual features that gained or lost a constraint since then.
   std::set<FeatureId> unsettled_;
   double seconds_ = 0.0;

@@ -124,6 +124,11 @@ std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {
   std::string list;
   if (summary.partial) {
     Append("the run was interrupted", &list);
+  } else if (summary.IsUnsolved()) {
+    const std::string& hint = summary.solver->hint;
+    Append("the solver did not converge" +
+               (hint.empty() ? hint : " (" + hint + ")"),
+           &list);
   } else if (summary.em_termination != EmTermination::kConvergence) {
     Append("the search for structure did not converge", &list);
   }

@@ -398,6 +398,8 @@ Json DataToJson(const Report& report) {
   json["em"] = {
       {"iterations", summary.em_iterations},
       {"converged", summary.em_termination == EmTermination::kConvergence}};
+  json["unsolved"] =
+      summary.IsUnsolved() ? Json(summary.solver->hint) : Json(nullptr);
   json["orthogonality_deg"] = summary.orthogonality_deg
                                   ? Digits(*summary.orthogonality_deg)
                                   : Json(nullptr);

@@ -93,6 +93,12 @@ struct Summary {
   /// Iterations of EM on the whole graph, and why they ended.
   int em_iterations = 0;
   EmTermination em_termination = EmTermination::kNoConvergence;
+  /// Whether EM ended without convergence after solves of a graph that did not
+  /// reach their tolerance: the state is no minimum.
+  bool IsUnsolved() const {
+    return em_termination != EmTermination::kConvergence && !partial &&
+           solver && !solver->converged;
+  }
 
   /// Seconds.
   double total_seconds = 0.0;
@@ -135,6 +141,9 @@ struct Summary {
     int solves = 0;
     /// Every solve reached its tolerance.
     bool converged = true;
+    /// Where not: what may help, for people ("--initial_guess=chordal may
+    /// help"). Not in summary.json.
+    std::string hint;
     /// Steps computed, each a factorization.
     int iterations = 0;
     double evaluation_seconds = 0.0;

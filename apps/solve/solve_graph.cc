@@ -12,12 +12,14 @@
 #include <plumbline/core/graph.h>
 #include <plumbline/core/graph_g2o.h>
 #include <plumbline/core/initial_guess.h>
+#include <plumbline/core/registry.h>
 #include <plumbline/core/stopwatch.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/pipeline/graph_solver.h>
 #include <plumbline/pipeline/without_structure.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <optional>
@@ -84,6 +86,22 @@ void PlaceStart(const InputStream& input, const G2oFile& g2o, Graph* graph,
          static_cast<long long>(made.poses), made.parts,
          static_cast<long long>(made.landmarks),
          static_cast<long long>(made.kept));
+}
+
+// What may help where the solver did not converge. A chordal start needs
+// relative poses.
+std::string HintOf(const Graph& graph) {
+  const std::vector<const Constraint*> constraints = graph.Constraints();
+  const bool has_relative_poses = std::any_of(
+      constraints.begin(), constraints.end(), [](const Constraint* constraint) {
+        return constraint->type->Is(RelationRole::kPose) &&
+               constraint->features.size() == 2;
+      });
+  const bool may_start_chordal =
+      has_relative_poses &&
+      InitialGuessOptionsFromFlags().method != InitialGuessMethod::kChordal;
+  return std::string(may_start_chordal ? "--initial_guess=chordal or a" : "a") +
+         " larger --max_solver_iterations may help";
 }
 
 // What the summary says of the solves of a graph.
@@ -161,13 +179,16 @@ int SolveGraph(InputStream* input, const RunContext& run) {
   clock->Begin("figures");
   Summarize(result.initial_cost, result.final_cost, result.em, &summary);
   SummarizeSolves(result, &figures);
+  if (!figures.converged) figures.hint = HintOf(graph);
   summary.solver = figures;
-  if (!figures.converged) {
-    const std::string& why = result.solves.message;
+  if (!figures.converged && result.em.converged()) {
     Remark(
-        "%s: the solver did not converge%s; --max_solver_iterations and "
-        "--initial_guess may help",
-        input->name().c_str(), why.empty() ? "" : (" (" + why + ")").c_str());
+        "%s: a solve did not reach its tolerance, but nothing moves any more",
+        input->name().c_str());
+  } else if (!figures.converged) {
+    const std::string& why = result.solves.message;
+    Remark("%s: the solver did not converge%s; %s", input->name().c_str(),
+           why.empty() ? "" : (" (" + why + ")").c_str(), figures.hint.c_str());
   }
   outcome.graph = &graph;
   outcome.registry = &registry;

@@ -1479,7 +1479,21 @@ TEST_F(SolveTest, StartsOfAGraph) {
             0)
       << output;
   EXPECT_FALSE(SummaryOf("short")["solver"]["converged"]);
-  EXPECT_THAT(output, HasSubstr("--max_solver_iterations"));
+  EXPECT_FALSE(SummaryOf("short")["em"]["converged"]);
+  EXPECT_EQ(SummaryOf("short")["em"]["termination"], "no_convergence");
+  const std::string hint =
+      "--initial_guess=chordal or a larger --max_solver_iterations may help";
+  EXPECT_THAT(output, HasSubstr("the solver did not converge; " + hint));
+  EXPECT_THAT(output, HasSubstr("worth a look: the solver did not converge (" +
+                                hint + ")"));
+  // So does the report.
+  ASSERT_EQ(Solve(input, "short",
+                  "--max_solver_iterations=1 --structure=false "
+                  "--outputs=report.html",
+                  &output),
+            0)
+      << output;
+  EXPECT_THAT(Out("short", "report.html"), HasSubstr("\"unsolved\":\"" + hint));
 }
 
 // TORO's tags, and files in circulation that list relative poses only.

@@ -82,6 +82,18 @@ TEST_F(ClosingLinesTest, WhatIsWorthALook) {
             std::string::npos);
 }
 
+TEST_F(ClosingLinesTest, ASolverThatDidNotConverge) {
+  Summary& summary = outcome_.summary;
+  summary.solver.emplace();
+  summary.solver->converged = false;
+  summary.solver->hint = "more steps may help";
+  // One on the way, which was made up for.
+  EXPECT_EQ(ClosingLines(outcome_, "out").size(), 1u);
+  summary.em_termination = EmTermination::kNoConvergence;
+  EXPECT_EQ(ClosingLines(outcome_, "out")[1],
+            "worth a look: the solver did not converge (more steps may help)");
+}
+
 TEST_F(ClosingLinesTest, WhatMayBeAnotherBuildingAndLengthsThatAreOpen) {
   outcome_.summary.logs.resize(3);
   outcome_.summary.logs[2].uncertain = "few parts agree";

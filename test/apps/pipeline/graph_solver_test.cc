@@ -4,12 +4,14 @@
 #include <plumbline/core/graph_json.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/default_hierarchy.h>
+#include <plumbline/factors/pose2.h>
 #include <plumbline/pipeline/graph_solver.h>
 
 #include <Eigen/Core>
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "detectors/point_world.h"
 
@@ -128,6 +130,42 @@ TEST_F(GraphSolverTest, WithoutStructureThatOfTheGraphIsLeftOut) {
   const LeftOutStructure again = LeaveOutStructure(&graph);
   EXPECT_EQ(again.constraints, 0);
   EXPECT_EQ(again.features, 0);
+}
+
+// Nothing comes or goes, but the last solve was not carried to its end.
+TEST_F(GraphSolverTest, HasNotConvergedWhereTheSolverHasNot) {
+  for (const char* const minimizer : {"ceres", "resident"}) {
+    SCOPED_TRACE(minimizer);
+    // Round a square; the last edge says that it is not quite one.
+    Graph graph;
+    Transaction transaction;
+    std::vector<FeatureId> poses;
+    for (int i = 0; i < 4; ++i) {
+      Feature pose;
+      pose.type = &registry_.GetFeature("pose");
+      pose.fixed = i == 0;
+      poses.push_back(transaction.AddFeature(pose));
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      transaction.AddConstraint(MakeMeasurement(
+          registry_.GetRelation("pose_pose"), {poses[i], poses[(i + 1) % 4]},
+          Pose2(i < 3 ? 1.0 : 1.2, 0.0, 0.5 * kPi), Eigen::Matrix3d::Identity(),
+          "test"));
+    }
+    graph.Apply(std::move(transaction));
+    GraphSolverOptions options;
+    options.structure = false;
+    options.session.minimizer = minimizer;
+    options.session.max_iterations = 1;
+    const GraphSolverResult few = GraphSolver(registry_, options, &graph).Run();
+    EXPECT_FALSE(few.solves.converged);
+    EXPECT_EQ(few.em.termination, EmTermination::kNoConvergence);
+    options.session.max_iterations = 100;
+    const GraphSolverResult more =
+        GraphSolver(registry_, options, &graph).Run();
+    EXPECT_TRUE(more.solves.converged);
+    EXPECT_TRUE(more.em.converged());
+  }
 }
 
 TEST_F(GraphSolverTest, StopsEarly) {

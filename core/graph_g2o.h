@@ -52,6 +52,10 @@ struct G2oFile {
   bool ends_with_line_feed = true;
   /// Number of lines with each unknown tag.
   std::map<std::string, int> unknown_tags;
+  /// The last line where the file may break off in the middle of it: an unknown
+  /// tag alone, without a line feed, with which known ones begin. Empty
+  /// otherwise.
+  std::string cut_tag;
   /// Number of laser scans; each belongs to the vertex above it.
   int laser_scans = 0;
   /// Id in the file of each feature, by feature id; kNoId where there is none.
@@ -102,7 +106,8 @@ struct G2oFile {
 /// `name`:line for dangling or duplicate ids, wrong counts, numbers that do not
 /// parse or are not finite, features that do not fit, information that is not
 /// positive semidefinite, and a laser scan without a vertex above it; the graph
-/// is empty then.
+/// is empty then. A file that breaks off within a line is mostly one of these;
+/// where it does so within a tag, G2oFile::cut_tag has it.
 G2oFile ReadG2o(std::istream& input, const std::string& name,
                 const Registry& registry, Graph* graph,
                 const G2oOptions& options = {});

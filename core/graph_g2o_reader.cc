@@ -177,6 +177,24 @@ class LineReader {
     }
   }
 
+  // The last line that was read, when it is the beginning of a known tag.
+  std::string CutTag() const {
+    if (fields_.size() != 1 || above_ != Above::kUnknown) return "";
+    const std::string tag(fields_[0]);
+    const auto begins = [&tag](const std::string& known) {
+      return known.compare(0, tag.size(), tag) == 0;
+    };
+    const auto begins_one = [&begins](const auto& tags) {
+      return std::any_of(
+          tags.begin(), tags.end(),
+          [&begins](const auto& known) { return begins(known.first); });
+    };
+    const bool is_cut = begins_one(vertex_tags_) || begins_one(edge_tags_) ||
+                        begins(kG2oFixTag) || begins(kG2oFeatureTag) ||
+                        begins(kG2oConstraintTag) || begins(kLaserTag);
+    return is_cut ? tag : "";
+  }
+
   // The line `number`, the last of G2oFile::lines.
   void Read(int number, const std::string& line) {
     fields_.Set(number, line);
@@ -672,6 +690,7 @@ G2oFile ReadG2o(std::istream& input, const std::string& name,
     if (number == 1) RemoveByteOrderMark(&line);
     file.lines.push_back({G2oLine::Kind::kText, line, kNoId});
     reader.Read(number, line);
+    if (!file.ends_with_line_feed) file.cut_tag = reader.CutTag();
   }
   if (input.bad()) throw Error(name, number, "cannot read on", "");
   GraphAssembler(name, registry, &file, &records, graph).Assemble();

@@ -142,6 +142,13 @@ int SolveGraph(InputStream* input, const RunContext& run) {
   }
 
   LeaveOutStructureOf(*input, &graph);
+  if (!g2o->cut_tag.empty()) {
+    Remark(
+        "%s: may break off: its last line, '%s', does not end and is the "
+        "beginning of a tag",
+        input->name().c_str(), PrintableUtf8(g2o->cut_tag).c_str());
+  }
+
   if (!FLAGS_marginals_hold_gauge) {
     CheckGauge(graph, ParseMarginalsSelection(FLAGS_marginals, registry));
   }

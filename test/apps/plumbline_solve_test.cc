@@ -1496,6 +1496,24 @@ TEST_F(SolveTest, StartsOfAGraph) {
   EXPECT_THAT(Out("short", "report.html"), HasSubstr("\"unsolved\":\"" + hint));
 }
 
+TEST_F(SolveTest, AGraphThatBreaksOffWithinATag) {
+  const std::string graph =
+      "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n"
+      "EDGE_SE2 0 1 1 0 0 9 0 0 9 0 9\n";
+  std::string output;
+  ASSERT_EQ(Solve(Write("cut.g2o", graph + "PLU"), "out", "--outputs=graph.g2o",
+                  &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("may break off: its last line, 'PLU', "));
+  EXPECT_EQ(Out("out", "graph.g2o"), graph + "PLU");
+  ASSERT_EQ(Solve(Write("whole.g2o", graph + "PLU\n"), "out",
+                  "--outputs=graph.g2o", &output),
+            0)
+      << output;
+  EXPECT_THAT(output, Not(HasSubstr("break off")));
+}
+
 // TORO's tags, and files in circulation that list relative poses only.
 TEST_F(SolveTest, GraphsWithoutVertices) {
   const std::string edges =

@@ -319,6 +319,22 @@ TEST_F(GraphG2oTest, UnknownLinesAreKept) {
   EXPECT_EQ(Write(graph, &file), text);
 }
 
+TEST_F(GraphG2oTest, AFileThatBreaksOffWithinATag) {
+  const std::string text = "VERTEX_SE2 0 0 0 0\n";
+  for (const std::string tag :
+       {"P", "PLU", "VERTEX_SE", "EDGE_SE2_X", "FI", "PLUMBLINE_CONSTR"}) {
+    Graph graph;
+    const G2oFile file = Read(text + tag, &graph);
+    EXPECT_EQ(file.cut_tag, tag);
+    EXPECT_EQ(Write(graph, &file), text + tag);
+  }
+  for (const char* const end :
+       {"", "PLU\n", "PLU 1", "QUX", "# PLU", "VERTEX_SE2 1 1 1 0"}) {
+    Graph graph;
+    EXPECT_EQ(Read(text + end, &graph).cut_tag, "") << end;
+  }
+}
+
 // Edges alone, vertices alone, both: in three dimensions nothing is known.
 TEST_F(GraphG2oTest, GraphsWithoutAKnownElementAreRefused) {
   const std::string vertices =

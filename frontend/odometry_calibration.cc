@@ -17,6 +17,11 @@ constexpr double kRidge = 1e-6;
 // A ratio of a motion by match to that by odometry that is more than so much
 // off is a slip.
 constexpr double kSlip = 0.3;
+// So many motions in a row whose ratios lie within this share of their mean are
+// none, up to a scale of so much.
+constexpr int kManyMotions = 8;
+constexpr double kSameRatio = 0.2;
+constexpr double kLargestScale = 3.0;
 // Standard deviation of such a ratio, and of a match's ends along the way, m.
 constexpr double kRatioSigma = 0.03;
 constexpr double kWaySigma = 0.01;
@@ -42,6 +47,23 @@ constexpr double kMostTurn = 0.05;
 constexpr double kLeastRatio = 0.5;
 
 }  // namespace
+
+void OdometryCalibration::NoteLonger(double ratio) {
+  if (ratio - scale_ <= kSlip) {
+    num_longer_ = 0;
+    return;
+  }
+  if (num_longer_ > 0 && std::abs(ratio - longer_) > kSameRatio * longer_) {
+    num_longer_ = 0;
+  }
+  ++num_longer_;
+  longer_ =
+      num_longer_ == 1 ? ratio : longer_ + (ratio - longer_) / num_longer_;
+  if (num_longer_ < kManyMotions || longer_ > kLargestScale) return;
+  scale_ = longer_;
+  variance_ = kPriorSigma * kPriorSigma;
+  num_longer_ = 0;
+}
 
 Pose2 OdometryCalibration::Corrected(const Pose2& motion) const {
   const double along = scale_ * std::cos(course_);
@@ -72,8 +94,10 @@ void OdometryCalibration::Compare(const Pose2& motion,
   const bool is_clear =
       of_returns <= kClearShare * along.dot(covariance * along);
   const double ratio = along.dot(matched) / way;
-  if (is_clear && is_anchored_ && std::abs(motion[2]) <= kMostTurnOfScale &&
-      std::abs(ratio - scale_) <= kSlip) {
+  const bool tells =
+      is_clear && is_anchored_ && std::abs(motion[2]) <= kMostTurnOfScale;
+  if (tells) NoteLonger(ratio);
+  if (tells && std::abs(ratio - scale_) <= kSlip) {
     const double of_ratio =
         kRatioSigma * kRatioSigma + (of_returns + kWaySigma * kWaySigma +
                                      kLagSteps * kLagSteps * change * change) /

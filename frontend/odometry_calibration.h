@@ -63,6 +63,9 @@ class OdometryCalibration {
   /// went better than odometry does, at its end and at its beginning, for less
   /// where the robot sped up or slowed down, as odometry is a little early or
   /// late; the course where they say much better at its end what is across.
+  /// Wheels that are entered wrong by half of their size are no slip: where
+  /// many motions in a row are longer than odometry's by the same factor, it is
+  /// the scale. None that are shorter: what goes along with the robot looks so.
   void Compare(const Pose2& motion, const Eigen::Matrix3d& covariance,
                const Pose2& matched, const Eigen::Matrix3d& information,
                double last_step);
@@ -73,10 +76,10 @@ class OdometryCalibration {
   /// Writes or reads all of it (state_archive.h).
   template <typename Archive>
   friend void Exchange(Archive& archive, OdometryCalibration& calibration) {
-    auto& [value, variance, is_anchored, last_step, course, course_variance] =
-        calibration;
+    auto& [value, variance, is_anchored, last_step, course, course_variance,
+           num_longer, longer] = calibration;
     ExchangeAll(archive, value, variance, is_anchored, last_step, course,
-                course_variance);
+                course_variance, num_longer, longer);
   }
 
  private:
@@ -88,6 +91,12 @@ class OdometryCalibration {
   double last_step_ = 0.0;
   double course_ = 0.0;
   double course_variance_ = kPriorCourse * kPriorCourse;
+  // Motions in a row that were longer in the matches than a slip explains, and
+  // the mean of their ratios.
+  int num_longer_ = 0;
+  double longer_ = 0.0;
+
+  void NoteLonger(double ratio);
 
   // What wheels are entered wrong by: a few percent, and two or three times
   // that (the metre of the intel log is 0.964 m) is still possible.

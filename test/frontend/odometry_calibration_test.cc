@@ -90,6 +90,43 @@ TEST(OdometryCalibrationTest, SlipsAndNoiseDoNotCount) {
   EXPECT_EQ(scale.scale(), 1.0);
 }
 
+// Wheels that are entered at 70 and at 40 % of their size.
+TEST(OdometryCalibrationTest, AMetreThatIsWrongByFarIsLearnt) {
+  for (const double ratio : {1.43, 2.5}) {
+    OdometryCalibration scale;
+    DriveStraight(8, ratio, 0.3, kClear, &scale);
+    EXPECT_EQ(scale.scale(), 1.0);
+    DriveStraight(1, ratio, 0.3, kClear, &scale);
+    EXPECT_NEAR(scale.scale(), ratio, 1e-9);
+    DriveStraight(50, 1.02 * ratio, 0.3, kClear, &scale);
+    EXPECT_NEAR(scale.scale(), 1.02 * ratio, 0.01);
+  }
+}
+
+// Motions that are longer at times, or by now this and now that, are slips, ...
+TEST(OdometryCalibrationTest, MotionsThatAreLongerNowAndThenAreNone) {
+  OdometryCalibration scale;
+  for (int i = 0; i < 20; ++i) {
+    DriveStraight(6, 1.5, 0.0, kClear, &scale);
+    DriveStraight(2, 1.0, 0.0, kClear, &scale);
+  }
+  EXPECT_EQ(scale.scale(), 1.0);
+  for (int i = 0; i < 20; ++i) {
+    DriveStraight(2, 1.5, 0.0, kClear, &scale);
+    DriveStraight(2, 2.4, 0.0, kClear, &scale);
+  }
+  EXPECT_EQ(scale.scale(), 1.0);
+  DriveStraight(30, 5.0, 0.0, kClear, &scale);
+  EXPECT_EQ(scale.scale(), 1.0);
+}
+
+// ... and those that are shorter may have been seen against what goes along.
+TEST(OdometryCalibrationTest, MotionsThatAreShorterByFarAreNone) {
+  OdometryCalibration scale;
+  DriveStraight(50, 0.5, 0.0, kClear, &scale);
+  EXPECT_EQ(scale.scale(), 1.0);
+}
+
 TEST(OdometryCalibrationTest, AnotherFloorIsFollowed) {
   OdometryCalibration scale;
   DriveStraight(1000, 0.97, 0.0, kClear, &scale);

@@ -70,6 +70,30 @@ void ListPlugins(const Registry& registry) {
   }
 }
 
+// What --check_flags looks at besides: all that a run finds wrong with its
+// flags only when it has seen what its input is. Files that the flags name are
+// read, the input is not.
+void CheckRemainingFlags(bool are_several, const Registry& registry) {
+  const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
+  LaserOptionsFromFlags();
+  if (are_several) CheckOptionsOfLogs(options);
+  // Only a log is made of scans, and these are known to come from one.
+  if (are_several || options.features != RawFeatures::kSegments) {
+    CheckHierarchy(options, registry);
+    return;
+  }
+  if (!options.structure || options.hierarchy.empty()) return;
+  // A graph may hold whatever there is.
+  std::vector<std::string> types;
+  for (const FeatureType* type : registry.features()) {
+    types.push_back(type->name);
+  }
+  ForFlag("hierarchy", [&] {
+    MakeHierarchy(options.hierarchy, registry, types,
+                  options.detector_parameters);
+  });
+}
+
 int Run() {
   RunClock clock;
   Registry& registry = Registry::Global();
@@ -78,17 +102,18 @@ int Run() {
   RegisterBuiltinOutputWriters(&registry);
   LoadPlugins(&registry);
   if (FLAGS_list_plugins) {
-    ListPlugins(registry);
+    if (!OnlyChecksFlags()) ListPlugins(registry);
     return kExitSuccess;
   }
-  if (FLAGS_input.empty() || FLAGS_output_dir.empty()) {
+  // Whoever asks about flags may yet add these two.
+  if (!OnlyChecksFlags() && (FLAGS_input.empty() || FLAGS_output_dir.empty())) {
     std::fprintf(stderr,
                  "plumbline_solve: --input and --output_dir are needed; see "
                  "--help\n");
     return kExitUsage;
   }
   RefuseFlagsWithoutEffect();
-  RemarkOnStructureFlags();
+  if (!OnlyChecksFlags()) RemarkOnStructureFlags();
   // Wrong lists are refused before the work.
   ForFlag("outputs", [&] { SelectOutputs(FLAGS_outputs, registry); });
   if (ParseMarginalsSelection(FLAGS_marginals, registry).empty() &&
@@ -113,6 +138,10 @@ int Run() {
   const auto starts =
       ForFlag("start_pose", [&] { return StartPosesFromFlags(names.size()); });
   const std::unique_ptr<EarlierMap> earlier = EarlierMapFromFlags(registry);
+  if (OnlyChecksFlags()) {
+    CheckRemainingFlags(names.size() > 1 || earlier != nullptr, registry);
+    return kExitSuccess;
+  }
   std::vector<std::unique_ptr<OpenInput>> inputs;
   for (const std::string& name : names) {
     inputs.push_back(Open(name, registry, reader));
@@ -158,6 +187,7 @@ int main(int argc, char** argv) {
   info.example =
       "plumbline_solve --input=datasets/office.clf.gz --output_dir=out/office";
   info.groups = plumbline::SolveFlagGroups();
+  info.checks_flags_itself = true;
   plumbline::ParseFlags(info, argc, argv);
   return plumbline::RunMain(plumbline::Run);
 }

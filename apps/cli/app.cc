@@ -294,7 +294,9 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
     }
   }
   if (!problems.empty()) ExitWithUsageError(info, problems);
-  if (FLAGS_check_flags) std::exit(kExitSuccess);
+  if (FLAGS_check_flags && !info.checks_flags_itself) {
+    std::exit(kExitSuccess);
+  }
 
   if (!google::IsGoogleLoggingInitialized()) {
     // glog keeps the pointer.
@@ -304,6 +306,8 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
   CatchInterrupts(info.interrupts_end_it);
   return arguments;
 }
+
+bool OnlyChecksFlags() { return FLAGS_check_flags; }
 
 int RunMain(const std::function<int()>& run) {
   KeepMemory();

@@ -53,17 +53,27 @@ struct AppInfo {
   /// and the files as they were: of binaries that have nothing to show before
   /// they are done, and so do not ask InterruptRequested().
   bool interrupts_end_it = false;
+  /// The binary looks closer at its flags than their ranges and choices do:
+  /// with --check_flags it is run, does that, and ends where it would begin its
+  /// work (OnlyChecksFlags). Others end in ParseFlags.
+  bool checks_flags_itself = false;
 };
 
 /// Parses the command line (and --flagfile, command_line.h; --fromenv), starts
 /// glog (warnings and worse, on stderr only) and catches Ctrl-C and SIGTERM.
 /// Returns the arguments that are no flags.
 ///
-/// Ends the process: with status 0 after --help and --version, with kExitUsage
+/// Ends the process: with status 0 after --help and --version, and after
+/// --check_flags unless the binary goes on with that, with kExitUsage
 /// and a message on stderr for an unknown flag, a value that does not parse, a
 /// value outside of its range (PLUMBLINE_FLAG_RANGE, PLUMBLINE_FLAG_CHOICES)
 /// and arguments where none are taken.
 std::vector<std::string> ParseFlags(const AppInfo& info, int argc, char** argv);
+
+/// Whether flags are only checked (--check_flags): a binary with
+/// AppInfo::checks_flags_itself ends, without having written anything, once it
+/// knows that they are good.
+bool OnlyChecksFlags();
 
 /// Runs a binary's work and returns the process's exit status: what `run`
 /// returns; kExitInput when it throws an Error (its message goes to stderr);

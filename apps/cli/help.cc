@@ -152,8 +152,8 @@ constexpr CommonFlag kCommonFlags[] = {
      "What --help prints: text, man (a manual page) or bash (a completion "
      "script) (default text)"},
     {"--[no]check_flags",
-     "Only checks the flags, and ends with status 0 or 1: for programs that "
-     "start this one"}};
+     "Only checks the flags, and ends with status 0 where they are good: for "
+     "programs that start this one"}};
 
 struct StatusLine {
   const char* status;

@@ -262,6 +262,17 @@ std::unique_ptr<EarlierMap> EarlierMapFromFlags(const Registry& registry) {
   return map;
 }
 
+void CheckOptionsOfLogs(const LogSolverOptions& options) {
+  if (options.features == RawFeatures::kSegments &&
+      options.refine == Refinement::kFull) {
+    return;
+  }
+  throw Error("--input", 0,
+              "several logs, or --map, do not go with --features=points, "
+              "--refine=map or --refine=none",
+              "segments and full refinement");
+}
+
 int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
               const std::vector<std::optional<Pose2>>& starts,
               const EarlierMap* earlier, const RunContext& run) {
@@ -275,13 +286,7 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
   }
   CheckHierarchy(options.solver, run.registry);
   RemarkOnFlags("--input", "list of logs", "graphs", GraphFlags());
-  if (options.solver.features != RawFeatures::kSegments ||
-      options.solver.refine != Refinement::kFull) {
-    throw Error("--input", 0,
-                "several logs, or --map, do not go with --features=points, "
-                "--refine=map or --refine=none",
-                "segments and full refinement");
-  }
+  CheckOptionsOfLogs(options.solver);
   Summary common = BeginSummary();
   std::vector<Log> logs = ReadLogs(inputs, options.solver, run.clock, &common);
 

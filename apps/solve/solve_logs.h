@@ -7,6 +7,7 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/key_scan_archive.h>
+#include <plumbline/pipeline/log_solver.h>
 
 #include <memory>
 #include <optional>
@@ -22,6 +23,10 @@ struct EarlierMap {
 
 /// What --map names; null without. Throws Error.
 std::unique_ptr<EarlierMap> EarlierMapFromFlags(const Registry& registry);
+
+/// Refuses options that do not go with several logs, or with --map. Throws
+/// Error.
+void CheckOptionsOfLogs(const LogSolverOptions& options);
 
 /// Turns several logs into one map, or continues an earlier one, or finds logs
 /// in it, and writes what came out. `starts`: of each log, where it is known

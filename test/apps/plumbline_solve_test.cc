@@ -2241,6 +2241,45 @@ TEST_F(SolveTest, AbsurdFlags) {
   }
 }
 
+TEST_F(SolveTest, OnlyCheckedFlags) {
+  const std::string log = Write("office.log", Join(OfficeLines(20)));
+  std::string output;
+  // What the run refuses is refused, in the same words and with its status.
+  for (const char* flag :
+       {"--delta_threshold=7", "--hierarchy=foo",
+        "--hierarchy=orientation_mixture/foo",
+        "--features=points --hierarchy=orientation_mixture", "--outputs=foo",
+        "--constraints=/nothere", "--plan=/nothere", "--map=/nothere",
+        "--structure_prior=/nothere", "--plugins=/nothere.so",
+        "--allowed_angles=1e9", "--marginals=tree", "--laser_max_range=nan",
+        "--detector_parameters=orientation_mixture.sigma_deg=-1",
+        "--log_reader=foo", "--start_pose=2:0,0,0", "--plan_sigma=0.1",
+        "--localize", "--ellipse_sigmas=2"}) {
+    const int status = Solve(log, "out", flag, &output);
+    EXPECT_NE(status, 0) << flag;
+    std::string checked;
+    EXPECT_EQ(Solve(log, "out", std::string(flag) + " --check_flags", &checked),
+              status)
+        << flag;
+    EXPECT_EQ(checked, output) << flag;
+  }
+  // What may be good with an input that it does not look at passes in silence,
+  // and nothing is written.
+  for (const char* flag :
+       {"", "--hierarchy=same_wall",
+        "--hierarchy=line_ransac,circle_ransac/center_cluster",
+        "--structure=false --hierarchy=foo", "--marginals=pose,7",
+        "--list_plugins", "--initial_guess=odometry"}) {
+    EXPECT_EQ(Solve((folder_ / "missing").string(), "out",
+                    std::string(flag) + " --check_flags", &output),
+              0)
+        << flag;
+    EXPECT_EQ(output, "") << flag;
+  }
+  EXPECT_EQ(Run("--check_flags", &output), 0) << output;
+  EXPECT_TRUE(Files("out").empty());
+}
+
 TEST_F(SolveTest, InputThatIsNone) {
   std::string output;
   EXPECT_EQ(Solve((folder_ / "missing").string(), "out", "", &output), 2);

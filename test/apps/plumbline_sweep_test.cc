@@ -235,6 +235,12 @@ TEST_F(SweepBinaryTest, WhatCannotComeOutIsRefusedAtOnce) {
   EXPECT_THAT(output,
               HasSubstr("the command would refuse it: --delta_threshold=50: "
                         "out of range"));
+  // One that is no number, and that only the run looks up.
+  EXPECT_EQ(Run("--grid='hierarchy=foo,same_wall'" + out +
+                    " -- plumbline_solve --input=none",
+                &output),
+            2);
+  EXPECT_THAT(output, HasSubstr("the command would refuse it: --hierarchy: "));
   EXPECT_EQ(Run("--grid=delta_treshold=0.1" + out +
                     " -- plumbline_solve --input=none",
                 &output),

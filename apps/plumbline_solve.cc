@@ -149,7 +149,12 @@ int Run() {
       std::fprintf(stderr, "interrupted: nothing was read yet\n");
       return kExitInterrupted;
     }
-    if ((names.size() > 1 || earlier != nullptr) && inputs.back()->is_graph) {
+    if (!inputs.back()->is_graph) continue;
+    if (earlier != nullptr) {
+      throw Error("--input", 0, name + " is a graph",
+                  "logs: --map goes with nothing else");
+    }
+    if (names.size() > 1) {
       throw Error("--input", 0, name + " is a graph",
                   "one graph alone, or logs");
     }

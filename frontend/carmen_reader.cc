@@ -54,9 +54,10 @@ class CarmenReader {
         ForeignFormat(input_->Peek(std::size_t{1} << 16));
     if (!foreign.empty()) {
       throw Error(input_->name(), 0, "is " + foreign,
-                  "a robot's log (CARMEN, or a ROS 1 or ROS 2 bag) or a graph "
-                  "(g2o)");
+                  "a robot's log (CARMEN, CSV, or a ROS 1 or ROS 2 bag) or a "
+                  "graph (g2o)");
     }
+    is_recognized_ = LooksLikeCarmenLog(input_->Peek(std::size_t{1} << 16));
     std::string_view line;
     while (input_->ReadLine(&line)) {
       if (line.find('\0') != std::string_view::npos) {
@@ -108,9 +109,13 @@ class CarmenReader {
       ++chosen;
     }
     if (chosen == CarmenMessages::kNumKinds) {
-      throw Error(input_->name(), 0, "no laser scan found: " + Found(),
-                  "a CARMEN log with FLASER, ROBOTLASER1, RAWLASER1 or RLASER "
-                  "messages");
+      // What no reader recognizes comes here, too: its name may say better
+      // what it was meant to be.
+      throw Error(input_->name(), 0, Found(),
+                  is_recognized_
+                      ? "a CARMEN log with FLASER, ROBOTLASER1, RAWLASER1 or "
+                        "RLASER messages"
+                      : ExpectedInFileOf(input_->name()));
     }
     kind_ = static_cast<Kind>(chosen);
     log_.scan_message = CarmenMessages::kNames[kind_];
@@ -136,8 +141,12 @@ class CarmenReader {
   // What the input holds in place of scans, for the refusal.
   std::string Found() const {
     if (input_->line_number() == 0 && input_->damage().empty())
-      return "the input is empty";
-    std::string found = std::to_string(input_->line_number()) + " lines";
+      return "is empty";
+    if (input_->line_number() == 0)
+      return "nothing of it can be unpacked: " + input_->damage();
+    std::string found =
+        "no laser scan found: " + std::to_string(input_->line_number()) +
+        " lines";
     for (const auto& [name, count] : log_.messages)
       found += ", " + std::to_string(count) + " " + name;
     int listed = 0;
@@ -258,6 +267,8 @@ class CarmenReader {
 
   InputStream* input_;
   LaserOptions options_;
+  // Whether its beginning is that of a CARMEN log.
+  bool is_recognized_ = false;
   CarmenMessages messages_;
   Log log_;
   Kind kind_ = CarmenMessages::kFlaser;

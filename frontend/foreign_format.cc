@@ -48,6 +48,25 @@ constexpr Signature kSignatures[] = {
     {0, "MZ\x90"sv, "a program (Windows)"},
 };
 
+struct Ending {
+  std::string_view ending;
+  const char* expected;
+};
+
+// What files begin with whose names end so.
+constexpr Ending kEndings[] = {
+    {".bag", "a ROS 1 bag, which begins with '#ROSBAG V2.0'"},
+    {".mcap", "an MCAP file, which begins with the bytes 0x89 MCAP0"},
+    {".db3", "a ROS 2 bag's database, which begins with 'SQLite format 3'"},
+    {".csv",
+     "a line that names the columns, among them time and r0, then a line per "
+     "scan"},
+    {".g2o", "a graph (g2o) with lines such as VERTEX_SE2 and EDGE_SE2"},
+};
+
+constexpr std::string_view kPackings[] = {".gz",   ".bz2", ".xz", ".zst",
+                                          ".zstd", ".lz4", ".zip"};
+
 constexpr char kBlanks[] = " \t\r\n";
 
 // Numbers of the first line that is neither empty nor a comment; 0 when there
@@ -78,7 +97,29 @@ bool BeginsWith(std::string_view text, std::string_view begin) {
   return text.substr(0, begin.size()) == begin;
 }
 
+// Takes `end` off; whether it was there.
+bool TakeEnd(std::string_view end, std::string_view* text) {
+  if (text->size() < end.size() ||
+      text->substr(text->size() - end.size()) != end) {
+    return false;
+  }
+  text->remove_suffix(end.size());
+  return true;
+}
+
 }  // namespace
+
+std::string ExpectedInFileOf(const std::string& name) {
+  std::string_view unpacked = name;
+  for (const std::string_view packing : kPackings) {
+    if (TakeEnd(packing, &unpacked)) break;
+  }
+  for (const Ending& known : kEndings) {
+    if (TakeEnd(known.ending, &unpacked)) return known.expected;
+  }
+  return "a robot's log (CARMEN, CSV, or a ROS 1 or ROS 2 bag) or a graph "
+         "(g2o)";
+}
 
 std::string ForeignFormat(std::string_view prefix) {
   for (const Signature& signature : kSignatures) {

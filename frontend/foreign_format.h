@@ -12,6 +12,11 @@ namespace plumbline {
 /// no comment are enough.
 std::string ForeignFormat(std::string_view prefix);
 
+/// What was expected in the place of a file that no reader recognizes: what a
+/// file of its name begins with, "an MCAP file, which begins with the bytes
+/// 0x89 MCAP0", or any input where the name says nothing.
+std::string ExpectedInFileOf(const std::string& name);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_FRONTEND_FOREIGN_FORMAT_H_

@@ -2,6 +2,9 @@
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/log_reader.h>
 
+#include <filesystem>
+#include <system_error>
+
 namespace plumbline {
 namespace {
 
@@ -31,11 +34,20 @@ const LogReaderType* RecognizeLogPath(const Registry& registry,
   return nullptr;
 }
 
+void RefuseFolder(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(path, error)) return;
+  throw Error(path, 0, "is a directory",
+              "a file, or the folder of a ROS 2 bag with metadata.yaml, or of "
+              "the parts of a ROS 1 bag");
+}
+
 Log ReadLog(const std::string& path, const Registry& registry,
             const LaserOptions& options) {
   if (path != "-") {
     const LogReaderType* reader = RecognizeLogPath(registry, path);
     if (reader != nullptr) return reader->read_path(path, options);
+    RefuseFolder(path);
   }
   InputStream input(path, options.stop);
   const LogReaderType* reader =

@@ -73,6 +73,10 @@ const LogReaderType* RecognizeLog(const Registry& registry,
 const LogReaderType* RecognizeLogPath(const Registry& registry,
                                       const std::string& path);
 
+/// Throws Error for a folder that no reader recognizes; what else there may be
+/// at `path` is let pass.
+void RefuseFolder(const std::string& path);
+
 /// Reads the log `path` ("-": standard input), whatever its format and
 /// compression, with the reader that recognizes it. Throws Error when the file
 /// cannot be read, no reader of the registry (RegisterBuiltinLogReaders)

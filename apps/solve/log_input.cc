@@ -221,6 +221,7 @@ std::unique_ptr<OpenInput> Open(const std::string& name,
                                             : nullptr;
   }
   if (input->log.reader != nullptr) return input;
+  if (name != "-") RefuseFolder(name);
   input->stream.emplace(name, [] { return InterruptRequested(); });
   const std::string_view prefix = input->stream->Peek(1 << 16);
   if (prefix.empty() && InterruptRequested()) return nullptr;

@@ -1153,7 +1153,9 @@ TEST_F(SolveTest, AnEarlierMap) {
   EXPECT_EQ(
       Solve(Write("graph.g2o", "VERTEX_SE2 0 0 0 0\n"), "none", flag, &output),
       2);
-  EXPECT_THAT(output, HasSubstr("is a graph"));
+  EXPECT_THAT(output,
+              HasSubstr("graph.g2o is a graph: expected logs: --map goes "
+                        "with nothing else"));
 }
 
 TEST_F(SolveTest, FlagsOfTheOtherInput) {
@@ -2285,9 +2287,10 @@ TEST_F(SolveTest, InputThatIsNone) {
   EXPECT_EQ(Solve((folder_ / "missing").string(), "out", "", &output), 2);
   EXPECT_THAT(output, HasSubstr("missing: cannot be opened"));
   EXPECT_EQ(Solve(folder_.string(), "out", "", &output), 2);
-  EXPECT_THAT(output, HasSubstr("directory"));
+  EXPECT_THAT(output, HasSubstr("is a directory: expected a file, or the "
+                                "folder of a ROS 2 bag with metadata.yaml"));
   EXPECT_EQ(Solve(Write("empty", ""), "out", "", &output), 2);
-  EXPECT_THAT(output, HasSubstr("empty: "));
+  EXPECT_THAT(output, HasSubstr("empty: is empty: expected a robot's log"));
   EXPECT_EQ(Solve("-", "out", "</dev/null", &output), 2);
   EXPECT_THAT(output, HasSubstr("standard input: "));
   EXPECT_EQ(Solve(Write("blank", "\n\n\n"), "out", "", &output), 2);

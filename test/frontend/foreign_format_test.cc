@@ -34,11 +34,38 @@ TEST(ForeignFormatTest, WhatMayBeALogIsLeftAlone) {
   EXPECT_EQ(ForeignFormat("1 2 3 4 5 6 7 8"), "");
 }
 
+TEST(ForeignFormatTest, WhatTheNamePromisesIsExpected) {
+  const auto refusal = [](const std::string& name, const std::string& text) {
+    InputStream input(name, text);
+    return Refusal([&] { ReadCarmenLog(&input, {}); });
+  };
+  EXPECT_EQ(refusal("a.bag", ""),
+            "a.bag: is empty: expected a ROS 1 bag, which begins with "
+            "'#ROSBAG V2.0'");
+  EXPECT_EQ(refusal("a.mcap", ""),
+            "a.mcap: is empty: expected an MCAP file, which begins with the "
+            "bytes 0x89 MCAP0");
+  EXPECT_EQ(refusal("a.csv", "a,b\n1,2\n").substr(0, 32),
+            "a.csv: no laser scan found: 2 li");
+  EXPECT_EQ(ExpectedInFileOf("a.csv"),
+            "a line that names the columns, among them time and r0, then a "
+            "line per scan");
+  EXPECT_EQ(refusal("a.g2o.bz2", "BZh9"),
+            "a.g2o.bz2: nothing of it can be unpacked: bzip2 data breaks off "
+            "before its end: expected a graph (g2o) with lines such as "
+            "VERTEX_SE2 and EDGE_SE2");
+  const std::string any =
+      "a robot's log (CARMEN, CSV, or a ROS 1 or ROS 2 bag) or a graph (g2o)";
+  for (const char* name : {"", "bag", "standard input", "a.log.gz"}) {
+    EXPECT_EQ(ExpectedInFileOf(name), any);
+  }
+}
+
 TEST(ForeignFormatTest, TheRefusalNamesIt) {
   InputStream input("scans.pcd", "# .PCD v0.7 - Point Cloud Data\n");
   EXPECT_EQ(Refusal([&] { ReadCarmenLog(&input, {}); }),
             "scans.pcd: is a PCD point cloud: expected a robot's log (CARMEN, "
-            "or a ROS 1 or ROS 2 bag) or a graph (g2o)");
+            "CSV, or a ROS 1 or ROS 2 bag) or a graph (g2o)");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -28,6 +29,8 @@ constexpr std::string_view kSqliteMagic("SQLite format 3\0", 16);
 // Bytes of metadata.yaml, and of a message.
 constexpr std::size_t kLargestMetadata = std::size_t{1} << 26;
 constexpr std::size_t kLargestMessage = std::size_t{1} << 28;
+// Bytes of a database before its first table.
+constexpr std::size_t kSqliteHeader = 100;
 constexpr char kExpected[] = "the messages and topics of a ROS 2 bag";
 
 // A file that is gone when this is, with what a stream holds.
@@ -110,11 +113,22 @@ std::string UriOf(const std::string& path, bool is_immutable) {
   return uri + (is_immutable ? "?mode=ro&immutable=1" : "?mode=ro");
 }
 
+// 0 where there is no header.
+std::size_t PageSizeOf(std::string_view header) {
+  if (header.size() < kSqliteHeader) return 0;
+  const auto high = static_cast<unsigned char>(header[16]);
+  const auto low = static_cast<unsigned char>(header[17]);
+  const std::size_t size = std::size_t{high} << 8 | low;
+  // The largest does not fit into the two bytes.
+  return size == 1 ? std::size_t{1} << 16 : size;
+}
+
 class Rosbag2Sqlite : public BagSource {
  public:
   explicit Rosbag2Sqlite(InputStream* input)
       : BagSource("ROS 2 bag (db3)"), name_(input->name()) {
     std::string path = name_;
+    const std::size_t page_size = PageSizeOf(input->Peek(kSqliteHeader));
     if (!input->is_plain_file()) {
       unpacked_ = std::make_unique<TemporaryFile>(input);
       path = unpacked_->path();
@@ -122,9 +136,11 @@ class Rosbag2Sqlite : public BagSource {
         Skip(input->damage() + ": what was unpacked before it is used");
       }
     }
+    if (EndsWithinAPage(path, page_size)) path = CutToPages(page_size, input);
     // A database that nobody closed has a journal beside it, which is read
     // where the folder lets that happen.
-    if (!Open(UriOf(path, unpacked_ != nullptr)) && !Open(UriOf(path, true))) {
+    if (!Open(UriOf(path, unpacked_ != nullptr)) && !Open(UriOf(path, true)) &&
+        !OpenBroken()) {
       Refuse();
     }
     ReadTopics();
@@ -187,6 +203,45 @@ class Rosbag2Sqlite : public BagSource {
                   static_cast<int>(kLargestMessage));
     sqlite3_exec(database, "PRAGMA cell_size_check=ON", nullptr, nullptr,
                  nullptr);
+    return HasSchema();
+  }
+
+  // Whether the last page of the file is there in part. The rest of it would be
+  // read as zeros, and these would be taken for what was measured.
+  static bool EndsWithinAPage(const std::string& path, std::size_t page_size) {
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(path, error);
+    return !error && page_size > 0 && size % page_size != 0;
+  }
+
+  // Makes the file a copy that ends with its last whole page; its path.
+  std::string CutToPages(std::size_t page_size, InputStream* input) {
+    if (unpacked_ == nullptr) {
+      unpacked_ = std::make_unique<TemporaryFile>(input);
+    }
+    const std::string& path = unpacked_->path();
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(path, error);
+    if (!error) fs::resize_file(path, size - size % page_size, error);
+    if (error)
+      throw Error(path, 0, error.message(), "a file to write (TMPDIR)");
+    Skip("the database breaks off within a page, which is left out");
+    return path;
+  }
+
+  // What Open() refused, if it has fewer pages than it says it has: SQLite
+  // takes it only from who may write to the schema, which a file opened to be
+  // read forbids again. What lies behind its end is an error where it is asked
+  // for.
+  bool OpenBroken() {
+    if (sqlite3_errcode(database_.get()) != SQLITE_CORRUPT) return false;
+    sqlite3_db_config(database_.get(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
+    sqlite3_exec(database_.get(), "PRAGMA writable_schema=ON", nullptr, nullptr,
+                 nullptr);
+    return HasSchema();
+  }
+
+  bool HasSchema() {
     return Prepare("SELECT count(*) FROM sqlite_master") != nullptr &&
            sqlite3_step(Prepare("SELECT count(*) FROM sqlite_master").get()) ==
                SQLITE_ROW;

@@ -418,6 +418,44 @@ TEST_F(DatabaseTest, DescriptionOfAnUnknownCompression) {
                                 HasSubstr("zstd or none")));
 }
 
+// The copy of a recording, cut off at a page of the database and within one.
+TEST_F(DatabaseTest, WhatBreaksOffIsUsedUpToThere) {
+  std::filesystem::remove_all(folder_ / "bag");
+  WriteRosbag2(SmallDrive(kCdr, 300), folder_ / "bag");
+  const std::string whole = FileText(folder_ / "bag/bag_0.db3");
+  Log all;
+  ASSERT_EQ(Change("", &all), "");
+  const std::size_t pages = whole.size() / 4096;
+  ASSERT_GT(pages, 20u);
+  const std::size_t cuts[] = {whole.size() - 4096, whole.size() - 3000,
+                              whole.size() - 100, pages / 2 * 4096,
+                              pages / 2 * 4096 + 2000};
+  for (const bool is_packed : {false, true}) {
+    for (const std::size_t size : cuts) {
+      SCOPED_TRACE(std::to_string(size) + " of " +
+                   std::to_string(whole.size()));
+      std::filesystem::remove(folder_ / "bag/bag_0.db3");
+      const std::string cut = whole.substr(0, size);
+      WriteText(folder_ / (is_packed ? "bag/bag_0.db3.zstd" : "bag/bag_0.db3"),
+                is_packed ? Zstd(cut) : cut);
+      Log log;
+      ASSERT_NO_THROW(log = ReadPath(folder_ / "bag"));
+      EXPECT_EQ(SkippedInBag(log, "database is damaged"), 1);
+      EXPECT_EQ(SkippedInBag(log, "breaks off within a page"),
+                size % 4096 == 0 ? 0 : 1);
+      EXPECT_EQ(SkippedInBag(log, "does not describe"), 0);
+      // The last page holds odometry alone.
+      EXPECT_EQ(log.scans.size() < all.scans.size(),
+                size < whole.size() / 2 + 4096);
+      EXPECT_GT(log.scans.size(), all.scans.size() / 4);
+      for (std::size_t i = 0; i < log.scans.size(); ++i) {
+        EXPECT_EQ(log.scans[i].timestamp, all.scans[i].timestamp);
+        EXPECT_EQ(log.scans[i].ranges, all.scans[i].ranges);
+      }
+    }
+  }
+}
+
 // A recorder splits what gets long. Transforms that stand still are in the
 // first file alone.
 TEST_F(DatabaseTest, SeveralFilesAreOneLog) {

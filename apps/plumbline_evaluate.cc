@@ -21,6 +21,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/core/utf8.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -98,6 +99,9 @@ namespace plumbline {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// So few of the poses match by coincidence, too.
+constexpr double kSmallShare = 0.1;
 
 Json ToJson(const ErrorStatistics& statistics) {
   return Json{{"mean", statistics.mean},
@@ -240,6 +244,15 @@ Json EvaluateAgainstReference(const TrajectoryFile& trajectory) {
       reference, trajectory, FLAGS_max_time_difference, FLAGS_time_offset);
   const std::size_t matched = comparison.pairs.times.size();
   std::printf("matched: %zu poses\n", matched);
+  const std::size_t most =
+      std::min(reference.poses.size(), trajectory.poses.size());
+  if (static_cast<double>(matched) < kSmallShare * static_cast<double>(most)) {
+    std::fprintf(stderr,
+                 "only %zu of the %zu poses of the shorter trajectory have one "
+                 "of the other within --max_time_difference: the two may be of "
+                 "different drives, or need --time_offset\n",
+                 matched, most);
+  }
   const PoseAlignment alignment = AlignmentFromFlag(reference, trajectory);
   const AlignmentTransform transform = ForFlag(
       "alignment", [&] { return AlignPoses(alignment, &comparison.pairs); });

@@ -237,6 +237,39 @@ TEST_F(EvaluateTest, BadInput) {
   }
 }
 
+TEST_F(EvaluateTest, ASmallShareOfMatchesIsSaid) {
+  std::string reference;
+  std::string few;
+  std::string more;
+  for (int i = 0; i < 60; ++i) {
+    const std::string pose = std::to_string(i) + " 0 0 0 0 0 1\n";
+    reference += std::to_string(i) + " " + pose;
+    // Every twelfth and every sixth at the time of one of the reference.
+    few += std::to_string(i) + (i % 12 == 0 ? " " : ".5 ") + pose;
+    more += std::to_string(i) + (i % 6 == 0 ? " " : ".5 ") + pose;
+  }
+  Write("reference.tum", reference);
+  Write("few.tum", few);
+  Write("more.tum", more);
+  std::string output;
+  ASSERT_EQ(
+      Run(Flag("trajectory", "few.tum") + Flag("reference", "reference.tum"),
+          &output),
+      0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("matched: 5 poses\n"));
+  EXPECT_THAT(output, HasSubstr("only 5 of the 60 poses of the shorter "
+                                "trajectory have one of the other within "
+                                "--max_time_difference"));
+  ASSERT_EQ(
+      Run(Flag("trajectory", "more.tum") + Flag("reference", "reference.tum"),
+          &output),
+      0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("matched: 10 poses\n"));
+  EXPECT_EQ(output.find("only"), std::string::npos) << output;
+}
+
 TEST_F(EvaluateTest, Usage) {
   std::string output;
   EXPECT_EQ(Run("", &output), 1);

@@ -26,8 +26,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 DEFINE_string(
@@ -548,6 +550,29 @@ int UsageError(const std::string& message) {
   return kExitUsage;
 }
 
+// What is wrong with a flag that was given and says more of a comparison that
+// was not asked for; empty without one.
+std::string FlagWithoutEffect() {
+  const std::map<std::string, std::pair<const char*, bool>> needed = {
+      {"alignment", {"reference", !FLAGS_reference.empty()}},
+      {"max_time_difference", {"reference", !FLAGS_reference.empty()}},
+      {"time_offset", {"reference", !FLAGS_reference.empty()}},
+      {"rpe_delta", {"reference", !FLAGS_reference.empty()}},
+      {"rpe_unit", {"reference", !FLAGS_reference.empty()}},
+      {"rpe_all_pairs", {"reference", !FLAGS_reference.empty()}},
+      {"time_tolerance", {"relations", !FLAGS_relations.empty()}},
+      {"minimum_wall_length", {"truth", !FLAGS_truth.empty()}},
+      {"maximum_wall_offset", {"truth", !FLAGS_truth.empty()}},
+      {"trajectory_topic", {"trajectory", !FLAGS_trajectory.empty()}},
+  };
+  for (const FlagValue& flag : ChangedFlags()) {
+    const auto entry = needed.find(flag.name);
+    if (entry == needed.end() || entry->second.second) continue;
+    return "--" + flag.name + " needs --" + entry->second.first;
+  }
+  return "";
+}
+
 int Run() {
   if (!FLAGS_plan.empty() && FLAGS_truth.empty() && FLAGS_rooms.empty())
     return UsageError("--plan needs --truth or --rooms");
@@ -579,6 +604,8 @@ int Run() {
       }
     }
   }
+  const std::string without_effect = FlagWithoutEffect();
+  if (!without_effect.empty()) return UsageError(without_effect);
   if (!FLAGS_plot.empty() && !EndsIn(FLAGS_plot, ".svg") &&
       !EndsIn(FLAGS_plot, ".png")) {
     return UsageError("--plot=" + FLAGS_plot +

@@ -31,6 +31,18 @@ void RemarkOnFlags(const std::string& name, const char* kind,
          count > 1 ? "have" : "has");
 }
 
+void RemarkOnBagFlags(const std::string& name,
+                      const std::vector<const LogReaderType*>& readers) {
+  // A reader of a plug-in may know topics as well.
+  std::string format;
+  for (const LogReaderType* reader : readers) {
+    if (reader->name != "carmen" && reader->name != "csv") return;
+    format = reader->name == "csv" ? "table of scans" : "CARMEN log";
+  }
+  if (readers.size() > 1) format = "list of logs without topics";
+  RemarkOnFlags(name, format.c_str(), "bags", {"scan_topic", "odometry_topic"});
+}
+
 void RemarkOnStructureFlags() {
   if (FLAGS_structure) return;
   std::string flags;

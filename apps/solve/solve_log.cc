@@ -70,6 +70,7 @@ int SolveLog(const LogInput& input, const RunContext& run) {
   const LogSolverOptions options = LogSolverOptionsFromFlags(run.registry);
   CheckHierarchy(options, run.registry);
   RemarkOnFlags(input.name, "log", "graphs", GraphFlags());
+  RemarkOnBagFlags(input.name, {input.reader});
 
   run.clock->bar().Plan(StagesOfLogs({1.0}, options));
   Log log = ReadLog(input, run.clock, &summary);

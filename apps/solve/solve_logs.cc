@@ -286,6 +286,9 @@ int SolveLogs(const std::vector<std::unique_ptr<OpenInput>>& inputs,
   }
   CheckHierarchy(options.solver, run.registry);
   RemarkOnFlags("--input", "list of logs", "graphs", GraphFlags());
+  std::vector<const LogReaderType*> readers;
+  for (const auto& input : inputs) readers.push_back(input->log.reader);
+  RemarkOnBagFlags("--input", readers);
   CheckOptionsOfLogs(options.solver);
   Summary common = BeginSummary();
   std::vector<Log> logs = ReadLogs(inputs, options.solver, run.clock, &common);

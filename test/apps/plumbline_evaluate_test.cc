@@ -286,6 +286,18 @@ TEST_F(EvaluateTest, Usage) {
   EXPECT_THAT(output, HasSubstr("--plan needs --truth or --rooms"));
   EXPECT_EQ(Run(Flag("rooms", "rooms.json"), &output), 1);
   EXPECT_THAT(output, HasSubstr("--rooms needs a plan"));
+  const std::string relations =
+      Flag("trajectory", "path.tum") + Flag("relations", "true.relations");
+  for (const char* flag :
+       {"--rpe_delta=10", "--rpe_unit=m", "--rpe_all_pairs", "--alignment=se2",
+        "--max_time_difference=1", "--time_offset=1"}) {
+    EXPECT_EQ(Run(relations + " " + flag, &output), 1) << flag;
+    const std::string name = flag;
+    EXPECT_THAT(output, HasSubstr(name.substr(0, name.find('=')) +
+                                  " needs --reference"));
+  }
+  EXPECT_EQ(Run(relations + " --minimum_wall_length=2", &output), 1);
+  EXPECT_THAT(output, HasSubstr("--minimum_wall_length needs --truth"));
   EXPECT_EQ(Run(" --no_such_flag=1", &output), 1);
   EXPECT_THAT(output, HasSubstr("no_such_flag"));
   EXPECT_EQ(Run(" --trajektory=a", &output), 1);

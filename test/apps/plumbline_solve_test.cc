@@ -1175,6 +1175,14 @@ TEST_F(SolveTest, FlagsOfTheOtherInput) {
             &output),
       0);
   EXPECT_EQ(output, "");
+  ASSERT_EQ(Solve(log, "out",
+                  "--scan_topic=/scan --odometry_topic=tf --outputs=graph.g2o",
+                  &output),
+            0);
+  EXPECT_EQ(output.find(log + " is a CARMEN log: --odometry_topic, "
+                              "--scan_topic are for bags and have no effect\n"),
+            0u)
+      << output;
   const std::string graph = Write("graph.g2o", Out("out", "graph.g2o"));
   // A value that is the default's asks for nothing.
   ASSERT_EQ(Solve(graph, "graph",

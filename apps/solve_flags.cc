@@ -20,7 +20,7 @@
 #include <utility>
 
 DEFINE_string(input, "",
-              "Robot log (ROS 1 or 2 bag, a file or a folder; CARMEN) or graph "
+              "Robot log (ROS 1 or 2 bag, a file or a folder; CARMEN; CSV) or graph "
               "(g2o), plain or compressed; - reads standard input. Several "
               "logs of one building, separated by commas, become one map");
 DEFINE_string(output_dir, "", "Folder for the results; made if missing");

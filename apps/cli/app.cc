@@ -219,7 +219,7 @@ std::vector<std::string> CheckFlagValues() {
     if (!gflags::GetCommandLineFlagInfo(entry.first.c_str(), &flag)) continue;
     if (Holds(entry.second, flag.current_value)) continue;
     problems.push_back(
-        "--" + flag.name + "=" + flag.current_value + ": " +
+        "--" + flag.name + "=" + ToFlagValue(flag).value + ": " +
         (entry.second.choices.empty() ? "out of range: expected "
                                       : "unknown value: expected one of ") +
         Describe(entry.second) + Guess(flag.current_value, entry.second));

@@ -19,10 +19,14 @@ constexpr char kExpectedLine[] =
     "--name=value, --name, --noname or a comment that begins with #";
 
 // A word of somebody's in a message.
-std::string Shown(const std::string& text) {
+std::string Shortened(const std::string& text) {
   constexpr std::size_t kLongest = 60;
   const std::string printable = PrintableUtf8(text.substr(0, kLongest));
-  return "'" + printable + (text.size() > kLongest ? "...'" : "'");
+  return printable + (text.size() > kLongest ? "..." : "");
+}
+
+std::string Shown(const std::string& text) {
+  return "'" + Shortened(text) + "'";
 }
 
 std::string Trimmed(const std::string& text) {
@@ -67,6 +71,25 @@ bool IsNegation(const std::string& name) {
 bool IsKnown(const std::string& name) {
   gflags::CommandLineFlagInfo info;
   return FindFlag(name, &info) || IsNegation(name);
+}
+
+// Values of a flag's type, for people.
+std::string ValuesOf(const std::string& type) {
+  if (type == "bool") return "true or false";
+  if (type == "double") return "a number";
+  if (type.compare(0, 4, "uint") == 0) return "a whole number from 0 on";
+  return "a whole number";
+}
+
+// Whether gflags can read a value of a flag. Words it takes as they are, and
+// some of its own are more than values.
+bool CanRead(const gflags::CommandLineFlagInfo& flag,
+             const std::string& value) {
+  if (flag.type == "string") return true;
+  // Set for a try, and set back.
+  const gflags::FlagSaver saver;
+  return !gflags::SetCommandLineOption(flag.name.c_str(), value.c_str())
+              .empty();
 }
 
 // What the name of a flag that is not known may have been meant for, for
@@ -130,6 +153,18 @@ class CommandLineReader {
         }
         flag.value = next;
       }
+      if (FindFlag(flag.name, &info)) {
+        if (!flag.has_value && !takes_next && info.type != "bool") {
+          Problem("--" + flag.name + ": has no value: expected --" + flag.name +
+                  "=value");
+          continue;
+        }
+        if ((flag.has_value || takes_next) && !CanRead(info, flag.value)) {
+          Problem(Unreadable(info, flag.value));
+          if (takes_next) ++i;
+          continue;
+        }
+      }
       CheckNegation("", flag);
       if (NamesFlagFiles(flag) && (flag.has_value || takes_next)) {
         ReadFiles("--flagfile", flag.value);
@@ -145,6 +180,12 @@ class CommandLineReader {
  private:
   void Problem(std::string text) {
     result_.problems.push_back(std::move(text));
+  }
+
+  static std::string Unreadable(const gflags::CommandLineFlagInfo& flag,
+                                const std::string& value) {
+    return "--" + flag.name + "=" + Shortened(value) +
+           ": cannot be read: expected " + ValuesOf(flag.type);
   }
 
   void CheckNegation(const std::string& place, const FlagWords& flag) {
@@ -227,13 +268,8 @@ class CommandLineReader {
                 flag.name + "=value");
         return;
       }
-      // Set for a try, and set back.
-      const gflags::FlagSaver saver;
-      if (flag.has_value &&
-          gflags::SetCommandLineOption(flag.name.c_str(), flag.value.c_str())
-              .empty()) {
-        Problem(place + ": --" + flag.name + "=" + Shown(flag.value) +
-                ": expected a value of type " + info.type);
+      if (flag.has_value && !CanRead(info, flag.value)) {
+        Problem(place + ": " + Unreadable(info, flag.value));
         return;
       }
     }

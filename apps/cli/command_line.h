@@ -17,7 +17,8 @@ struct CommandLine {
 
 /// Reads the files that --flagfile names (several separated by commas; relative
 /// paths start at the working directory) into the command line, and checks what
-/// gflags does not: a word that nobody understands is a problem, never ignored.
+/// gflags does not, or says in words of its own: a word that nobody understands
+/// and a value that cannot be read are problems, never ignored.
 ///
 /// A flag file has a flag on a line, as --name=value, --name or --noname; lines
 /// that are empty or begin with # are comments, and blanks around a line do not

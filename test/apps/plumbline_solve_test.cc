@@ -2218,7 +2218,12 @@ TEST_F(SolveTest, AbsurdFlags) {
     name = name.substr(0, name.find('='));
     while (name[0] == '-') name.erase(0, 1);
     EXPECT_THAT(output, HasSubstr(name));
+    EXPECT_THAT(output, Not(HasSubstr("ERROR")));
   }
+  EXPECT_EQ(Solve(log, "out", "--delta_threshold=-0.1", &output), 1);
+  EXPECT_THAT(output, StartsWith("--delta_threshold=-0.1: out of range"));
+  EXPECT_EQ(Solve(log, "out", "--seed=-5", &output), 1);
+  EXPECT_THAT(output, StartsWith("--seed=-5: cannot be read: expected"));
   // Those that only a closer look shows to be wrong.
   for (const char* flag :
        {"--hierarchy=no_such_detector",

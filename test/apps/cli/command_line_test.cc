@@ -94,7 +94,8 @@ TEST_F(CommandLineTest, LinesThatAreNotUnderstood) {
       Problems("--test_number 1\n"),
       ElementsAre(HasSubstr("my.flags:1: there is no flag '--test_number 1'")));
   EXPECT_THAT(Problems("--test_number= 1x\n"),
-              ElementsAre(HasSubstr("a value of type uint64")));
+              ElementsAre(HasSubstr("my.flags:1: --test_number= 1x: cannot be "
+                                    "read: expected a whole number from 0")));
   EXPECT_THAT(Problems("--test_number\n"),
               ElementsAre(HasSubstr("has no value")));
   EXPECT_THAT(Problems("--notest_number\n"), ElementsAre(HasSubstr("no flag")));
@@ -135,9 +136,21 @@ TEST_F(CommandLineTest, WordsOfTheCommandLine) {
   EXPECT_THAT(
       problems({"--notest_switch=false"}),
       ElementsAre(HasSubstr("--notest_switch=false: 'no' and a value")));
+  EXPECT_THAT(problems({"--test_number=-5"}),
+              ElementsAre("--test_number=-5: cannot be read: expected a whole "
+                          "number from 0 on"));
+  EXPECT_THAT(problems({"--test_number", "x", "--test_switch=perhaps"}),
+              ElementsAre(HasSubstr("--test_number=x: cannot be read"),
+                          "--test_switch=perhaps: cannot be read: expected "
+                          "true or false"));
+  EXPECT_THAT(problems({"--test_number"}),
+              ElementsAre(HasSubstr("--test_number: has no value")));
+  // Only tried.
+  EXPECT_THAT(problems({"--test_number=77", "--test_switch"}), IsEmpty());
+  EXPECT_EQ(FLAGS_test_number, 1u);
   EXPECT_THAT(problems({"--test_word", "--test_switch"}),
               ElementsAre(HasSubstr("--test_word: has no value")));
-  EXPECT_THAT(problems({"--test_word", "man", "--test_number", "-1",
+  EXPECT_THAT(problems({"--test_word", "-1", "--test_number", "7",
                         "--notest_switch", "word", "-"}),
               IsEmpty());
 }

@@ -58,6 +58,7 @@ int main(int argc, char** argv) {
       "and odometry, what plumbline_solve would use of it, and what it would "
       "refuse and why. Ends with status 2 for a log that would be refused.";
   info.usage = {"LOG [flags]"};
+  info.statuses = {{plumbline::kExitInput, "also for a log that is refused"}};
   info.example = "plumbline_inspect robot.bag";
   info.groups = {{"Output", {"json", "quiet", "verbose"}},
                  {"Bags", {"scan_topic", "odometry_topic"}}};

@@ -192,6 +192,9 @@ int main(int argc, char** argv) {
   info.example =
       "plumbline_solve --input=datasets/office.clf.gz --output_dir=out/office";
   info.groups = plumbline::SolveFlagGroups();
+  info.statuses = {{plumbline::kExitElsewhere,
+                    "A log fits nowhere in --map, or in more than one place; "
+                    "nothing is written"}};
   info.checks_flags_itself = true;
   plumbline::ParseFlags(info, argc, argv);
   return plumbline::RunMain(plumbline::Run);

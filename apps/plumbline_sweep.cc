@@ -612,6 +612,7 @@ int main(int argc, char** argv) {
       "plumbline_sweep --grid='delta_threshold=0.05,0.1,0.3;"
       "link_radius=5,10,20' --trials=20 --jobs=2 --output_dir=out/sweep -- "
       "plumbline_solve --input=datasets/office.clf.gz --outputs=none";
+  info.statuses = {{plumbline::kExitInput, "also where a run failed"}};
   info.groups = {
       {"Runs",
        {"grid", "one_at_a_time", "trials", "seed", "seed_flag", "evaluate",

@@ -8,6 +8,7 @@
 #include <functional>
 #include <initializer_list>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -15,9 +16,12 @@ namespace plumbline {
 /// Exit statuses of every binary.
 enum ExitStatus {
   kExitSuccess = 0,
-  /// Wrong flags.
+  /// A command line that is wrong by itself: a flag that there is not, a value
+  /// that does not parse or is out of its range, a flag that is missing.
   kExitUsage = 1,
-  /// Wrong input, or output that cannot be written (plumbline::Error).
+  /// Whatever an Error says: wrong input, a flag that only a closer look shows
+  /// to be wrong (names, lists, flags that do not go together, files that are
+  /// not there), output that cannot be written.
   kExitInput = 2,
   /// Any other exception.
   kExitInternal = 3,
@@ -47,6 +51,8 @@ struct AppInfo {
   std::string example;
   /// Flags of ours that no group lists come last, under "Other flags".
   std::vector<FlagGroup> groups;
+  /// What exit statuses mean of this binary besides what they mean of all.
+  std::vector<std::pair<int, std::string>> statuses;
   /// Arguments that are no flags are refused unless this is true.
   bool takes_arguments = false;
   /// Ctrl-C and SIGTERM end the process at once, with status kExitInterrupted

@@ -155,18 +155,30 @@ constexpr CommonFlag kCommonFlags[] = {
      "Only checks the flags, and ends with status 0 where they are good: for "
      "programs that start this one"}};
 
-struct StatusLine {
-  const char* status;
-  const char* meaning;
-};
-
-constexpr StatusLine kStatuses[] = {
-    {"0", "Success"},
-    {"1", "Wrong flags"},
-    {"2", "Wrong input, or output that cannot be written"},
-    {"3", "Any other failure"},
-    {"130",
-     "Interrupted by Ctrl-C or SIGTERM; what was done so far is written"}};
+// What an exit status means, the lowest first.
+std::map<int, std::string> Statuses(const AppInfo& info) {
+  std::map<int, std::string> statuses = {
+      {kExitSuccess, "Success"},
+      {kExitUsage,
+       "A command line that is wrong by itself: a flag that there is not, a "
+       "value that cannot be read or is out of its range, a flag that is "
+       "missing"},
+      {kExitInput,
+       "Wrong input; a flag that only a closer look shows to be wrong (names, "
+       "lists, flags that do not go together, files that are not there); or "
+       "output that cannot be written"},
+      {kExitInternal, "Any other failure, such as a lack of memory"},
+      {kExitInterrupted,
+       "Interrupted by Ctrl-C or SIGTERM; what was done so far is written"}};
+  if (info.interrupts_end_it) {
+    statuses[kExitInterrupted] = "Interrupted by Ctrl-C or SIGTERM";
+  }
+  for (const auto& [status, meaning] : info.statuses) {
+    std::string& text = statuses[status];
+    text += (text.empty() ? "" : "; ") + meaning;
+  }
+  return statuses;
+}
 
 // Roff takes a backslash, a hyphen (from which a minus must be told) and a dot
 // or quote at the beginning of a line for its own.
@@ -233,6 +245,10 @@ std::string HelpText(const AppInfo& info,
   }
   text += "\nCommon flags:\n";
   for (const CommonFlag& flag : kCommonFlags) add(flag.usage, flag.description);
+  text += "\nExit status:\n";
+  for (const auto& [status, meaning] : Statuses(info)) {
+    add(std::to_string(status), meaning);
+  }
   return text;
 }
 
@@ -263,7 +279,9 @@ std::string ManPage(const AppInfo& info,
   text += ".SS Common flags\n";
   for (const CommonFlag& flag : kCommonFlags) add(flag.usage, flag.description);
   text += ".SH EXIT STATUS\n";
-  for (const StatusLine& line : kStatuses) add(line.status, line.meaning);
+  for (const auto& [status, meaning] : Statuses(info)) {
+    add(std::to_string(status), meaning);
+  }
   if (!info.example.empty()) {
     // As it would be typed: the lines of the help without their indent.
     text += ".SH EXAMPLE\n.nf\n";

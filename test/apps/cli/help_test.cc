@@ -105,6 +105,18 @@ TEST(HelpTest, FitsEightyColumnsAndGroupsFlags) {
                                 "pi/rho,sigma"));
 }
 
+TEST(HelpTest, ExitStatuses) {
+  AppInfo info = TestInfo();
+  info.statuses = {{4, "Elsewhere"}, {3, "or worse"}};
+  const std::string help = HelpText(info, TestFlags());
+  EXPECT_THAT(help, HasSubstr("\nExit status:\n  0\n      Success\n  1\n"));
+  EXPECT_THAT(help, HasSubstr("\n  4\n      Elsewhere\n  130\n"));
+  EXPECT_THAT(help, HasSubstr("lack of memory; or worse\n"));
+  EXPECT_THAT(HelpText(TestInfo(), TestFlags()), Not(HasSubstr("\n  4\n")));
+  EXPECT_THAT(ManPage(info, TestFlags()),
+              HasSubstr("\n.B 4\nElsewhere\n.TP\n.B 130\n"));
+}
+
 TEST(HelpTest, ManPage) {
   const std::string page = ManPage(TestInfo(), TestFlags());
   EXPECT_THAT(page, ::testing::StartsWith(".TH PLUMBLINE_TEST 1 "));

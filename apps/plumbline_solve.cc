@@ -14,6 +14,7 @@
 #include <plumbline/apps/solve/solve_logs.h>
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/hierarchy.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/core/plugin.h>
 #include <plumbline/core/registry.h>
@@ -23,6 +24,7 @@
 #include <plumbline/outputs/marginals_output.h>
 #include <plumbline/outputs/output_folder.h>
 #include <plumbline/outputs/solve_outputs.h>
+#include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/several_logs.h>
 
 #include <cstdio>
@@ -76,6 +78,7 @@ void ListPlugins(const Registry& registry) {
 void CheckRemainingFlags(bool are_several, const Registry& registry) {
   const LogSolverOptions options = LogSolverOptionsFromFlags(registry);
   LaserOptionsFromFlags();
+  LiveMap::CheckFlags();
   if (are_several) CheckOptionsOfLogs(options);
   // Only a log is made of scans, and these are known to come from one.
   if (are_several || options.features != RawFeatures::kSegments) {

@@ -18,7 +18,7 @@ constexpr char kPage[] = "report.html";
 
 }  // namespace
 
-LiveMap::LiveMap(const RunClock& clock) : clock_(clock) {
+void LiveMap::CheckFlags() {
   if (FLAGS_live_dir.empty()) return;
   namespace fs = std::filesystem;
   std::error_code error;
@@ -27,6 +27,11 @@ LiveMap::LiveMap(const RunClock& clock) : clock_(clock) {
     throw Error("--live_dir", 0, "is the folder of --output_dir",
                 "another one");
   }
+}
+
+LiveMap::LiveMap(const RunClock& clock) : clock_(clock) {
+  if (FLAGS_live_dir.empty()) return;
+  CheckFlags();
   ForFlag("live_dir",
           [this] { report_.emplace(FLAGS_live_dir, FLAGS_live_every); });
 }

@@ -20,6 +20,10 @@ class LiveMap {
   /// `clock` has to outlive this. Throws Error where --live_dir cannot be used.
   explicit LiveMap(const RunClock& clock);
 
+  /// Throws Error where --live_dir cannot be used whatever is in the folder: as
+  /// the constructor does, without writing anything.
+  static void CheckFlags();
+
   bool is_on() const { return report_.has_value(); }
 
   /// Shows the map as it stands, if it is time to; `stage` says where the run

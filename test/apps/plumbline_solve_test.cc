@@ -2260,16 +2260,28 @@ TEST_F(SolveTest, OnlyCheckedFlags) {
   const std::string log = Write("office.log", Join(OfficeLines(20)));
   std::string output;
   // What the run refuses is refused, in the same words and with its status.
+  const std::string live = "--live_dir='" + (folder_ / "out").string() + "'";
   for (const char* flag :
-       {"--delta_threshold=7", "--hierarchy=foo",
+       {live.c_str(),
+        "--delta_threshold=7",
+        "--hierarchy=foo",
         "--hierarchy=orientation_mixture/foo",
-        "--features=points --hierarchy=orientation_mixture", "--outputs=foo",
-        "--constraints=/nothere", "--plan=/nothere", "--map=/nothere",
-        "--structure_prior=/nothere", "--plugins=/nothere.so",
-        "--allowed_angles=1e9", "--marginals=tree", "--laser_max_range=nan",
+        "--features=points --hierarchy=orientation_mixture",
+        "--outputs=foo",
+        "--constraints=/nothere",
+        "--plan=/nothere",
+        "--map=/nothere",
+        "--structure_prior=/nothere",
+        "--plugins=/nothere.so",
+        "--allowed_angles=1e9",
+        "--marginals=tree",
+        "--laser_max_range=nan",
         "--detector_parameters=orientation_mixture.sigma_deg=-1",
-        "--log_reader=foo", "--start_pose=2:0,0,0", "--plan_sigma=0.1",
-        "--localize", "--ellipse_sigmas=2"}) {
+        "--log_reader=foo",
+        "--start_pose=2:0,0,0",
+        "--plan_sigma=0.1",
+        "--localize",
+        "--ellipse_sigmas=2"}) {
     const int status = Solve(log, "out", flag, &output);
     EXPECT_NE(status, 0) << flag;
     std::string checked;

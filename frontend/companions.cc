@@ -1,4 +1,5 @@
 #include <plumbline/core/parallel_for.h>
+#include <plumbline/factors/angle.h>
 #include <plumbline/frontend/companions.h>
 
 #include <Eigen/Core>
@@ -20,12 +21,18 @@ constexpr double kRound = 6.1;
 constexpr double kGate = 0.3;
 // Steps of odometry longer than this between two scans are jumps, m.
 constexpr double kJump = 1.0;
-// While the robot stands what stood beside it before stands there still, m.
-constexpr double kStanding = 0.1;
 // No points are put between beams this far apart, rad.
 constexpr double kNoneBetween = 4.0;
-// Comparisons without it after which a companion is another one.
+// Comparisons and scans without it after which a companion is another one.
 constexpr int kMostMissed = 2;
+// Comparisons that tell how it looks where it is first and last found.
+constexpr std::size_t kLooksAtAnEnd = 3;
+// A scan that has other things in front of more than this share of it says
+// nothing; so many scans in a row may be such.
+constexpr double kMostHidden = 0.7;
+constexpr int kLongestHidden = 50;
+// Cosine of the angle up to which two directions are those of one beam.
+const double kSameBeam = std::cos(DegToRad(1.0));
 
 // Points by x, to find those near a place.
 class NearPoints {
@@ -221,9 +228,13 @@ class CompanionSearch {
     return found;
   }
 
+  // By odometry, m.
+  double WayBetween(int begin, int end) const {
+    return way_[Index(end)] - way_[Index(begin)];
+  }
+
   // Whether the scans between those that were compared show it, too.
   bool IsSeenBetween(const Track& track) const {
-    const double square = options_.reach_between * options_.reach_between;
     double shown = 0.0;
     double all = 0.0;
     std::vector<ScanPoint> points;
@@ -231,13 +242,8 @@ class CompanionSearch {
       const int end = stations_[Index(comparison + 1)];
       for (int i = stations_[Index(comparison)] + 1; i < end; ++i) {
         Returns(scans_[Index(i)], &points);
-        for (const Vector2d& place : thing) {
-          shown += std::any_of(
-              points.begin(), points.end(), [&](const ScanPoint& point) {
-                return (point.position - place).squaredNorm() <= square;
-              });
-        }
-        all += static_cast<double>(thing.size());
+        shown += Look(thing, LaserOf(i), points).shown;
+        all += 1.0;
       }
     }
     return shown >= options_.min_share_between * all;
@@ -247,25 +253,25 @@ class CompanionSearch {
   Companion TakeOut(const Track& track, std::vector<Scan>* scans) const {
     Companion companion;
     const int first = stations_[Index(track.first())];
-    companion.begin = first;
-    companion.end = stations_[Index(track.last() + 1)];
-    // The robot may have stood beside it before.
-    while (companion.begin > 0 &&
-           way_[Index(first)] - way_[Index(companion.begin - 1)] <= kStanding) {
-      --companion.begin;
-    }
-    companion.way = way_[Index(companion.end)] - way_[Index(companion.begin)];
+    const int last = stations_[Index(track.last() + 1)];
+    // Where the robot stands or turns on the spot two scans say nothing.
+    companion.begin = Extended(track, first, -1, *scans);
+    companion.end = Extended(track, last, 1, *scans);
+    companion.way = WayBetween(companion.begin, companion.end);
     const double square = options_.reach * options_.reach;
     std::vector<ScanPoint> points;
     std::size_t next = 0;
     for (int i = companion.begin; i <= companion.end; ++i) {
-      // What was seen in the last comparison before this scan and in the next.
+      // What was seen in the last comparisons before this scan and in the next.
       while (next < track.seen.size() &&
              stations_[Index(track.seen[next].first + 1)] <= i) {
         ++next;
       }
-      const std::size_t begin = next == 0 ? 0 : next - 1;
-      const std::size_t end = std::min(track.seen.size(), next + 1);
+      const bool is_extended = i < first || i > last;
+      const std::size_t around = is_extended ? kLooksAtAnEnd : 1;
+      const std::size_t begin = next < around ? 0 : next - around;
+      const std::size_t end =
+          std::min(track.seen.size(), next + (is_extended ? around : 1));
       Scan& scan = (*scans)[Index(i)];
       Returns(scan, &points);
       for (const ScanPoint& point : points) {
@@ -287,6 +293,77 @@ class CompanionSearch {
 
  private:
   static std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+  // What a scan shows of a thing: shares of it.
+  struct Sight {
+    double shown = 0.0;
+    // Something else is in front of it.
+    double hidden = 0.0;
+
+    bool IsShown(double least) const {
+      return shown >= least * (1.0 - hidden) && hidden <= kMostHidden;
+    }
+  };
+
+  // `laser`: where it is in the robot's frame; `points`: of the scan.
+  Sight Look(const std::vector<Vector2d>& thing, const Vector2d& laser,
+             const std::vector<ScanPoint>& points) const {
+    const double square = options_.reach_between * options_.reach_between;
+    Sight sight;
+    for (const Vector2d& place : thing) {
+      const Vector2d to = place - laser;
+      const double range = to.norm();
+      bool is_shown = false;
+      bool is_hidden = false;
+      for (const ScanPoint& point : points) {
+        is_shown = (point.position - place).squaredNorm() <= square;
+        if (is_shown) break;
+        is_hidden =
+            is_hidden ||
+            (point.range < range - options_.reach_between &&
+             to.dot(point.position - laser) >= kSameBeam * range * point.range);
+      }
+      sight.shown += is_shown;
+      sight.hidden += !is_shown && is_hidden;
+    }
+    sight.shown /= static_cast<double>(thing.size());
+    sight.hidden /= static_cast<double>(thing.size());
+    return sight;
+  }
+
+  // The last scan, from scan `end` on (`way` 1) or back (-1), that shows the
+  // thing as the first or last comparisons have it.
+  int Extended(const Track& track, int end, int way,
+               const std::vector<Scan>& scans) const {
+    const std::size_t count = std::min(kLooksAtAnEnd, track.seen.size());
+    const std::size_t begin = way < 0 ? 0 : track.seen.size() - count;
+    std::vector<ScanPoint> points;
+    int missed = 0;
+    int hidden = 0;
+    for (int i = end + way; i >= 0 && i < static_cast<int>(scans.size()) &&
+                            missed <= kMostMissed && hidden <= kLongestHidden;
+         i += way) {
+      Returns(scans[Index(i)], &points);
+      bool is_shown = false;
+      bool is_hidden = false;
+      for (std::size_t k = begin; k < begin + count && !is_shown; ++k) {
+        const Sight sight = Look(track.seen[k].second, LaserOf(i), points);
+        is_shown = sight.IsShown(options_.min_share_between);
+        is_hidden = is_hidden || sight.hidden > kMostHidden;
+      }
+      if (is_shown) {
+        missed = hidden = 0;
+        end = i;
+      } else {
+        ++(is_hidden ? hidden : missed);
+      }
+    }
+    return end;
+  }
+
+  Vector2d LaserOf(int scan) const {
+    return scans_[Index(scan)].laser_offset.head<2>();
+  }
 
   // Those of the beams alone, near enough.
   void Returns(const Scan& scan, std::vector<ScanPoint>* points) const {
@@ -344,9 +421,23 @@ class CompanionSearch {
 std::vector<Companion> TakeOutCompanions(const CompanionOptions& options,
                                          std::vector<Scan>* scans) {
   const CompanionSearch search(options, *scans);
-  std::vector<Companion> companions;
+  std::vector<Companion> all;
   for (const Track& track : search.Find()) {
-    companions.push_back(search.TakeOut(track, scans));
+    all.push_back(search.TakeOut(track, scans));
+  }
+  std::sort(all.begin(), all.end(), [](const Companion& a, const Companion& b) {
+    return a.begin < b.begin;
+  });
+  std::vector<Companion> companions;
+  for (const Companion& companion : all) {
+    if (companions.empty() || companion.begin > companions.back().end) {
+      companions.push_back(companion);
+      continue;
+    }
+    Companion& last = companions.back();
+    last.end = std::max(last.end, companion.end);
+    last.way = search.WayBetween(last.begin, last.end);
+    last.returns += companion.returns;
   }
   return companions;
 }

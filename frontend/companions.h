@@ -59,8 +59,8 @@ struct CompanionOptions {
   double reach = 0.25;
 };
 
-/// Something that went along with the robot for a part of the log: a cart, a
-/// person, a part of the robot that the laser sees.
+/// A part of the log in which something went along with the robot: a cart, a
+/// person, a part of the robot that the laser sees; or several such things.
 struct Companion {
   /// First and last scan: indices.
   int begin = 0;
@@ -76,6 +76,10 @@ struct Companion {
 /// others go by as odometry says. No map holds what goes along, and where it is
 /// the largest thing that tells how far the robot went, as a cart in a
 /// corridor, scans that are matched stand still.
+///
+/// What is found so is followed to both sides, scan by scan, as long as it is
+/// seen where it was, or something is in front of it: where the robot stands or
+/// turns on the spot nothing tells what goes along.
 ///
 /// Takes its returns out of the scans (they become none). Needs odometry that
 /// tells a metre from none; where there is none, or wheels spin, nothing is

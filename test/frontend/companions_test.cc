@@ -2,6 +2,7 @@
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/companions.h>
 
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -110,6 +111,45 @@ TEST(CompanionsTest, IsThereFromWhereTheRobotStoodAtTheBeginning) {
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].begin, 0);
   EXPECT_EQ(scans[0].ranges[90], 0.0f);
+}
+
+// Where it turns around on the spot the walls beside it hide the cart for a
+// while.
+TEST(CompanionsTest, IsFollowedWhereTheRobotTurnsOnTheSpot) {
+  const std::vector<WallEnds> corridor = CorridorWithDoors();
+  testing::Noise noise(6);
+  testing::Laser laser;
+  laser.sigma = 0.01;
+  std::vector<Scan> scans;
+  Pose2 pose = Pose2::Zero();
+  for (int i = 0; i < 150; ++i) {
+    std::vector<WallEnds> walls = corridor;
+    walls.push_back(CartAt(pose, 0.8));
+    scans.push_back(testing::MakeScan(walls, pose, laser, &noise));
+    const bool turns = i >= 60 && i < 96;
+    pose = Compose(pose,
+                   turns ? Pose2(0.0, 0.0, kPi / 36.0) : Pose2(0.1, 0.0, 0.0));
+  }
+  const std::vector<Scan> before = scans;
+  const std::vector<Companion> found =
+      TakeOutCompanions(CompanionOptions(), &scans);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].begin, 0);
+  EXPECT_EQ(found[0].end, 149);
+  EXPECT_NEAR(found[0].way, 11.3, 0.1);
+  int seen = 0;
+  for (std::size_t i = 0; i < 150; ++i) {
+    const float range = before[i].ranges[90];
+    const float apart = std::abs(range - 1.5f);
+    seen += apart < 0.1f;
+    if (apart < 0.1f) {
+      EXPECT_EQ(scans[i].ranges[90], 0.0f) << i;
+    } else if (apart > 0.3f) {
+      EXPECT_EQ(scans[i].ranges[90], range) << i;
+    }
+  }
+  EXPECT_GT(seen, 125);
+  EXPECT_LT(seen, 150);
 }
 
 TEST(CompanionsTest, WhatStandsStays) {

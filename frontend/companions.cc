@@ -150,10 +150,6 @@ struct Track {
   // Comparison, and where it was seen.
   std::vector<std::pair<int, std::vector<Vector2d>>> seen;
   Vector2d middle = Vector2d::Zero();
-  // Of all its comparisons: returns that stand, and that go along on something
-  // else.
-  int witnesses = 0;
-  int others = 0;
 
   int first() const { return seen.front().first; }
   int last() const { return seen.back().first; }
@@ -180,7 +176,7 @@ class CompanionSearch {
   }
 
   std::vector<Track> Find() const {
-    const std::vector<Comparison> comparisons = CompareAll();
+    std::vector<Comparison> comparisons = CompareAll();
     std::vector<Track> open, found;
     for (int i = 0; i < static_cast<int>(comparisons.size()); ++i) {
       const Comparison& comparison = comparisons[Index(i)];
@@ -204,8 +200,6 @@ class CompanionSearch {
         Track& track = best < open.size() ? open[best] : begun.back();
         track.seen.emplace_back(i, thing);
         track.middle = middle;
-        track.witnesses += comparison.witnesses;
-        track.others += comparison.along - static_cast<int>(thing.size());
       }
       std::vector<Track> still_open = std::move(begun);
       for (Track& track : open) {
@@ -215,12 +209,17 @@ class CompanionSearch {
       open = std::move(still_open);
     }
     for (Track& track : open) found.push_back(std::move(track));
-    found.erase(std::remove_if(found.begin(), found.end(),
-                               [this](const Track& track) {
-                                 return !IsBelieved(track) ||
-                                        !IsSeenBetween(track);
-                               }),
-                found.end());
+    Keep(&found, [this](const Track& track) {
+      return IsSteady(track) && IsSeenBetween(track);
+    });
+    // People who walk along together are not others to each other.
+    for (const Track& track : found) {
+      for (const auto& [i, thing] : track.seen) {
+        comparisons[Index(i)].along -= static_cast<int>(thing.size());
+      }
+    }
+    Keep(&found,
+         [&](const Track& track) { return HasWitnesses(track, comparisons); });
     std::sort(found.begin(), found.end(), [](const Track& a, const Track& b) {
       return std::make_pair(a.first(), a.last()) <
              std::make_pair(b.first(), b.last());
@@ -398,14 +397,34 @@ class CompanionSearch {
     return comparisons;
   }
 
-  bool IsBelieved(const Track& track) const {
+  template <typename Test>
+  static void Keep(std::vector<Track>* tracks, const Test& test) {
+    tracks->erase(
+        std::remove_if(tracks->begin(), tracks->end(),
+                       [&test](const Track& track) { return !test(track); }),
+        tracks->end());
+  }
+
+  bool IsSteady(const Track& track) const {
     const auto seen = static_cast<double>(track.seen.size());
     const double span = track.last() - track.first() + 1.0;
     return static_cast<int>(track.seen.size()) >= options_.min_steps &&
-           seen >= options_.min_share * span &&
-           track.witnesses >= options_.min_witnesses &&
-           track.witnesses >= options_.min_witnesses_per_step * seen &&
-           track.witnesses >= options_.min_ratio * track.others;
+           seen >= options_.min_share * span;
+  }
+
+  // `comparisons`: of what goes along only what belongs to no track.
+  bool HasWitnesses(const Track& track,
+                    const std::vector<Comparison>& comparisons) const {
+    int witnesses = 0;
+    int others = 0;
+    for (const auto& seen : track.seen) {
+      witnesses += comparisons[Index(seen.first)].witnesses;
+      others += comparisons[Index(seen.first)].along;
+    }
+    return witnesses >= options_.min_witnesses &&
+           witnesses >= options_.min_witnesses_per_step *
+                            static_cast<double>(track.seen.size()) &&
+           witnesses >= options_.min_ratio * others;
   }
 
   const CompanionOptions& options_;

@@ -40,8 +40,8 @@ struct CompanionOptions {
   /// ... and in this share of those between the first and the last, ...
   double min_share = 0.6;
   /// ... in which this many returns in all, and in the mean, went by as
-  /// odometry says, and this many times as many as went along on something
-  /// else: where wheels spin on the spot everything goes along.
+  /// odometry says, and this many times as many as went along on what is no
+  /// such thing: where wheels spin on the spot everything goes along.
   int min_witnesses = 8;
   double min_witnesses_per_step = 0.2;
   double min_ratio = 2.0;

@@ -113,6 +113,30 @@ TEST(CompanionsTest, IsThereFromWhereTheRobotStoodAtTheBeginning) {
   EXPECT_EQ(scans[0].ranges[90], 0.0f);
 }
 
+// Two people side by side have more returns than the doors that go by.
+TEST(CompanionsTest, SeveralThingsMayGoAlong) {
+  Drive drive;
+  std::vector<Scan> scans = ScansOf(drive);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const Pose2 pose(0.1 * static_cast<double>(i), 0.0, 0.0);
+    std::vector<WallEnds> walls = drive.walls;
+    for (const double side : {-0.4, 0.4}) {
+      walls.push_back({TransformPoint(pose, {1.2, side - 0.2}),
+                       TransformPoint(pose, {1.2, side + 0.2})});
+    }
+    scans[i].ranges = testing::MakeScan(walls, pose, testing::Laser()).ranges;
+  }
+  const std::vector<Companion> found =
+      TakeOutCompanions(CompanionOptions(), &scans);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR(found[0].way, 19.9, 1.0);
+  // atan(0.4 / 1.2) is 18.4 degrees.
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    EXPECT_EQ(scans[i].ranges[90 - 18], 0.0f);
+    EXPECT_EQ(scans[i].ranges[90 + 18], 0.0f);
+  }
+}
+
 // Where it turns around on the spot the walls beside it hide the cart for a
 // while.
 TEST(CompanionsTest, IsFollowedWhereTheRobotTurnsOnTheSpot) {

@@ -188,9 +188,9 @@ void LeaveOutCompanions(const std::string& name,
   char text[200];
   std::snprintf(
       text, sizeof text,
-      "something went along with the robot for %.1f m in %zu stretches, the "
+      "something went along with the robot for %.1f m in %zu stretch%s, the "
       "first from %.1f s on: its %lld returns are left out",
-      way, companions.size(),
+      way, companions.size(), companions.size() == 1 ? "" : "es",
       log->scans[static_cast<std::size_t>(begin)].timestamp,
       static_cast<long long>(returns));
   summary->notes.push_back(text);

@@ -69,7 +69,7 @@ def main():
                     file.write(" ".join(with_cart(list(words), cart) if seed else words) + "\n")
             solve = subprocess.run([os.path.join(binaries, "plumbline_solve"), "--input=" + path, "--output_dir=" + folder + "/out",
                                     "--outputs=trajectory.tum"], check=True, capture_output=True, text=True)
-            said = re.findall(r"went along with the robot for ([\d.]+) m in (\d+)", solve.stderr)
+            said = re.findall(r"went along with the robot for ([\d.]+) m in (\d+ stretch\w*)", solve.stderr)
             text = subprocess.run([os.path.join(binaries, "plumbline_evaluate"), "--relations=" + relations,
                                    "--trajectory=" + folder + "/out/trajectory.tum"], check=True, capture_output=True,
                                   text=True).stdout
@@ -79,7 +79,7 @@ def main():
         what = "%.1f m wide, %.1f m ahead, %.2f to and fro, %.0f s" % (
             cart["width"], cart["ahead"], cart["sway"], cart["end"] - cart["begin"]) if seed else "none"
         print("%3d %s: %s (%s) m, %d loose, %s" % (seed, what, mean, most, loose,
-                                                   "%s m in %s stretches left out" % said[0] if said else "nothing left out"),
+                                                   "%s m in %s left out" % said[0] if said else "nothing left out"),
               flush=True)
 
 

@@ -21,6 +21,8 @@ constexpr double kRound = 6.1;
 constexpr double kGate = 0.3;
 // Steps of odometry longer than this between two scans are jumps, m.
 constexpr double kJump = 1.0;
+// Comparisons that one thread makes in a row.
+constexpr std::size_t kInTurn = 64;
 // No points are put between beams this far apart, rad.
 constexpr double kNoneBetween = 4.0;
 // Comparisons and scans without it after which a companion is another one.
@@ -375,26 +377,40 @@ class CompanionSearch {
   std::vector<Comparison> CompareAll() const {
     const std::size_t count = stations_.empty() ? 0 : stations_.size() - 1;
     std::vector<Comparison> comparisons(count);
-    std::vector<std::vector<ScanPoint>> points(stations_.size());
-    ParallelFor(stations_.size(), ThreadsHere(), [&](std::size_t i) {
-      ExtractScanPoints(scans_[Index(stations_[i])], options_.points,
-                        &points[i]);
-    });
-    ParallelFor(count, ThreadsHere(), [&](std::size_t i) {
-      const Pose2 motion = Between(scans_[Index(stations_[i])].odometry,
-                                   scans_[Index(stations_[i + 1])].odometry);
-      if (std::abs(motion[2]) > options_.max_turn ||
-          motion.head<2>().norm() < 0.5 * options_.step) {
-        return;
-      }
-      const Scan& scan = scans_[Index(stations_[i + 1])];
-      const bool is_round =
-          std::abs(scan.angle_step) * static_cast<double>(scan.ranges.size()) >
-          kRound;
-      comparisons[i] =
-          Compare(points[i], points[i + 1], motion, is_round, options_);
-    });
+    ParallelFor(
+        (count + kInTurn - 1) / kInTurn, ThreadsHere(), [&](std::size_t turn) {
+          // In the same memory: of a long log not all fit into it.
+          std::vector<ScanPoint> before, now;
+          const std::size_t begin = turn * kInTurn;
+          const std::size_t end = std::min(count, begin + kInTurn);
+          ExtractScanPoints(StationScan(begin), options_.points, &before);
+          for (std::size_t i = begin; i < end; ++i) {
+            ExtractScanPoints(StationScan(i + 1), options_.points, &now);
+            comparisons[i] = CompareStations(i, before, now);
+            before.swap(now);
+          }
+        });
     return comparisons;
+  }
+
+  const Scan& StationScan(std::size_t station) const {
+    return scans_[Index(stations_[station])];
+  }
+
+  // Of a station with the next one; says nothing where the robot turned.
+  Comparison CompareStations(std::size_t station,
+                             const std::vector<ScanPoint>& before,
+                             const std::vector<ScanPoint>& now) const {
+    const Scan& scan = StationScan(station + 1);
+    const Pose2 motion = Between(StationScan(station).odometry, scan.odometry);
+    if (std::abs(motion[2]) > options_.max_turn ||
+        motion.head<2>().norm() < 0.5 * options_.step) {
+      return Comparison();
+    }
+    const bool is_round =
+        std::abs(scan.angle_step) * static_cast<double>(scan.ranges.size()) >
+        kRound;
+    return Compare(before, now, motion, is_round, options_);
   }
 
   template <typename Test>

@@ -81,13 +81,12 @@ std::string ValuesOf(const std::string& type) {
   return "a whole number";
 }
 
-// Whether gflags can read a value of a flag. Words it takes as they are, and
-// some of its own are more than values.
+// Whether gflags can read a value of a flag, which it is set to for a try: who
+// calls has a FlagSaver. Words it takes as they are, and some of its own are
+// more than values.
 bool CanRead(const gflags::CommandLineFlagInfo& flag,
              const std::string& value) {
   if (flag.type == "string") return true;
-  // Set for a try, and set back.
-  const gflags::FlagSaver saver;
   return !gflags::SetCommandLineOption(flag.name.c_str(), value.c_str())
               .empty();
 }
@@ -276,6 +275,9 @@ class CommandLineReader {
     result_.arguments.push_back(line);
   }
 
+  // Values that were set for a try go in the end: one for all of them, since it
+  // copies every flag.
+  const gflags::FlagSaver saver_;
   CommandLine result_;
   // Flag files that are being read, the outermost first.
   std::vector<fs::path> open_;

@@ -1,6 +1,7 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/companions.h>
+#include <plumbline/frontend/near_points.h>
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -17,8 +18,6 @@ using Eigen::Vector2d;
 constexpr double kEnd = 0.2;
 // Beams over this angle go all around, rad.
 constexpr double kRound = 6.1;
-// Surfaces farther apart than this are not compared, m.
-constexpr double kGate = 0.3;
 // Steps of odometry longer than this between two scans are jumps, m.
 constexpr double kJump = 1.0;
 // Comparisons that one thread makes in a row.
@@ -35,36 +34,6 @@ constexpr double kMostHidden = 0.7;
 constexpr int kLongestHidden = 50;
 // Cosine of the angle up to which two directions are those of one beam.
 const double kSameBeam = std::cos(DegToRad(1.0));
-
-// Points by x, to find those near a place.
-class NearPoints {
- public:
-  explicit NearPoints(const std::vector<ScanPoint>& points) {
-    for (const ScanPoint& point : points) places_.push_back(point.position);
-    std::sort(places_.begin(), places_.end(),
-              [](const Vector2d& a, const Vector2d& b) { return a[0] < b[0]; });
-  }
-
-  // Least distance from `place` along `normal` of points within the gate; along
-  // every direction where the normal is zero. The gate when there is none.
-  double DistanceTo(const Vector2d& place, const Vector2d& normal) const {
-    double least = kGate;
-    auto it =
-        std::lower_bound(places_.begin(), places_.end(), place[0] - kGate,
-                         [](const Vector2d& a, double x) { return a[0] < x; });
-    for (; it != places_.end() && (*it)[0] <= place[0] + kGate; ++it) {
-      const Vector2d apart = *it - place;
-      const double distance = apart.norm();
-      if (distance > kGate) continue;
-      least = std::min(
-          least, normal.isZero() ? distance : std::abs(normal.dot(apart)));
-    }
-    return least;
-  }
-
- private:
-  std::vector<Vector2d> places_;
-};
 
 // What two scans say of what stands and what goes along.
 struct Comparison {
@@ -122,7 +91,7 @@ Comparison Compare(const std::vector<ScanPoint>& before,
                             : std::abs(point.normal.dot(shift));
     if (says < options.least_shift) continue;
     const bool stays = near.DistanceTo(point.position, point.normal) <=
-                       std::min(kGate, options.stays * says);
+                       std::min(NearPoints::kGate, options.stays * says);
     const bool stands =
         near.DistanceTo(was, transform.Direction(point.normal)) <=
         options.stands;

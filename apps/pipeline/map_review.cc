@@ -114,6 +114,27 @@ void AddDisputedWays(const std::vector<DisputedWay>& ways,
   }
 }
 
+void AddContestedWays(const std::vector<ContestedWay>& ways,
+                      const std::vector<DisputedWay>& told,
+                      std::vector<LooseTrack>* loose) {
+  for (const ContestedWay& way : ways) {
+    const bool is_told = std::any_of(
+        told.begin(), told.end(), [&way](const DisputedWay& disputed) {
+          const int common = std::min(disputed.end, way.end) -
+                             std::max(disputed.begin, way.begin);
+          return 2 * common >= way.end - way.begin;
+        });
+    if (is_told) continue;
+    char why[192];
+    std::snprintf(
+        why, sizeof why,
+        "most of what is in sight goes along with the robot, or its "
+        "wheels slip: odometry has %.1f m of way here, the map %.1f m",
+        way.by_odometry, way.by_map);
+    AddLoose(way.begin, way.end, why, loose);
+  }
+}
+
 // Of level 0.
 std::vector<Wall> WallsOf(const Graph& graph) {
   std::vector<Wall> walls;
@@ -174,7 +195,17 @@ void MapReview::Revise(const Graph& graph,
   AddContradictions(contradictions, loose);
   AddBlockedWays(blocked, loose);
   AddBlindRuns(FindBlindRuns(refined), check_.open_way, loose);
-  AddDisputedWays(Odometry().disputed, loose);
+  const OdometryAgreement odometry = Odometry();
+  AddDisputedWays(odometry.disputed, loose);
+  ContestedWayOptions contested;
+  contested.points = check_.points;
+  contested.num_threads = check_.num_threads;
+  // A laser that looks elsewhere than the log says contests all of the way.
+  if (!odometry.is_course_disputed) {
+    AddContestedWays(
+        FindContestedWays(scans_, trajectory_, odometry.scale, contested),
+        odometry.disputed, loose);
+  }
   if (tell_open_ways) AddOpenWays(OpenWays(), loose);
   std::stable_sort(loose->begin(), loose->end(),
                    [](const LooseTrack& a, const LooseTrack& b) {

@@ -3,6 +3,7 @@
 
 #include <plumbline/core/graph.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/contested_ways.h>
 #include <plumbline/frontend/graph_builder.h>
 #include <plumbline/frontend/map_check.h>
 #include <plumbline/frontend/odometry_check.h>
@@ -45,9 +46,9 @@ class MapReview {
   /// match or a guess: adds those that contradict what was seen on other
   /// visits, ways through walls of `graph`, scans that odometry alone placed
   /// while it missed much (`refined`, one per scan), ways that odometry has
-  /// longer by far and, with `tell_open_ways`, ways whose length hangs on
-  /// odometry; drops those that turn out to be
-  /// right. Ordered by their first scans.
+  /// longer by far or that what was in sight contests and, with
+  /// `tell_open_ways`, ways whose length hangs on odometry; drops those that
+  /// turn out to be right. Ordered by their first scans.
   void Revise(const Graph& graph, const std::vector<RefinedScan>& refined,
               bool tell_open_ways, std::vector<LooseTrack>* loose) const;
 

@@ -299,6 +299,34 @@ double SigmaByWheels(const WheelModel& wheels, double way) {
   return std::sqrt(wheels.variance * way + wheels.scale_variance * way * way);
 }
 
+// How much longer the map has this part of the way than odometry, m.
+double MissedBy(const std::vector<Scan>& scans, const std::vector<int>& keys,
+                const std::vector<Pose2>& poses, const Places& places,
+                const WheelModel& wheels, const Run& run) {
+  double missed = 0.0;
+  for (std::size_t p = run.first + 1; p <= run.second; ++p) {
+    const std::size_t a = places.keys[p - 1];
+    const std::size_t b = places.keys[p];
+    missed += (poses[b] - poses[a]).head<2>().norm() -
+              wheels.scale *
+                  Between(scans[static_cast<std::size_t>(keys[a])].odometry,
+                          scans[static_cast<std::size_t>(keys[b])].odometry)
+                      .head<2>()
+                      .norm();
+  }
+  return missed;
+}
+
+// How far the length of a part of the way in the map may be off: what is known
+// of it has this standard deviation with what was seen and `by_wheels` without.
+// The square root of the difference of the squares is how far the one may lead
+// from the other; where the map lies farther off it is not what is known.
+double SigmaOfMap(double sigma, double by_wheels, double missed) {
+  const double explained = by_wheels * by_wheels - sigma * sigma;
+  return std::sqrt(sigma * sigma +
+                   std::max(0.0, missed * missed - std::max(0.0, explained)));
+}
+
 // Where the returns say less of the way than odometry does.
 std::vector<Run> OpenRuns(const Places& places, const WheelModel& wheels,
                           const OpenWayOptions& options) {
@@ -486,7 +514,9 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
   }
   // Odometry alone may be good enough: then nothing is left to be asked.
   const auto may_be_told = [&](const WheelModel& wheels, const Run& run) {
-    return SigmaByWheels(wheels, places.LengthOf(run)) > options.told_sigma;
+    return SigmaByWheels(wheels, places.LengthOf(run)) > options.told_sigma ||
+           std::abs(MissedBy(scans, keys, poses, places, wheels, run)) >
+               options.told_sigma;
   };
   WheelModel wheels = LearnWheels(scans, keys, poses, places, options);
   std::vector<Run> runs = OpenRuns(places, wheels, options);
@@ -509,7 +539,9 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
     way.begin = keys[places.keys[run.first]];
     way.end = keys[places.keys[run.second]];
     way.length = places.LengthOf(run);
-    way.sigma = network.SigmaOf(run);
+    way.sigma =
+        SigmaOfMap(network.SigmaOf(run), SigmaByWheels(wheels, way.length),
+                   MissedBy(scans, keys, poses, places, wheels, run));
     if (way.sigma > options.told_sigma) ways.push_back(way);
   }
   return ways;

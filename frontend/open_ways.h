@@ -35,7 +35,8 @@ struct OpenWayOptions {
   double scale_sigma = 0.05;
   double prior_way = 3.0;
   /// Uncertainty of the length of a way (standard deviation, m) from which on
-  /// it is reported.
+  /// it is reported. Ways that odometry alone knows better, and that are as
+  /// long in the map to within this, are not looked into.
   double told_sigma = 0.2;
   int num_threads = 0;
 };
@@ -60,7 +61,9 @@ struct OpenWay {
 /// like knowledge. The scan is shifted by a quarter of a metre to a metre
 /// instead, and by how much it then fits worse is what is known. All places,
 /// bound by what is known so and by odometry, whose errors are estimated where
-/// returns tell how far the robot went, give the covariance.
+/// returns tell how far the robot went, give the covariance. Where the map has
+/// another length than odometry, the part of it that what was seen does not
+/// explain counts as well.
 ///
 /// `keys`: indices into `scans`, ascending; `poses`: of the robot at these, map
 /// frame. `stop` (may be null) is asked now and then; once it has returned true

@@ -2,6 +2,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/open_ways.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -111,6 +112,23 @@ TEST(FindOpenWaysTest, AShortCorridorDoesNot) {
   const SeenDrive drive =
       DriveAlong(RoomAndCorridor(), Straight(-8.0, 5.0), 0.01);
   EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}).empty());
+}
+
+// Nothing in sight shows it, but odometry does.
+TEST(FindOpenWaysTest, AMapThatIsShorterThanOdometryIsLessCertain) {
+  const SeenDrive drive =
+      DriveAlong(RoomAndCorridor(), Straight(-8.0, 8.0), 0.005);
+  OpenWayOptions options;
+  options.told_sigma = 0.3;
+  EXPECT_TRUE(
+      FindOpenWays(drive.scans, drive.keys, drive.poses, options).empty());
+  std::vector<Pose2> shorter = drive.poses;
+  // By 0.5 m, from where the room is out of sight.
+  for (Pose2& pose : shorter) pose[0] -= 0.1 * std::max(0.0, pose[0] - 3.0);
+  const std::vector<OpenWay> ways =
+      FindOpenWays(drive.scans, drive.keys, shorter, options);
+  ASSERT_EQ(ways.size(), 1u);
+  EXPECT_GT(ways[0].sigma, 0.4);
 }
 
 // A round corridor looks the same from everywhere, but each of its scans has

@@ -183,10 +183,11 @@ std::vector<ContestedWay> FindContestedWays(
       const ContestedWay way =
           WayBetween(scans, trajectory, scale, stations, first, last);
       const bool is_unopposed = sum.standing <= options.unopposed * sum.along;
-      const double doubt =
-          is_unopposed ? way.by_odometry
-                       : std::max(std::abs(way.by_odometry - way.by_map),
-                                  options.scale_sigma * way.by_odometry);
+      double doubt = options.scale_sigma * way.by_odometry;
+      if (is_unopposed) doubt = way.by_odometry;
+      if (way.by_odometry >= options.least_length) {
+        doubt = std::max(doubt, std::abs(way.by_odometry - way.by_map));
+      }
       if (doubt > options.told) ways.push_back(way);
     }
     steps = 0;

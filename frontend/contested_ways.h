@@ -33,12 +33,14 @@ struct ContestedWayOptions {
   int min_steps = 4;
   int max_gap = 2;
   /// The doubt from which on it is told, m: all of the way where no more than
-  /// this share of what goes along stands; else by how much map and odometry
-  /// differ, and how uncertain a length is that odometry alone has, in parts of
-  /// it.
+  /// this share of what goes along stands; else how uncertain a length is that
+  /// odometry alone has, in parts of it, and, from this length on, by how much
+  /// map and odometry differ: over a shorter way they do where odometry comes
+  /// late.
   double told = 0.2;
   double unopposed = 0.1;
   double scale_sigma = 0.03;
+  double least_length = 4.0;
   int num_threads = 0;
 };
 

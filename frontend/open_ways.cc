@@ -299,10 +299,13 @@ double SigmaByWheels(const WheelModel& wheels, double way) {
   return std::sqrt(wheels.variance * way + wheels.scale_variance * way * way);
 }
 
-// How much longer the map has this part of the way than odometry, m.
+// How much longer the map has this part of the way than odometry, m; nothing
+// is said of short ones.
 double MissedBy(const std::vector<Scan>& scans, const std::vector<int>& keys,
                 const std::vector<Pose2>& poses, const Places& places,
-                const WheelModel& wheels, const Run& run) {
+                const WheelModel& wheels, const Run& run,
+                const OpenWayOptions& options) {
+  if (places.LengthOf(run) < options.least_length) return 0.0;
   double missed = 0.0;
   for (std::size_t p = run.first + 1; p <= run.second; ++p) {
     const std::size_t a = places.keys[p - 1];
@@ -515,8 +518,8 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
   // Odometry alone may be good enough: then nothing is left to be asked.
   const auto may_be_told = [&](const WheelModel& wheels, const Run& run) {
     return SigmaByWheels(wheels, places.LengthOf(run)) > options.told_sigma ||
-           std::abs(MissedBy(scans, keys, poses, places, wheels, run)) >
-               options.told_sigma;
+           std::abs(MissedBy(scans, keys, poses, places, wheels, run,
+                             options)) > options.told_sigma;
   };
   WheelModel wheels = LearnWheels(scans, keys, poses, places, options);
   std::vector<Run> runs = OpenRuns(places, wheels, options);
@@ -541,7 +544,7 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
     way.length = places.LengthOf(run);
     way.sigma =
         SigmaOfMap(network.SigmaOf(run), SigmaByWheels(wheels, way.length),
-                   MissedBy(scans, keys, poses, places, wheels, run));
+                   MissedBy(scans, keys, poses, places, wheels, run, options));
     if (way.sigma > options.told_sigma) ways.push_back(way);
   }
   return ways;

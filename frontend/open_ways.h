@@ -38,6 +38,9 @@ struct OpenWayOptions {
   /// it is reported. Ways that odometry alone knows better, and that are as
   /// long in the map to within this, are not looked into.
   double told_sigma = 0.2;
+  /// Shorter ways are not compared with odometry, m: over them it has another
+  /// length where it comes late.
+  double least_length = 4.0;
   int num_threads = 0;
 };
 

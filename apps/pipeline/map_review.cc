@@ -182,6 +182,12 @@ std::vector<OpenWay> MapReview::OpenWays() const {
   return FindOpenWays(scans_, keys_, poses_, options, stop_);
 }
 
+double MapReview::LargestOpenSigma() const {
+  double largest = 0.0;
+  for (const OpenWay& way : OpenWays()) largest = std::max(largest, way.sigma);
+  return largest;
+}
+
 void MapReview::Revise(const Graph& graph,
                        const std::vector<RefinedScan>& refined,
                        bool tell_open_ways,

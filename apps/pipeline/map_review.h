@@ -33,8 +33,9 @@ class MapReview {
 
   /// Whether what the robot saw contradicts itself (FindContradictions).
   bool HasContradictions() const;
-  /// Whether the length of a way hangs on odometry (FindOpenWays).
-  bool HasOpenWays() const { return !OpenWays().empty(); }
+  /// How uncertain the length of a way is that hangs on odometry (FindOpenWays;
+  /// standard deviation of the most uncertain one, m); 0 where none does.
+  double LargestOpenSigma() const;
   /// How odometry agrees with the map.
   OdometryAgreement Odometry() const {
     return CompareWithOdometry(scans_, trajectory_, OdometryCheckOptions());

@@ -105,7 +105,8 @@ void SecondMap::AdjustFrom(const std::vector<Pose2>& start,
 
 void SecondMap::TryFrom(const std::vector<Pose2>& start) {
   const bool has_contradictions = HasContradictions();
-  if (!has_contradictions && !HasOpenWays()) return;
+  const double open_sigma = has_contradictions ? 0.0 : LargestOpenSigma();
+  if (!has_contradictions && open_sigma == 0.0) return;
   const MapAgreement agreement = Review().Agreement();
   const double misfit = adjustment_->Misfit();
   const std::int64_t relations = adjustment_->num_relations();
@@ -115,12 +116,13 @@ void SecondMap::TryFrom(const std::vector<Pose2>& start) {
   std::vector<Pose2> trajectory = run_.result.trajectory;
   AdjustFrom(start, options_.adjustment);
   // Where scans agree everywhere, as in a round corridor, what was measured
-  // between them decides.
+  // between them decides, and how far odometry has the same.
   const MapAgreement now = Review().Agreement();
   const bool is_better =
       has_contradictions ? now.IsBetterThan(agreement)
                          : now.contradicting <= agreement.contradicting &&
-                               adjustment_->FitsBetterThan(misfit, relations);
+                               adjustment_->FitsBetterThan(misfit, relations) &&
+                               Review().LargestOpenSigma() <= open_sigma;
   if (run_.IsStopped() || is_better) return;
   const std::string bytes = kept.bytes();
   StateReader reader(bytes);
@@ -142,10 +144,11 @@ bool SecondMap::HasContradictions() const {
          Review().HasContradictions();
 }
 
-bool SecondMap::HasOpenWays() {
-  if (!options_.check_map || run_.IsStopped()) return false;
-  run_.may_have_open_ways = Review().HasOpenWays();
-  return run_.may_have_open_ways;
+double SecondMap::LargestOpenSigma() {
+  if (!options_.check_map || run_.IsStopped()) return 0.0;
+  const double sigma = Review().LargestOpenSigma();
+  run_.may_have_open_ways = sigma > 0.0;
+  return sigma;
 }
 
 void SecondMap::MakeWalls() {

@@ -89,7 +89,7 @@ class SecondMap {
   MapReview Review() const;
   // Not when the map is not to be checked.
   bool HasContradictions() const;
-  bool HasOpenWays();
+  double LargestOpenSigma();
 
   const Registry& registry_;
   const LogSolverOptions& options_;

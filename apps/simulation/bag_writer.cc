@@ -130,6 +130,14 @@ const Definition& DefinitionOf(const std::string& type) {
         "float32 angle_increment\nfloat32 time_increment\nfloat32 scan_time\n"
         "float32 range_min\nfloat32 range_max\nfloat32[] ranges\n"
         "float32[] intensities\n"}},
+      {"sensor_msgs/MultiEchoLaserScan",
+       {"6fefb0c6da89d7c8abe4b339f5c2f8fb",
+        "Header header\nfloat32 angle_min\nfloat32 angle_max\n"
+        "float32 angle_increment\nfloat32 time_increment\nfloat32 scan_time\n"
+        "float32 range_min\nfloat32 range_max\nLaserEcho[] ranges\n"
+        "LaserEcho[] intensities\n" +
+            std::string(kRule) +
+            "MSG: sensor_msgs/LaserEcho\nfloat32[] echoes\n"}},
       {"sensor_msgs/Imu",
        {"6a62c6daae103f4ff57a132d6f95cec2",
         "Header header\ngeometry_msgs/Quaternion orientation\n"
@@ -673,20 +681,45 @@ bool IsOurBag(const fs::path& folder, const std::string& database) {
           digests.count(Sha256OfFile((folder / database).string())) > 0);
 }
 
+// What LaserScan and MultiEchoLaserScan begin with.
+void EncodeScanUpToRanges(const LaserScanMessage& message, Encoder* encoder) {
+  encoder->Header(message.header);
+  for (const double value :
+       {message.angle_min, message.angle_max, message.angle_increment,
+        message.time_increment, message.scan_time, message.range_min,
+        message.range_max}) {
+    encoder->Float32(value);
+  }
+  encoder->Number(message.ranges.size(), 4);
+}
+
 }  // namespace
 
 std::string EncodeLaserScan(const LaserScanMessage& message,
                             MessageEncoding encoding, bool big_endian) {
   Encoder encoder(encoding, big_endian);
-  encoder.Header(message.header);
-  for (const double value :
-       {message.angle_min, message.angle_max, message.angle_increment,
-        message.time_increment, message.scan_time, message.range_min,
-        message.range_max}) {
-    encoder.Float32(value);
-  }
-  encoder.Number(message.ranges.size(), 4);
+  EncodeScanUpToRanges(message, &encoder);
   for (const float range : message.ranges) encoder.Float32(range);
+  encoder.Number(0, 4);
+  return encoder.Take();
+}
+
+std::string EncodeMultiEchoLaserScan(const LaserScanMessage& message,
+                                     MessageEncoding encoding,
+                                     bool big_endian) {
+  Encoder encoder(encoding, big_endian);
+  EncodeScanUpToRanges(message, &encoder);
+  for (std::size_t i = 0; i < message.ranges.size(); ++i) {
+    const float range = message.ranges[i];
+    if (!(range > 0.0f) || !std::isfinite(range)) {
+      encoder.Number(0, 4);
+      continue;
+    }
+    const bool is_double = i % 3 == 0;
+    encoder.Number(is_double ? 2 : 1, 4);
+    encoder.Float32(range);
+    if (is_double) encoder.Float32(range + 0.5f);
+  }
   encoder.Number(0, 4);
   return encoder.Take();
 }

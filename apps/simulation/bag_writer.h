@@ -25,6 +25,11 @@ struct BagRecord {
 /// comes in both orders. Covariances, twists and intensities are zero or empty.
 std::string EncodeLaserScan(const LaserScanMessage& message,
                             MessageEncoding encoding, bool big_endian = false);
+/// As a sensor_msgs/MultiEchoLaserScan: a beam with a return has that and,
+/// every third one, a second echo behind it; a beam without one has no echo.
+std::string EncodeMultiEchoLaserScan(const LaserScanMessage& message,
+                                     MessageEncoding encoding,
+                                     bool big_endian = false);
 std::string EncodeOdometry(const OdometryMessage& message,
                            MessageEncoding encoding, bool big_endian = false);
 std::string EncodeTransforms(const std::vector<TransformMessage>& messages,

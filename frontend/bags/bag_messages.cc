@@ -22,6 +22,11 @@ double RoundAngle(double angle) {
   return static_cast<float>(round) == static_cast<float>(angle) ? round : angle;
 }
 
+// Of a laser that tells several echoes of a beam apart.
+bool IsMultiEcho(const BagTopic& topic) {
+  return topic.type == "sensor_msgs/MultiEchoLaserScan";
+}
+
 // Takes in all messages, decoded.
 class Collector {
  public:
@@ -173,7 +178,10 @@ class Collector {
   bool TakeScan(const BagMessage& message, std::size_t topic,
                 MessageEncoding encoding, std::string* why) {
     LaserScanMessage scan;
-    if (!DecodeLaserScan(message.data, encoding, &scan, why)) return false;
+    const auto decode = IsMultiEcho(source_->topics()[topic])
+                            ? DecodeMultiEchoLaserScan
+                            : DecodeLaserScan;
+    if (!decode(message.data, encoding, &scan, why)) return false;
     if (!CheckAngles(&scan, why)) return false;
     CompareEnds(scan);
     if (messages_.scans.empty()) messages_.scan_topic = topic;
@@ -256,7 +264,9 @@ class Collector {
 }  // namespace
 
 BagTopicKind KindOf(const BagTopic& topic) {
-  if (topic.type == "sensor_msgs/LaserScan") return BagTopicKind::kScan;
+  if (topic.type == "sensor_msgs/LaserScan" || IsMultiEcho(topic)) {
+    return BagTopicKind::kScan;
+  }
   if (topic.type == "nav_msgs/Odometry") return BagTopicKind::kOdometry;
   if (topic.type == "sensor_msgs/Imu") return BagTopicKind::kImu;
   if (topic.type == "tf2_msgs/TFMessage" || topic.type == "tf/tfMessage") {

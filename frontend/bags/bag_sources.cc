@@ -126,14 +126,15 @@ class SourceChooser {
                     : "has messages of type " + named->type + " on " +
                           options_.scan_topic) +
                    "; it has " + messages_->Contents(),
-               candidates.empty() ? "a bag with sensor_msgs/LaserScan"
+               candidates.empty() ? "a bag with sensor_msgs/LaserScan or "
+                                    "MultiEchoLaserScan"
                                   : "--scan_topic with one of " + candidates);
       }
     }
     if (messages_->scans.empty()) {
       Refuse("has no laser scan that can be used; it has " +
                  messages_->Contents() + messages_->Losses(),
-             "messages of type sensor_msgs/LaserScan");
+             "messages of type sensor_msgs/LaserScan or MultiEchoLaserScan");
     }
     BagStream& stream = messages_->streams[messages_->scan_topic];
     stream.seen.use = "scans";

@@ -42,6 +42,27 @@ bool Done(const MessageDecoder& decoder, std::string* why) {
   return decoder.ok();
 }
 
+// What comes before the ranges, of which there is then the right number: a
+// float each, or a list of echoes, whose own number is as long.
+bool DecodeScanUpToRanges(MessageDecoder* decoder, LaserScanMessage* message,
+                          std::string* why) {
+  message->header = DecodeHeader(decoder);
+  message->angle_min = decoder->Float32();
+  message->angle_max = decoder->Float32();
+  message->angle_increment = decoder->Float32();
+  message->time_increment = decoder->Float32();
+  message->scan_time = decoder->Float32();
+  message->range_min = decoder->Float32();
+  message->range_max = decoder->Float32();
+  const std::size_t count = decoder->SequenceSize(sizeof(float));
+  if (count > kMostReadings) {
+    *why = "has more than a million readings";
+    return false;
+  }
+  message->ranges.resize(count);
+  return true;
+}
+
 }  // namespace
 
 MessageDecoder::MessageDecoder(std::string_view bytes, MessageEncoding encoding)
@@ -142,21 +163,21 @@ void MessageDecoder::SkipFloat64(std::size_t count) {
 bool DecodeLaserScan(std::string_view bytes, MessageEncoding encoding,
                      LaserScanMessage* message, std::string* why) {
   MessageDecoder decoder(bytes, encoding);
-  message->header = DecodeHeader(&decoder);
-  message->angle_min = decoder.Float32();
-  message->angle_max = decoder.Float32();
-  message->angle_increment = decoder.Float32();
-  message->time_increment = decoder.Float32();
-  message->scan_time = decoder.Float32();
-  message->range_min = decoder.Float32();
-  message->range_max = decoder.Float32();
-  const std::size_t count = decoder.SequenceSize(sizeof(float));
-  if (count > kMostReadings) {
-    *why = "has more than a million readings";
-    return false;
-  }
-  message->ranges.resize(count);
+  if (!DecodeScanUpToRanges(&decoder, message, why)) return false;
   for (float& range : message->ranges) range = decoder.Float32();
+  return Done(decoder, why);
+}
+
+bool DecodeMultiEchoLaserScan(std::string_view bytes, MessageEncoding encoding,
+                              LaserScanMessage* message, std::string* why) {
+  MessageDecoder decoder(bytes, encoding);
+  if (!DecodeScanUpToRanges(&decoder, message, why)) return false;
+  for (float& range : message->ranges) {
+    const std::size_t echoes = decoder.SequenceSize(sizeof(float));
+    if (!decoder.ok()) break;
+    range = echoes > 0 ? decoder.Float32() : 0.0f;
+    for (std::size_t i = 1; i < echoes; ++i) decoder.Float32();
+  }
   return Done(decoder, why);
 }
 

@@ -73,7 +73,9 @@ struct MessageHeader {
   std::string frame;
 };
 
-/// sensor_msgs/LaserScan: rad, s, m, as the message has them.
+/// sensor_msgs/LaserScan: rad, s, m, as the message has them. Of a
+/// sensor_msgs/MultiEchoLaserScan the first echo of each beam; 0, which is no
+/// return, where there was none.
 struct LaserScanMessage {
   MessageHeader header;
   double angle_min = 0.0;
@@ -123,6 +125,8 @@ struct ImuMessage {
 /// the bytes and returns false.
 bool DecodeLaserScan(std::string_view bytes, MessageEncoding encoding,
                      LaserScanMessage* message, std::string* why);
+bool DecodeMultiEchoLaserScan(std::string_view bytes, MessageEncoding encoding,
+                              LaserScanMessage* message, std::string* why);
 bool DecodeOdometry(std::string_view bytes, MessageEncoding encoding,
                     OdometryMessage* message, std::string* why);
 bool DecodePoseStamped(std::string_view bytes, MessageEncoding encoding,

@@ -333,6 +333,8 @@ class Rosbag1 : public ChunkedBag {
     static const auto* const definitions =
         new std::map<std::string, std::string>{
             {"sensor_msgs/LaserScan", "90c7ef2dc6895d81024acba2ac42f369"},
+            {"sensor_msgs/MultiEchoLaserScan",
+             "6fefb0c6da89d7c8abe4b339f5c2f8fb"},
             {"nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"},
             {"sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"},
             {"tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec"},

@@ -142,6 +142,19 @@ TEST_F(FormatsTest, Ros2Folder) {
   EXPECT_EQ(log.scans.size(), carmen_.scans.size());
 }
 
+// Of several echoes the first is meant, and a beam without any is no return.
+TEST_F(FormatsTest, MultiEcho) {
+  for (const MessageEncoding encoding : {kRos1, kCdr}) {
+    std::vector<BagRecord> messages =
+        SimulatedMessages(Drive(), Laser(), encoding);
+    for (BagRecord& message : messages) {
+      if (message.topic == "/scan") AsMultiEcho(encoding, &message);
+    }
+    ExpectSame(ReadBytes(encoding == kRos1 ? MakeRosbag1(messages)
+                                           : MakeMcap(messages)));
+  }
+}
+
 TEST_F(FormatsTest, Csv) {
   std::ostringstream text;
   WriteCsvLog(Drive(), Laser(), {"a drive"}, text);
@@ -446,11 +459,66 @@ TEST(BagLogTest, FramesWithSlashesAndWaysOfSeveralFrames) {
   EXPECT_THAT(log.skipped, IsEmpty());
 }
 
-TEST(BagLogTest, MultiEchoScansAreRefusedByType) {
-  EXPECT_THAT(WhatOf(MakeRosbag1({{"/echoes", "sensor_msgs/MultiEchoLaserScan",
-                                   kBagStart, "bytes"}})),
-              AllOf(HasSubstr("/echoes (sensor_msgs/MultiEchoLaserScan, 1)"),
-                    HasSubstr("expected"), HasSubstr("sensor_msgs/LaserScan")));
+TEST(BagLogTest, OtherScansAreRefusedByType) {
+  EXPECT_THAT(WhatOf(MakeRosbag1(
+                  {{"/sonar", "sensor_msgs/Range", kBagStart, "bytes"}})),
+              AllOf(HasSubstr("/sonar (sensor_msgs/Range, 1)"),
+                    HasSubstr("expected"), HasSubstr("sensor_msgs/LaserScan"),
+                    HasSubstr("MultiEchoLaserScan")));
+}
+
+TEST(BagLogTest, ReadsMultiEchoMessagesOfEitherByteOrder) {
+  LaserScanMessage scan = PlainScan(kBagStart);
+  scan.ranges[1] = 0.0f;
+  scan.ranges[2] = std::numeric_limits<float>::infinity();
+  for (const bool big_endian : {false, true}) {
+    const Log log = ReadBytes(
+        MakeMcap({{"/echoes", "sensor_msgs/MultiEchoLaserScan", kBagStart,
+                   EncodeMultiEchoLaserScan(scan, kCdr, big_endian)}}));
+    ASSERT_EQ(log.scans.size(), 1u);
+    EXPECT_EQ(log.scans[0].ranges,
+              (std::vector<float>{1.0f, 0.0f, 0.0f, 4.0f, 5.0f}));
+    EXPECT_EQ(log.scan_message, "/echoes");
+    EXPECT_THAT(log.skipped, IsEmpty());
+  }
+}
+
+// A message breaks off where its last readings are, and after it no bytes of
+// the next one are taken for echoes.
+TEST(BagLogTest, MultiEchoMessagesThatBreakOffOrLieAreCounted) {
+  const std::string whole =
+      EncodeMultiEchoLaserScan(PlainScan(kBagStart), kRos1);
+  std::string bare = whole;
+  bare.resize(whole.size() - 4);
+  const auto record = [](std::int64_t time, std::string data) {
+    return BagRecord{"/echoes", "sensor_msgs/MultiEchoLaserScan", time,
+                     std::move(data)};
+  };
+  // Ranges of PlainScan, without intensities, as all that can be missing.
+  const std::size_t ranges = bare.size() - 5 * 4 - 7 * 4;
+  for (std::size_t cut = 0; cut < bare.size(); ++cut) {
+    const Log log = ReadBytes(
+        MakeRosbag1({record(kBagStart, whole),
+                     record(kBagStart + kSecond, bare.substr(0, cut))}));
+    EXPECT_EQ(log.scans.size(), 1u) << cut;
+    EXPECT_EQ(SkippedInBag(log, "/echoes that"), 1) << cut;
+  }
+  for (const std::uint32_t lie : {3u, 1000u, 0x40000000u, 0xffffffffu}) {
+    // Of the number of echoes of the first beam, and of that of beams.
+    for (const std::size_t place : {ranges, ranges - 4}) {
+      std::string data = bare;
+      std::memcpy(&data[place], &lie, 4);
+      const Log log = ReadBytes(MakeRosbag1(
+          {record(kBagStart, whole), record(kBagStart + kSecond, data)}));
+      // Three beams in place of five are a scan of another shape.
+      EXPECT_EQ(log.scans.size(), lie == 3 && place != ranges ? 2u : 1u);
+      EXPECT_EQ(SkippedInBag(log, "/echoes that"),
+                lie == 3 && place != ranges ? 0 : 1)
+          << lie;
+    }
+  }
+  EXPECT_THAT(WhatOf(MakeRosbag1({record(kBagStart, "bytes")})),
+              HasSubstr("breaks off"));
 }
 
 TEST(BagLogTest, TfThatLacksTheLaserIsSaid) {

@@ -10,6 +10,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -99,6 +100,15 @@ inline BagRecord Record(const LaserScanMessage& scan, MessageEncoding encoding,
                         const std::string& topic = "/scan") {
   return {topic, "sensor_msgs/LaserScan", scan.header.stamp,
           EncodeLaserScan(scan, encoding)};
+}
+
+// Makes one of a record of a LaserScan.
+inline void AsMultiEcho(MessageEncoding encoding, BagRecord* record) {
+  LaserScanMessage scan;
+  std::string why;
+  if (!DecodeLaserScan(record->data, encoding, &scan, &why)) std::abort();
+  record->type = "sensor_msgs/MultiEchoLaserScan";
+  record->data = EncodeMultiEchoLaserScan(scan, encoding);
 }
 
 inline BagRecord OdometryRecord(std::int64_t stamp, const Pose2& pose,

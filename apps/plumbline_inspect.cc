@@ -18,7 +18,8 @@
 
 DEFINE_bool(json, false, "Write JSON in place of text.");
 DEFINE_string(scan_topic, "",
-              "Topic of a bag's laser scans; empty: the only one there is.");
+              "Topic of a bag's laser scans; empty: the only one that may be "
+              "meant.");
 DEFINE_string(odometry_topic, "",
               "Topic of a bag's odometry, tf or none; empty: as "
               "plumbline_solve chooses.");

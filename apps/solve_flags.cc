@@ -225,11 +225,13 @@ DEFINE_double(usable_range, 50.0, "Returns farther away are left out, m");
 PLUMBLINE_FLAG_RANGE(usable_range, 0.5, 10000.0);
 
 DEFINE_string(scan_topic, "",
-              "Topic of a bag's laser scans; empty: the only one there is");
-DEFINE_string(odometry_topic, "",
-              "Topic of a bag's odometry, tf (the transform of odom to the "
-              "robot) or none; empty: the only topic there is, else tf, else "
-              "none");
+              "Topic of a bag's laser scans; empty: the only one that may be "
+              "meant");
+DEFINE_string(
+    odometry_topic, "",
+    "Topic of a bag's odometry, tf (the transform of odom to the "
+    "robot) or none; empty: the only topic that may be meant, else tf, else "
+    "none");
 
 DEFINE_string(laser_start_angle, "",
               "Direction of the first beam, degrees; empty: as the log says or "

@@ -38,8 +38,8 @@ class ScanPlacer {
         sources_(std::move(sources)),
         messages_(messages),
         tree_(messages->tree),
-        frames_(messages->frames),
-        scans_(messages->scans),
+        frames_(messages->scans.frames),
+        scans_(messages->scans.list),
         log_(log) {}
 
   void Place() {
@@ -357,18 +357,6 @@ void AppendReports(const std::vector<SkipReport>& reports, Log* log) {
   log->skipped.insert(log->skipped.end(), reports.begin(), reports.end());
 }
 
-void NoteEnds(const BagMessages& messages, Log* log) {
-  if (messages.other_ends == 0) return;
-  char text[200];
-  std::snprintf(text, sizeof text,
-                "%lld scans end at another angle than they say, the first at "
-                "%.2f degrees by angle_increment and at %.2f by angle_max: "
-                "angle_increment is believed (--laser_step says another)",
-                static_cast<long long>(messages.other_ends),
-                RadToDeg(messages.end_by_step), RadToDeg(messages.stated_end));
-  log->notes.push_back(text);
-}
-
 void TellTopics(const BagMessages& messages, const LaserOptions& options,
                 Log* log) {
   for (const BagStream& stream : messages.streams) {
@@ -390,7 +378,6 @@ Log ReadBag(BagSource* source, const std::string& name,
   AppendReports(messages.skipped_by_source, &log);
   AppendReports(messages.skipped, &log);
   log.notes = source->notes();
-  NoteEnds(messages, &log);
   try {
     ScanPlacer placer(options, ChooseBagSources(name, options, &messages, &log),
                       &messages, &log);

@@ -58,8 +58,8 @@ class Collector {
       case BagTopicKind::kOther:
         return false;
       case BagTopicKind::kScan:
-        return !messages_.is_ambiguous && (options_.scan_topic.empty() ||
-                                           IsNamed(topic, options_.scan_topic));
+        return options_.scan_topic.empty() ||
+               IsNamed(topic, options_.scan_topic);
       case BagTopicKind::kOdometry:
         return options_.odometry_topic.empty() ||
                IsNamed(topic, options_.odometry_topic);
@@ -121,7 +121,7 @@ class Collector {
     const MessageEncoding encoding = source_->topics()[topic].encoding;
     switch (stream->kind) {
       case BagTopicKind::kScan:
-        return TakeScan(message, topic, encoding, why);
+        return TakeScan(message, topic, encoding, &stream->scans, why);
       case BagTopicKind::kOdometry: {
         OdometryMessage odometry;
         if (!DecodeOdometry(message.data, encoding, &odometry, why)) {
@@ -176,45 +176,37 @@ class Collector {
   }
 
   bool TakeScan(const BagMessage& message, std::size_t topic,
-                MessageEncoding encoding, std::string* why) {
+                MessageEncoding encoding, BagScanSet* set, std::string* why) {
     LaserScanMessage scan;
     const auto decode = IsMultiEcho(source_->topics()[topic])
                             ? DecodeMultiEchoLaserScan
                             : DecodeLaserScan;
     if (!decode(message.data, encoding, &scan, why)) return false;
     if (!CheckAngles(&scan, why)) return false;
-    CompareEnds(scan);
-    if (messages_.scans.empty()) messages_.scan_topic = topic;
-    if (messages_.scan_topic != topic) {
-      // Two topics could be meant: nothing is to be kept but the counts.
-      messages_.is_ambiguous = true;
-      messages_.scans = {};
-      return true;
-    }
+    CompareEnds(scan, set);
     const std::string frame = PlainFrameName(scan.header.frame);
-    const auto known =
-        std::find(messages_.frames.begin(), messages_.frames.end(), frame);
+    const auto known = std::find(set->frames.begin(), set->frames.end(), frame);
     BagScan raw;
     raw.stamp = scan.header.stamp;
     raw.received = message.time;
     raw.position = position_;
-    raw.frame = static_cast<std::size_t>(known - messages_.frames.begin());
-    if (known == messages_.frames.end()) {
-      if (messages_.frames.size() >= kMostFrames) {
+    raw.frame = static_cast<std::size_t>(known - set->frames.begin());
+    if (known == set->frames.end()) {
+      if (set->frames.size() >= kMostFrames) {
         *why = "has one frame too many";
         return false;
       }
-      messages_.frames.push_back(frame);
+      set->frames.push_back(frame);
     }
     scan.header.frame.clear();
     raw.message = std::move(scan);
-    messages_.scans.push_back(std::move(raw));
+    set->list.push_back(std::move(raw));
     return true;
   }
 
   // Steps that are rounded, or of another laser, bend a scan into a spiral.
   // Many drivers count a beam too many or too few: that is no matter.
-  void CompareEnds(const LaserScanMessage& scan) {
+  void CompareEnds(const LaserScanMessage& scan, BagScanSet* set) {
     if (options_.laser_start_angle || options_.laser_step) return;
     const double end =
         scan.angle_min +
@@ -223,9 +215,9 @@ class Collector {
           kOtherEnd * std::abs(scan.angle_increment))) {
       return;
     }
-    if (messages_.other_ends++ > 0) return;
-    messages_.end_by_step = end;
-    messages_.stated_end = scan.angle_max;
+    if (set->other_ends++ > 0) return;
+    set->end_by_step = end;
+    set->stated_end = scan.angle_max;
   }
 
   bool CheckAngles(LaserScanMessage* scan, std::string* why) const {

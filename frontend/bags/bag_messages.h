@@ -68,7 +68,20 @@ struct BagTurnRate {
   double rate = 0.0;
 };
 
-/// A topic of a bag with the content of its messages, except scans.
+/// The scans of a topic.
+struct BagScanSet {
+  /// In the order of the bag.
+  std::vector<BagScan> list;
+  /// Names of their frames.
+  std::vector<std::string> frames;
+  /// Scans whose last direction is not that of their angle_max, and the first
+  /// one's two, rad: by angle_increment, which is believed, and by angle_max.
+  std::int64_t other_ends = 0;
+  double end_by_step = 0.0;
+  double stated_end = 0.0;
+};
+
+/// A topic of a bag with the content of its messages.
 struct BagStream {
   /// kOther as well for a topic whose messages cannot be read.
   BagTopicKind kind = BagTopicKind::kOther;
@@ -83,6 +96,8 @@ struct BagStream {
   std::vector<BagPose> poses;
   /// Messages of an IMU's topic.
   std::vector<BagTurnRate> rates;
+  /// Messages of a laser's topic, until one is chosen.
+  BagScanSet scans;
 };
 
 /// The content of all messages of a bag that a log can be made of.
@@ -90,19 +105,8 @@ struct BagMessages {
   /// By topic.
   std::vector<BagTopic> topics;
   std::vector<BagStream> streams;
-  /// The scans, in the order of the bag.
-  std::vector<BagScan> scans;
-  /// Names of the frames of the scans.
-  std::vector<std::string> frames;
-  /// Index of the topic of the scans.
-  std::size_t scan_topic = 0;
-  /// Scans whose last direction is not that of their angle_max, and the first
-  /// one's two, rad: by angle_increment, which is believed, and by angle_max.
-  std::int64_t other_ends = 0;
-  double end_by_step = 0.0;
-  double stated_end = 0.0;
-  /// Several topics have scans and no option chooses one: `scans` is empty.
-  bool is_ambiguous = false;
+  /// Those of the topic that was chosen (bag_sources.h); empty before.
+  BagScanSet scans;
   /// Transforms between frames, in the order of time.
   TransformTree tree;
   /// What the source passed over, and messages that could not be used.

@@ -1,6 +1,7 @@
 #include <plumbline/core/error.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/bags/bag_sources.h>
+#include <plumbline/frontend/bags/topic_choice.h>
 
 #include <algorithm>
 #include <cctype>
@@ -106,15 +107,6 @@ class SourceChooser {
 
   void ChooseScans() {
     const std::string candidates = messages_->ListOf(BagTopicKind::kScan);
-    if (messages_->is_ambiguous) {
-      for (BagStream& stream : messages_->streams) {
-        if (stream.kind == BagTopicKind::kScan) {
-          stream.seen.why_not = "several topics have scans";
-        }
-      }
-      Refuse("has laser scans on several topics: " + candidates,
-             "--scan_topic with one of them");
-    }
     if (!options_.scan_topic.empty()) {
       const auto named = std::find_if(
           messages_->topics.begin(), messages_->topics.end(),
@@ -131,20 +123,49 @@ class SourceChooser {
                                   : "--scan_topic with one of " + candidates);
       }
     }
-    if (messages_->scans.empty()) {
+    const std::vector<std::size_t> topics = ScanTopicsThatMayBeMeant(messages_);
+    if (topics.empty()) {
       Refuse("has no laser scan that can be used; it has " +
                  messages_->Contents() + messages_->Losses(),
              "messages of type sensor_msgs/LaserScan or MultiEchoLaserScan");
     }
-    BagStream& stream = messages_->streams[messages_->scan_topic];
+    if (topics.size() > 1) {
+      for (const std::size_t topic : topics) {
+        messages_->streams[topic].seen.why_not = "several topics have scans";
+      }
+      Refuse("has laser scans on several topics: " + candidates,
+             "--scan_topic with one of them");
+    }
+    BagStream& stream = messages_->streams[topics[0]];
     stream.seen.use = "scans";
     log_->scan_message = stream.seen.name;
+    messages_->scans = std::move(stream.scans);
     for (BagStream& other : messages_->streams) {
-      if (other.kind == BagTopicKind::kScan && &other != &stream &&
-          other.seen.messages > 0) {
+      other.scans = {};
+      if (other.kind != BagTopicKind::kScan || &other == &stream ||
+          other.seen.messages == 0) {
+        continue;
+      }
+      if (other.seen.why_not.empty()) {
         other.seen.why_not = "another topic was chosen";
+      } else {
+        log_->notes.push_back("scans of " + other.seen.name +
+                              " are not used: " + other.seen.why_not);
       }
     }
+    NoteEnds(messages_->scans);
+  }
+
+  void NoteEnds(const BagScanSet& scans) {
+    if (scans.other_ends == 0) return;
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "%lld scans end at another angle than they say, the first at "
+                  "%.2f degrees by angle_increment and at %.2f by angle_max: "
+                  "angle_increment is believed (--laser_step says another)",
+                  static_cast<long long>(scans.other_ends),
+                  RadToDeg(scans.end_by_step), RadToDeg(scans.stated_end));
+    log_->notes.push_back(text);
   }
 
   void ChooseOdometry() {
@@ -183,6 +204,19 @@ class SourceChooser {
                                  : "one of " + list + ", tf or none"));
       }
     }
+    FindTransform();
+    if (wanted.empty()) {
+      const std::vector<std::size_t> all = candidates;
+      candidates = OdometryTopicsThatMayBeMeant(all, transforms_, messages_);
+      if (candidates.size() < 2) {
+        for (const std::size_t i : all) {
+          const LogTopic& seen = messages_->streams[i].seen;
+          if (seen.why_not.empty()) continue;
+          log_->notes.push_back("odometry of " + seen.name +
+                                " is not used: " + seen.why_not);
+        }
+      }
+    }
     if (wanted != "tf" && candidates.size() > 1) {
       for (const std::size_t i : candidates) {
         messages_->streams[i].seen.why_not = "several topics have odometry";
@@ -191,6 +225,7 @@ class SourceChooser {
              "--odometry_topic with one of them, tf or none");
     }
     if (wanted != "tf" && candidates.size() == 1) {
+      transforms_.clear();
       odometry_ = &messages_->streams[candidates[0]];
       odometry_->seen.use = "odometry";
       log_->odometry_source = odometry_->seen.name;
@@ -203,9 +238,9 @@ class SourceChooser {
 
   // The frames from the laser to the root, odom -> base -> ... -> laser, and
   // where odometry ties in.
-  void ChooseTransform() {
+  void FindTransform() {
     const std::vector<std::string> chain =
-        messages_->tree.ChainOf(messages_->frames[0]);
+        messages_->tree.ChainOf(messages_->scans.frames[0]);
     for (std::size_t i = 1; i < chain.size(); ++i) {
       std::string low = chain[i];
       std::transform(low.begin(), low.end(), low.begin(),
@@ -214,13 +249,22 @@ class SourceChooser {
           !messages_->tree.IsMoving(chain[i - 1])) {
         continue;
       }
-      sources_.base = chain[i - 1];
+      transform_frame_ = chain[i];
+      transform_base_ = chain[i - 1];
       for (const TransformTree::Sample& sample :
            *messages_->tree.SamplesOf(chain[i - 1])) {
         transforms_.push_back(
             {sample.time, sample.received, PoseInPlane(sample.pose)});
       }
-      log_->odometry_source = "tf " + chain[i] + " -> " + chain[i - 1];
+      return;
+    }
+  }
+
+  void ChooseTransform() {
+    if (!transforms_.empty()) {
+      sources_.base = transform_base_;
+      log_->odometry_source =
+          "tf " + transform_frame_ + " -> " + transform_base_;
       messages_->NoteTransformsUsed("odometry");
       return;
     }
@@ -228,7 +272,7 @@ class SourceChooser {
       Refuse(
           "has no transform of a moving robot in a frame called odom above "
           "the laser's frame '" +
-              messages_->frames[0] + "'; tf has " +
+              messages_->scans.frames[0] + "'; tf has " +
               (messages_->tree.empty() ? "nothing"
                                        : messages_->tree.Describe()),
           "such a transform, or --odometry_topic=none");
@@ -238,12 +282,12 @@ class SourceChooser {
   // Which times count, and by how much the other sources' may differ.
   void UseClock() {
     std::int64_t delay = 0;
-    const bool is_stamped = DelayOf(messages_->scans, &delay);
+    const bool is_stamped = DelayOf(messages_->scans.list, &delay);
     if (!is_stamped) {
       log_->notes.push_back(
           "scans have no time stamps of their own: the times "
           "at which they were recorded are used");
-      for (BagScan& scan : messages_->scans) scan.stamp = scan.received;
+      for (BagScan& scan : messages_->scans.list) scan.stamp = scan.received;
     }
     const auto align = [&](const std::string& topic, auto* messages) {
       std::int64_t own = 0;
@@ -283,9 +327,9 @@ class SourceChooser {
   // The median, ns; 0 where there is none.
   std::int64_t TimeBetweenScans() const {
     std::vector<std::int64_t> steps;
-    for (std::size_t i = 1; i < messages_->scans.size(); ++i) {
-      steps.push_back(messages_->scans[i].stamp -
-                      messages_->scans[i - 1].stamp);
+    for (std::size_t i = 1; i < messages_->scans.list.size(); ++i) {
+      steps.push_back(messages_->scans.list[i].stamp -
+                      messages_->scans.list[i - 1].stamp);
     }
     return steps.empty() ? 0 : MedianOf(std::move(steps));
   }
@@ -293,7 +337,7 @@ class SourceChooser {
   // One clock stamps scans and odometry and was set back: a time that came
   // twice is another one for both.
   void LetTimesGoOnWhereBothWereSetBack() {
-    std::vector<BagScan>& scans = messages_->scans;
+    std::vector<BagScan>& scans = messages_->scans.list;
     std::vector<BagPose>& poses = odometry_->poses;
     const std::vector<SetBack> of_scans = SetBacksOf(scans);
     const std::vector<SetBack> of_poses = SetBacksOf(poses);
@@ -366,6 +410,9 @@ class SourceChooser {
   BagStream* odometry_ = nullptr;
   // Odometry that comes as a transform.
   std::vector<BagPose> transforms_;
+  // Its frame and the robot's.
+  std::string transform_frame_;
+  std::string transform_base_;
   // The robot's frame by odometry that never changes.
   std::string standing_base_;
   BagSources sources_;

@@ -17,6 +17,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -563,6 +564,143 @@ TEST(BagLogTest, SeveralTopicsNeedAChoice) {
   options.odometry_topic = "tf";
   EXPECT_THAT(WhatOf(MakeRosbag1(records), options),
               HasSubstr("frame called odom"));
+}
+
+// A second laser in SmallDrive that nods, or stands on its side.
+std::vector<BagRecord> DriveWithTiltedLaser(bool nods) {
+  std::vector<BagRecord> records = SmallDrive(kRos1);
+  for (int i = 0; i < 12; ++i) {
+    const std::int64_t time = kBagStart + i * kSecond / 10;
+    TransformMessage tilt =
+        Transform(time, "base_link", "tilt", Pose2(0.0, 0.0, 0.0));
+    const double angle = nods ? 0.1 * i : 0.5 * kPi;
+    tilt.transform.qy = std::sin(0.5 * angle);
+    tilt.transform.qw = std::cos(0.5 * angle);
+    records.push_back(TfRecord(tilt, kRos1));
+    LaserScanMessage scan = PlainScan(time);
+    scan.header.frame = "tilt";
+    // It comes first in the bag.
+    records.insert(records.begin(), Record(scan, kRos1, "/tilt_scan"));
+  }
+  return records;
+}
+
+TEST(BagLogTest, LasersThatDoNotLookLevelAreNotMeant) {
+  for (const bool nods : {true, false}) {
+    const std::string bag = MakeRosbag1(DriveWithTiltedLaser(nods));
+    const Log log = ReadBytes(bag);
+    EXPECT_EQ(log.scan_message, "/scan");
+    EXPECT_EQ(log.scans.size(), 10u);
+    EXPECT_EQ(log.scans[0].laser_offset, Pose2(0.2, 0.0, 0.1));
+    EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("/tilt_scan are not used"),
+                                          HasSubstr("20 degrees"))));
+    LaserOptions options;
+    options.scan_topic = "/tilt_scan";
+    EXPECT_EQ(ReadBytes(bag, options).scans.size(), 12u);
+  }
+}
+
+// Without tf its name tells which laser of a backpack stands on its side.
+TEST(BagLogTest, LasersThatAreCalledVerticalAreNotMeant) {
+  const auto backpack = [](const char* other) {
+    std::vector<BagRecord> records;
+    for (int i = 0; i < 5; ++i) {
+      LaserScanMessage scan = PlainScan(kBagStart + i * kSecond / 10);
+      scan.header.frame = std::string(other) + "_laser_link";
+      records.push_back(Record(scan, kRos1, std::string(other) + "_laser_2d"));
+      scan.header.frame = "horizontal_laser_link";
+      records.push_back(Record(scan, kRos1, "horizontal_laser_2d"));
+    }
+    return MakeRosbag1(records);
+  };
+  const Log log = ReadBytes(backpack("vertical"));
+  EXPECT_EQ(log.scan_message, "horizontal_laser_2d");
+  EXPECT_THAT(log.notes, Contains(HasSubstr("called vertical")));
+  EXPECT_THAT(WhatOf(backpack("rear")),
+              AllOf(HasSubstr("several topics"), HasSubstr("rear_laser_2d (5)"),
+                    HasSubstr("horizontal_laser_2d (5)")));
+}
+
+// A filter takes away returns, or sends every fifth scan on.
+TEST(BagLogTest, ScansThatWereFilteredAreThoseOfOneLaser) {
+  for (const int every : {1, 5}) {
+    std::vector<BagRecord> records;
+    for (int i = 0; i < 20; ++i) {
+      LaserScanMessage scan = PlainScan(kBagStart + i * kSecond / 10);
+      const BagRecord raw = Record(scan, kRos1);
+      scan.ranges[1] = every == 1 ? std::nanf("") : 2.5f;
+      if (i % every == 0) {
+        records.push_back(Record(scan, kRos1, "/scan_filtered"));
+      }
+      records.push_back(raw);
+    }
+    const Log log = ReadBytes(MakeRosbag1(records));
+    EXPECT_EQ(log.scan_message, "/scan");
+    EXPECT_EQ(log.scans.size(), 20u);
+    EXPECT_THAT(log.notes, Contains(HasSubstr("it has the scans of /scan")));
+  }
+  // Stamps that nobody sets are all the same, and say nothing.
+  std::vector<BagRecord> records;
+  for (int i = 0; i < 5; ++i) {
+    for (const char* topic : {"/front", "/rear"}) {
+      BagRecord record = Record(PlainScan(0), kRos1, topic);
+      record.time = kBagStart + i * kSecond / 10;
+      records.push_back(record);
+    }
+  }
+  EXPECT_THAT(WhatOf(MakeRosbag1(records)), HasSubstr("/front (5), /rear (5)"));
+}
+
+// Poses of a localization jump; what tf has is what the robot goes by.
+TEST(BagLogTest, OdometryThatTheRobotGoesByIsMeant) {
+  std::vector<BagRecord> records = SmallDrive(kRos1, 30);
+  const auto add = [&](const char* topic, const char* frame, double scale) {
+    for (int i = 0; i <= 30; ++i) {
+      BagRecord record =
+          OdometryRecord(kBagStart + i * kSecond / 10,
+                         Pose2(0.1 * scale * i, 0.0, 0.0), kRos1, topic);
+      OdometryMessage odometry;
+      std::string why;
+      ASSERT_TRUE(DecodeOdometry(record.data, kRos1, &odometry, &why));
+      odometry.header.frame = frame;
+      record.data = EncodeOdometry(odometry, kRos1);
+      records.push_back(record);
+    }
+  };
+  add("/slam", "map", 3.0);
+  Log log = ReadBytes(MakeRosbag1(records));
+  EXPECT_EQ(log.odometry_source, "/odom");
+  EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("/slam is not used"),
+                                        HasSubstr("frame 'map'"))));
+
+  add("/filtered", "odom", 2.0);
+  EXPECT_THAT(WhatOf(MakeRosbag1(records)),
+              HasSubstr("has odometry on several topics"));
+  for (int i = 0; i <= 30; ++i) {
+    records.push_back(TfRecord(Transform(kBagStart + i * kSecond / 10, "odom",
+                                         "base_link", Pose2(0.2 * i, 0.0, 0.0)),
+                               kRos1));
+  }
+  log = ReadBytes(MakeRosbag1(records));
+  EXPECT_EQ(log.odometry_source, "/filtered");
+  EXPECT_NEAR(log.scans[10].odometry[0], 2.0, 1e-6);
+  EXPECT_THAT(log.notes, Contains(HasSubstr("tf has the poses of /filtered")));
+
+  // tf alone rather than a localization; that rather than nothing.
+  records = SmallDrive(kRos1, 30);
+  records.erase(
+      std::remove_if(records.begin(), records.end(),
+                     [](const BagRecord& r) { return r.topic == "/odom"; }),
+      records.end());
+  add("/slam", "map", 3.0);
+  EXPECT_EQ(ReadBytes(MakeRosbag1(records)).odometry_source, "/slam");
+  for (int i = 0; i <= 30; ++i) {
+    records.push_back(TfRecord(Transform(kBagStart + i * kSecond / 10, "odom",
+                                         "base_link", Pose2(0.1 * i, 0.0, 0.0)),
+                               kRos1));
+  }
+  EXPECT_EQ(ReadBytes(MakeRosbag1(records)).odometry_source,
+            "tf odom -> base_link");
 }
 
 TEST(BagLogTest, ListsWhatIsThereWhenThereIsNoScan) {

@@ -280,6 +280,7 @@ class ScanPlacer {
           "by what is nearest");
     }
     impossible_sweeps_ = maker.impossible_sweeps();
+    hasty_sweeps_ = maker.hasty_sweeps();
     undone_ = maker.undone();
   }
 
@@ -332,6 +333,13 @@ class ScanPlacer {
           " scans says that a sweep takes longer than from one scan to the "
           "next: it is not believed");
     }
+    if (hasty_sweeps_ > 0) {
+      log_->notes.push_back(
+          "time_increment of " + std::to_string(hasty_sweeps_) + " of " +
+          std::to_string(log_->scans.size()) +
+          " scans says that a whole turn takes less than a tenth of the time "
+          "to the next: it is not believed");
+    }
     if (undone_ > 0) {
       log_->notes.push_back("motion during the scan was undone in " +
                             std::to_string(undone_) + " of " +
@@ -349,6 +357,7 @@ class ScanPlacer {
   SkipCounter skips_;
   std::int64_t undone_ = 0;
   std::int64_t impossible_sweeps_ = 0;
+  std::int64_t hasty_sweeps_ = 0;
   // By frame.
   std::vector<LaserPlacement> mounts_;
 };

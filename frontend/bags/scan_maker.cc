@@ -23,6 +23,10 @@ constexpr std::size_t kMostBeamsUsed = 10000;
 // for what clocks differ by.
 constexpr double kLongestScan = 1.0;
 constexpr double kLongestSweep = 1.2;
+// A laser that sees so much, rad, turns all the time: unless most of its scans
+// are missing, a sweep takes no less than this share of the time between two.
+const double kWholeTurn = DegToRad(350.0);
+constexpr double kShortestSweep = 0.1;
 // Poses that a turn of the laser is sampled with.
 constexpr int kSweepSamples = 16;
 
@@ -128,6 +132,11 @@ void ScanMaker::UndoMotion(const BagScan& raw, const LaserPlacement& mount,
   if (!(std::abs(duration) <= kLongestScan) ||
       (period_ > 0.0 && std::abs(duration) > kLongestSweep * period_)) {
     ++impossible_sweeps_;
+    return;
+  }
+  if (std::abs(scan->angle_step) * static_cast<double>(n) >= kWholeTurn &&
+      std::abs(duration) < kShortestSweep * period_) {
+    ++hasty_sweeps_;
     return;
   }
   // Of the laser, seen from where it was at first, evenly in time.

@@ -37,8 +37,10 @@ class ScanMaker {
   Scan Make(const BagScan& raw, const LaserPlacement& mount,
             SkipCounter* skips);
 
-  /// Scans whose time_increment cannot be.
+  /// Scans whose time_increment cannot be: a sweep would take longer than from
+  /// one scan to the next, or a whole turn hardly any of that time.
   std::int64_t impossible_sweeps() const { return impossible_sweeps_; }
+  std::int64_t hasty_sweeps() const { return hasty_sweeps_; }
   /// Scans in which motion was undone.
   std::int64_t undone() const { return undone_; }
 
@@ -51,6 +53,7 @@ class ScanMaker {
   // Median time between scans, s; 0 where nothing is known.
   double period_ = 0.0;
   std::int64_t impossible_sweeps_ = 0;
+  std::int64_t hasty_sweeps_ = 0;
   std::int64_t undone_ = 0;
 };
 

@@ -410,6 +410,36 @@ TEST(BagLogTest, SweepsThatTakeLongerThanThereIsTimeAreNotBelieved) {
 }
 
 // What simulators write where there is no clock.
+// As one that is sold with many robots says: 11 ms for a turn, five a second.
+// What turns all the time takes from one scan to the next.
+TEST(BagLogTest, WholeTurnsThatTakeHardlyAnyTimeAreNotBelieved) {
+  const auto read = [](double increment, int beams) {
+    std::vector<BagRecord> records;
+    for (int i = 0; i < 10; ++i) {
+      const std::int64_t time = kBagStart + i * kSecond / 5;
+      records.push_back(
+          OdometryRecord(time, Pose2(0.1 * i, 0.0, 0.2 * i), kRos1));
+      LaserScanMessage scan = PlainScan(time);
+      scan.angle_min = 0.0;
+      scan.angle_increment = DegToRad(1.0);
+      scan.angle_max = DegToRad(1.0) * (beams - 1);
+      scan.time_increment = increment;
+      scan.ranges.assign(static_cast<std::size_t>(beams), 2.0f);
+      records.push_back(Record(scan, kRos1));
+    }
+    return ReadBytes(MakeRosbag1(records));
+  };
+  const auto is_said = Contains(HasSubstr("less than a tenth"));
+  const Log hasty = read(2.99e-5, 360);
+  EXPECT_THAT(hasty.notes, is_said);
+  for (const Scan& scan : hasty.scans) EXPECT_THAT(scan.bearings, IsEmpty());
+  // A turn that takes its time, and what does not see all round.
+  for (const Log& log : {read(5e-4, 360), read(2.99e-5, 270)}) {
+    EXPECT_THAT(log.notes, Not(is_said));
+    EXPECT_THAT(log.scans[4].bearings, Not(IsEmpty()));
+  }
+}
+
 TEST(BagLogTest, StampsOfZeroAreTimesOfRecording) {
   std::vector<BagRecord> records;
   for (int i = 0; i < 10; ++i) {

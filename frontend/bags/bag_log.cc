@@ -189,10 +189,24 @@ class ScanPlacer {
     const bool is_delay = sources_.clock_difference == 0;
     const std::int64_t difference =
         is_delay ? sources_.recording_delay : sources_.clock_difference;
-    if (difference == 0) return;
+    const auto mount_of = [this](const BagScan& scan) { return MountOf(scan); };
+    if (difference == 0) {
+      if (!sources_.motion.is_known()) return;
+      const ClockChoice choice =
+          FindSmallClockDifference(options_, scans_, mount_of, sources_.motion);
+      if (!choice.is_told || choice.difference == 0) return;
+      char text[120];
+      std::snprintf(text, sizeof text,
+                    ": %.3f s are added to its time stamps, by which it lays "
+                    "the scans on each other best",
+                    static_cast<double>(choice.difference) / kNanoseconds);
+      log_->notes.push_back(log_->odometry_source + text);
+      sources_.motion.MoveBy(choice.difference);
+      return;
+    }
     const bool is_motion = sources_.motion.is_known();
     const ClockChoice choice = ChooseClock(
-        options_, scans_, [this](const BagScan& scan) { return MountOf(scan); },
+        options_, scans_, mount_of,
         is_motion ? sources_.motion : MotionOfTurnRates(), difference);
     if ((choice.is_told || is_delay) && choice.difference == 0) return;
     // What was not stamped is not late unless scans say so.

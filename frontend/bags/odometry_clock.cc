@@ -37,6 +37,13 @@ constexpr int kFewestVotes = 5;
 constexpr double kSearchRadius = 2.5;
 constexpr double kSearchStep = 0.1;
 constexpr double kFineStep = 0.02;
+// Where no delay speaks for it: so far about no difference, s, in such steps,
+// by pairs that differ so far either way.
+constexpr double kNearRadius = 0.5;
+constexpr double kNearStep = 0.05;
+constexpr double kNearReach = 0.2;
+// A laser that sees less, rad, takes hardly any time to a scan.
+const double kLeastSweep = DegToRad(200.0);
 // Returns of a scan that the steps about the difference are compared by, at
 // least; the finer ones, and what decides, take all.
 constexpr std::size_t kCoarseReturns = 100;
@@ -102,7 +109,7 @@ class ClockSearch {
     if (difference > kMostTime || difference < -kMostTime) {
       return {OverlapsAsStamped() ? 0 : difference, false};
     }
-    ChoosePairs(difference);
+    ChoosePairs(0, difference);
     const std::vector<double> as_stamped = SharesAt(0, Returns::kAll);
     if (Beats(as_stamped, SharesAt(difference, Returns::kAll))) {
       return {0, true};
@@ -113,6 +120,18 @@ class ClockSearch {
       return {Best(near, kSearchStep, kFineStep, Returns::kAll), true};
     }
     return {OverlapsAsStamped() ? 0 : difference, false};
+  }
+
+  ClockChoice ChooseNear() {
+    if (!TellsWhenBeamsWereTaken()) return {};
+    const auto reach = static_cast<std::int64_t>(kNearReach * kSecond);
+    ChoosePairs(-reach, reach);
+    const std::int64_t near = Best(0, kNearRadius, kNearStep, Returns::kSome);
+    if (near == 0 ||
+        !Beats(SharesAt(near, Returns::kAll), SharesAt(0, Returns::kAll))) {
+      return {};
+    }
+    return {Best(near, kNearStep, kFineStep, Returns::kAll), true};
   }
 
  private:
@@ -129,7 +148,9 @@ class ClockSearch {
                    motion_.At(scans_[b].stamp - difference));
   }
 
-  void ChoosePairs(std::int64_t difference) {
+  // Those between which the robot moved otherwise by one difference than by
+  // another.
+  void ChoosePairs(std::int64_t one, std::int64_t other) {
     std::size_t j = 0;
     for (std::size_t i = 0; i + 1 < scans_.size(); ++i) {
       j = std::max(j, i + 1);
@@ -137,7 +158,7 @@ class ClockSearch {
       const double step = StepOf(i, j);
       if (step < kLeastStep || step > kMostStep) continue;
       const Pose2 apart =
-          Between(MotionBetween(i, j, 0), MotionBetween(i, j, difference));
+          Between(MotionBetween(i, j, one), MotionBetween(i, j, other));
       const double turn = std::abs(NormalizeAngle(apart[2]));
       const double way = std::hypot(apart[0], apart[1]);
       if (turn < kTurn && way < kWay) continue;
@@ -241,6 +262,21 @@ class ClockSearch {
     return sum;
   }
 
+  // Of most scans. Others may be sweeps stamped at one of their ends, which is
+  // as if clocks differed, and are looked at later.
+  bool TellsWhenBeamsWereTaken() const {
+    const ScanMaker maker(options_, &motion_, scans_);
+    const auto telling =
+        std::count_if(scans_.begin(), scans_.end(), [&](const BagScan& scan) {
+          const LaserScanMessage& message = scan.message;
+          return maker.IsSweepBelieved(message) ||
+                 std::abs(message.angle_increment) *
+                         static_cast<double>(message.ranges.size()) <
+                     kLeastSweep;
+        });
+    return 2 * static_cast<std::size_t>(telling) > scans_.size();
+  }
+
   bool OverlapsAsStamped() const {
     const auto within = std::count_if(
         scans_.begin(), scans_.end(), [this](const BagScan& scan) {
@@ -264,6 +300,13 @@ ClockChoice ChooseClock(
     const std::function<LaserPlacement(const BagScan&)>& mount_of,
     const BagMotion& motion, std::int64_t difference) {
   return ClockSearch(options, scans, mount_of, motion).Choose(difference);
+}
+
+ClockChoice FindSmallClockDifference(
+    const LaserOptions& options, const std::vector<BagScan>& scans,
+    const std::function<LaserPlacement(const BagScan&)>& mount_of,
+    const BagMotion& motion) {
+  return ClockSearch(options, scans, mount_of, motion).ChooseNear();
 }
 
 }  // namespace plumbline

@@ -120,6 +120,20 @@ Scan ScanMaker::Make(const BagScan& raw, const LaserPlacement& mount,
   return scan;
 }
 
+ScanMaker::Sweep ScanMaker::SweepOf(const LaserScanMessage& message) const {
+  const auto n = static_cast<double>(message.ranges.size());
+  const double duration = std::abs(message.time_increment) * (n - 1.0);
+  if (!(duration > 0.0)) return Sweep::kUnsaid;
+  if (!(duration <= kLongestScan) ||
+      (period_ > 0.0 && duration > kLongestSweep * period_)) {
+    return Sweep::kImpossible;
+  }
+  return std::abs(message.angle_increment) * n >= kWholeTurn &&
+                 duration < kShortestSweep * period_
+             ? Sweep::kHasty
+             : Sweep::kBelieved;
+}
+
 // A laser that turns with the robot sees each beam from another place: puts
 // the returns where they are seen from the place of the time stamp, which is
 // that of the first beam.
@@ -129,15 +143,17 @@ void ScanMaker::UndoMotion(const BagScan& raw, const LaserPlacement& mount,
   const std::size_t n = scan->ranges.size();
   const double duration = step * static_cast<double>(n - 1);
   if (!motion_->is_known() || !(std::abs(duration) > 0.0)) return;
-  if (!(std::abs(duration) <= kLongestScan) ||
-      (period_ > 0.0 && std::abs(duration) > kLongestSweep * period_)) {
-    ++impossible_sweeps_;
-    return;
-  }
-  if (std::abs(scan->angle_step) * static_cast<double>(n) >= kWholeTurn &&
-      std::abs(duration) < kShortestSweep * period_) {
-    ++hasty_sweeps_;
-    return;
+  switch (SweepOf(raw.message)) {
+    case Sweep::kUnsaid:
+      return;
+    case Sweep::kImpossible:
+      ++impossible_sweeps_;
+      return;
+    case Sweep::kHasty:
+      ++hasty_sweeps_;
+      return;
+    case Sweep::kBelieved:
+      break;
   }
   // Of the laser, seen from where it was at first, evenly in time.
   std::vector<Pose2> places;

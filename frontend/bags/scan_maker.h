@@ -44,7 +44,14 @@ class ScanMaker {
   /// Scans in which motion was undone.
   std::int64_t undone() const { return undone_; }
 
+  /// Whether a scan says how long the laser takes to it, and that can be.
+  bool IsSweepBelieved(const LaserScanMessage& message) const {
+    return SweepOf(message) == Sweep::kBelieved;
+  }
+
  private:
+  enum class Sweep { kUnsaid, kImpossible, kHasty, kBelieved };
+  Sweep SweepOf(const LaserScanMessage& message) const;
   void UndoMotion(const BagScan& raw, const LaserPlacement& mount,
                   std::size_t stride, Scan* scan);
 

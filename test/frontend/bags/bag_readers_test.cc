@@ -806,24 +806,25 @@ TEST(BagLogTest, ClocksThatDifferAreAligned) {
   EXPECT_THAT(log.notes, Contains(HasSubstr("another clock")));
 }
 
-// A robot in an office, a scan a second.
+// A robot in an office, so many scans a second.
+Simulation OfficeDrive(double scan_rate) {
+  SimulatorOptions options;
+  options.laser = Laser();
+  options.drive.scan_rate = scan_rate;
+  options.progress = [](double share) { return share < 0.3; };
+  return Simulate(MakeWorld("office", 3, 0.5), options, 3);
+}
+
 const Simulation& SlowDrive() {
-  static const Simulation* const simulation = [] {
-    SimulatorOptions options;
-    options.laser = Laser();
-    options.drive.scan_rate = 1.0;
-    options.progress = [](double share) { return share < 0.3; };
-    return new Simulation(Simulate(MakeWorld("office", 3, 0.5), options, 3));
-  }();
+  static const auto* const simulation = new Simulation(OfficeDrive(1.0));
   return *simulation;
 }
 
-// Records the scans of a slow drive `late` ns after their time stamps, and
-// stamps odometry by a clock that is `ahead` ns ahead.
-Log ReadSlowDrive(std::int64_t late, std::int64_t ahead,
-                  bool has_returns = true) {
-  std::vector<BagRecord> records =
-      SimulatedMessages(SlowDrive(), Laser(), kRos1);
+// Records the scans of a drive `late` ns after their time stamps, and stamps
+// odometry by a clock that is `ahead` ns ahead.
+Log ReadDrive(const Simulation& drive, std::int64_t late, std::int64_t ahead,
+              bool has_returns) {
+  std::vector<BagRecord> records = SimulatedMessages(drive, Laser(), kRos1);
   std::string why;
   for (BagRecord& record : records) {
     if (record.topic == "/scan") {
@@ -841,6 +842,11 @@ Log ReadSlowDrive(std::int64_t late, std::int64_t ahead,
     }
   }
   return ReadBytes(MakeRosbag1(records));
+}
+
+Log ReadSlowDrive(std::int64_t late, std::int64_t ahead,
+                  bool has_returns = true) {
+  return ReadDrive(SlowDrive(), late, ahead, has_returns);
 }
 
 // The laser of a slow robot takes a second to a scan, which is recorded in the
@@ -875,6 +881,34 @@ TEST(BagLogTest, ScansTellByHowMuchClocksDiffer) {
           (log.scans[i].odometry - right.scans[i].odometry).head<2>().norm());
     }
     EXPECT_LT(most, 0.05);
+  }
+}
+
+double MostApart(const Log& a, const Log& b) {
+  double most = 0.0;
+  for (std::size_t i = 0; i < a.scans.size(); ++i) {
+    const Pose2 apart = a.scans[i].odometry - b.scans[i].odometry;
+    most = std::max(
+        {most, apart.head<2>().norm(), std::abs(NormalizeAngle(apart[2]))});
+  }
+  return most;
+}
+
+// Of clocks that differ by a little the times of recording say nothing. Scans
+// do, where they do not hide it themselves.
+TEST(BagLogTest, ScansTellOfClocksThatDifferByALittle) {
+  const Simulation drive = OfficeDrive(10.0);
+  const Log right = ReadDrive(drive, 0, 0, true);
+  EXPECT_THAT(right.notes, Not(Contains(HasSubstr("time stamps, by which"))));
+  for (const std::int64_t ahead : {kSecond / 5, -kSecond / 4}) {
+    SCOPED_TRACE(ahead);
+    const Log log = ReadDrive(drive, 0, ahead, true);
+    ASSERT_EQ(log.scans.size(), right.scans.size());
+    EXPECT_THAT(log.notes, Contains(HasSubstr("time stamps, by which")));
+    EXPECT_LT(MostApart(log, right), 0.03);
+    const Log blind = ReadDrive(drive, 0, ahead, false);
+    EXPECT_THAT(blind.notes, Not(Contains(HasSubstr("time stamps, by which"))));
+    EXPECT_GT(MostApart(blind, right), 0.1);
   }
 }
 

@@ -185,7 +185,7 @@ class BagTrajectories {
       const bool is_static = topic.name.find("tf_static") != std::string::npos;
       for (const TransformMessage& transform : transforms) {
         const std::int64_t time = transform.header.stamp;
-        if (!tree_.Add(transform, time, message.time, is_static)) {
+        if (!tree_.Add(transform, message.time, 0, is_static)) {
           ++unusable_;
         } else if (!is_static) {
           times_[PlainFrameName(transform.child_frame)].insert(time);

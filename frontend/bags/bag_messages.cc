@@ -138,8 +138,8 @@ class Collector {
           stream->frame = PlainFrameName(odometry.header.frame);
           stream->child_frame = PlainFrameName(odometry.child_frame);
         }
-        stream->poses.push_back(
-            {odometry.header.stamp, message.time, PoseInPlane(pose)});
+        stream->poses.push_back({odometry.header.stamp, message.time,
+                                 PoseInPlane(pose), position_});
         return true;
       }
       case BagTopicKind::kTransforms:
@@ -150,7 +150,7 @@ class Collector {
         }
         for (const TransformMessage& transform : transforms) {
           if (!messages_.tree.Add(
-                  transform, transform.header.stamp, message.time,
+                  transform, message.time, position_,
                   stream->kind == BagTopicKind::kStaticTransforms)) {
             Skip("transform of '" + transform.child_frame.substr(0, 60) +
                  "' that has another parent, or no pose: expected one parent, "

@@ -56,6 +56,8 @@ struct BagPose {
   std::int64_t received = 0;
   /// m and rad, in the plane.
   Pose2 pose = Pose2::Zero();
+  /// Number of the message in the bag, from 1.
+  int position = 0;
 };
 
 /// A turn rate.

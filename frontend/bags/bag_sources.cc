@@ -17,10 +17,14 @@ constexpr double kNanoseconds = 1e9;  // in a second
 // were recorded the delays differ by less, s, or their clocks do.
 constexpr double kClockDifference = 0.5;
 
-// A clock that goes back by more, s, was set back; scans and odometry agree on
-// by how much to that. More often than this nobody does it.
+// A clock that goes back by more, s, was set back; where scans and odometry
+// agree on by how much to that, one clock was. More often than this nobody does
+// it.
 constexpr double kSetBack = 1.0;
 constexpr std::size_t kMostSetBack = 10;
+// Messages of a topic that are recorded after those of another though they were
+// sent before.
+constexpr std::size_t kUnderWay = 2;
 
 template <typename T>
 T MedianOf(std::vector<T> values) {
@@ -64,6 +68,23 @@ std::vector<SetBack> SetBacksOf(const std::vector<Raw>& messages) {
     }
   }
   return found;
+}
+
+// Whether two clocks were set back at one place in the bag, but for messages
+// that were under way. A recording that is played in a circle goes back by
+// another time for each topic, since none has its first and last message at
+// the very ends.
+template <typename One, typename Other>
+bool IsAtOnePlace(const std::vector<One>& ones, std::size_t one,
+                  const std::vector<Other>& others, std::size_t other) {
+  const auto begin = [](const auto& messages, std::size_t index) {
+    return messages[index - std::min(index, kUnderWay + 1)].position;
+  };
+  const auto end = [](const auto& messages, std::size_t index) {
+    return messages[std::min(index + kUnderWay, messages.size() - 1)].position;
+  };
+  return begin(ones, one) <= end(others, other) &&
+         begin(others, other) <= end(ones, one);
 }
 
 // Adds to the times after the clock was set back what it was set back by.
@@ -253,9 +274,14 @@ class SourceChooser {
       transform_base_ = chain[i - 1];
       for (const TransformTree::Sample& sample :
            *messages_->tree.SamplesOf(chain[i - 1])) {
-        transforms_.push_back(
-            {sample.time, sample.received, PoseInPlane(sample.pose)});
+        transforms_.push_back({sample.time, sample.received,
+                               PoseInPlane(sample.pose), sample.position});
       }
+      // In the order of the bag, as topics are.
+      std::stable_sort(transforms_.begin(), transforms_.end(),
+                       [](const BagPose& a, const BagPose& b) {
+                         return a.position < b.position;
+                       });
       return;
     }
   }
@@ -313,10 +339,11 @@ class SourceChooser {
     if (!is_stamped) sources_.recording_delay = TimeBetweenScans();
     if (odometry_ != nullptr) {
       align(odometry_->seen.name, &odometry_->poses);
-      LetTimesGoOnWhereBothWereSetBack();
+      LetTimesGoOnWhereBothWereSetBack(&odometry_->poses);
       sources_.motion.SetPoses(std::move(odometry_->poses));
     } else if (!transforms_.empty()) {
       align(log_->odometry_source, &transforms_);
+      LetTimesGoOnWhereBothWereSetBack(&transforms_);
       sources_.motion.SetPoses(std::move(transforms_));
     } else {
       TakeYawRates(align);
@@ -336,9 +363,9 @@ class SourceChooser {
 
   // One clock stamps scans and odometry and was set back: a time that came
   // twice is another one for both.
-  void LetTimesGoOnWhereBothWereSetBack() {
+  void LetTimesGoOnWhereBothWereSetBack(std::vector<BagPose>* all_poses) {
     std::vector<BagScan>& scans = messages_->scans.list;
-    std::vector<BagPose>& poses = odometry_->poses;
+    std::vector<BagPose>& poses = *all_poses;
     const std::vector<SetBack> of_scans = SetBacksOf(scans);
     const std::vector<SetBack> of_poses = SetBacksOf(poses);
     if (of_scans.empty() || of_scans.size() > kMostSetBack ||
@@ -355,9 +382,13 @@ class SourceChooser {
     for (std::size_t k = 0; k < of_scans.size(); ++k) {
       const auto of_one = static_cast<double>(of_scans[k].by);
       const auto of_other = static_cast<double>(of_poses[k].by);
-      if (std::abs(of_one - of_other) > kSetBack * kNanoseconds) return;
-      by.push_back(of_poses[k].by + std::max<std::int64_t>(step, 0));
-      sum += of_other + static_cast<double>(step);
+      if (std::abs(of_one - of_other) > kSetBack * kNanoseconds &&
+          !IsAtOnePlace(scans, of_scans[k].index, poses, of_poses[k].index)) {
+        return;
+      }
+      by.push_back(std::max(of_scans[k].by, of_poses[k].by) +
+                   std::max<std::int64_t>(step, 0));
+      sum += std::max(of_one, of_other) + static_cast<double>(step);
     }
     // Of damaged stamps the sums might not fit their type.
     if (sum > static_cast<double>(kMostTime) / 4.0) return;

@@ -37,8 +37,8 @@ ClockChoice ChooseClock(
     const BagMotion& motion, std::int64_t difference);
 
 /// The same where nothing else says that clocks differ: looks up to half a
-/// second about the time stamps, which as little smears scans in which motion
-/// is undone. No difference unless scans tell it clearly, nor for lasers that
+/// second about the time stamps. So little smears scans in which motion is
+/// undone. No difference unless scans tell it clearly, nor for lasers that
 /// see much and do not say how long they take to it.
 ClockChoice FindSmallClockDifference(
     const LaserOptions& options, const std::vector<BagScan>& scans,

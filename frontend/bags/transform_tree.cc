@@ -52,8 +52,9 @@ std::string PlainFrameName(const std::string& frame) {
   return frame.substr(std::min(frame.find_first_not_of('/'), frame.size()));
 }
 
-bool TransformTree::Add(const TransformMessage& message, std::int64_t time,
-                        std::int64_t received, bool is_static) {
+bool TransformTree::Add(const TransformMessage& message, std::int64_t received,
+                        int position, bool is_static) {
+  const std::int64_t time = message.header.stamp;
   const std::string child = PlainFrameName(message.child_frame);
   const std::string parent = PlainFrameName(message.header.frame);
   Pose3 pose;
@@ -72,7 +73,7 @@ bool TransformTree::Add(const TransformMessage& message, std::int64_t time,
   std::vector<Sample>& samples = edge.samples;
   if (edge.is_static) {
     // Said again, perhaps better: the last word holds.
-    samples.assign(1, {time, received, pose});
+    samples.assign(1, {time, received, position, pose});
     return true;
   }
   // Of what stands still the ends are enough.
@@ -81,8 +82,9 @@ bool TransformTree::Add(const TransformMessage& message, std::int64_t time,
       IsSame(samples[n - 1].pose, pose) && IsSame(samples[n - 2].pose, pose)) {
     samples.back().time = time;
     samples.back().received = received;
+    samples.back().position = position;
   } else {
-    samples.push_back({time, received, pose});
+    samples.push_back({time, received, position, pose});
   }
   return true;
 }

@@ -38,15 +38,17 @@ class TransformTree {
     std::int64_t time = 0;
     /// ns, when it was recorded.
     std::int64_t received = 0;
+    /// Number of the message in the bag.
+    int position = 0;
     Pose3 pose;
   };
 
-  /// Adds a transform, stamped with `time` and recorded at `received` (ns). A
-  /// frame keeps its first parent; false when another is given, the frame is
-  /// its own parent, or its transform is no rigid motion: nothing is added
-  /// then.
-  bool Add(const TransformMessage& message, std::int64_t time,
-           std::int64_t received, bool is_static);
+  /// Adds a transform, recorded at `received` (ns) by the message of that
+  /// number. A frame keeps its first parent; false when another is given, the
+  /// frame is its own parent, or its transform is no rigid motion: nothing is
+  /// added then.
+  bool Add(const TransformMessage& message, std::int64_t received, int position,
+           bool is_static);
 
   /// Puts what was added in the order of time. Call once all is in.
   void Sort();

@@ -980,56 +980,96 @@ TEST(BagLogTest, FolderOfTheRos1BagsThatOneWasSplitInto) {
   }
 }
 
-// A drive of 10 s whose clock is set back, with odometry or transforms.
-Log ReadSetBack(int jump_at, std::int64_t back, bool is_tf) {
+enum class SetBackOf { kAll, kScans };
+
+// A drive of 10 s in which a clock is set back, with odometry or transforms.
+Log ReadSetBack(int jump_at, std::int64_t back, bool is_tf,
+                SetBackOf what = SetBackOf::kAll) {
   std::vector<BagRecord> records;
   for (int i = 0; i < 200; ++i) {
-    const std::int64_t time =
-        kBagStart + i * kSecond / 20 - (i < jump_at ? 0 : back);
+    const std::int64_t on = kBagStart + i * kSecond / 20;
+    const std::int64_t time = i < jump_at ? on : on - back;
+    const std::int64_t of_pose = what == SetBackOf::kAll ? time : on;
     const Pose2 pose(0.05 * i, 0.0, 0.0);
     records.push_back(
-        is_tf ? TfRecord(Transform(time, "odom", "laser", pose), kRos1)
-              : OdometryRecord(time, pose, kRos1));
+        is_tf ? TfRecord(Transform(of_pose, "odom", "laser", pose), kRos1)
+              : OdometryRecord(of_pose, pose, kRos1));
     if (i % 2 == 0) records.push_back(Record(PlainScan(time), kRos1));
   }
   return ReadBytes(MakeRosbag1(records));
 }
 
-// A clock that is set back goes through the same times twice. Where odometry
-// comes in the order of the bag, that of the same time is meant.
+// A clock that is set back goes through the same times twice. The order of the
+// bag tells which odometry is meant.
 TEST(BagLogTest, OdometryOfTheSameTimeWhereTheClockWasSetBack) {
-  for (const std::int64_t back :
-       {2 * kSecond, 3 * kSecond, 8 * kSecond, 500 * kSecond}) {
-    SCOPED_TRACE(back);
-    const Log log = ReadSetBack(101, back, false);
-    ASSERT_EQ(log.scans.size(), 100u);
-    for (std::size_t i = 0; i < log.scans.size(); ++i) {
-      ASSERT_NEAR(log.scans[i].odometry[0], 0.1 * static_cast<double>(i), 1e-9)
-          << i;
+  for (const bool is_tf : {false, true}) {
+    for (const std::int64_t back :
+         {2 * kSecond, 3 * kSecond, 8 * kSecond, 500 * kSecond}) {
+      SCOPED_TRACE(back);
+      const Log log = ReadSetBack(101, back, is_tf);
+      ASSERT_EQ(log.scans.size(), 100u);
+      for (std::size_t i = 0; i < log.scans.size(); ++i) {
+        ASSERT_NEAR(log.scans[i].odometry[0], 0.1 * static_cast<double>(i),
+                    1e-9)
+            << i;
+      }
+      // As stamped.
+      EXPECT_NEAR(log.scans[60].timestamp,
+                  SecondsOf(kBagStart + 6 * kSecond - back), 1e-6);
+      EXPECT_EQ(log.time_reversals, 1);
+      EXPECT_THAT(log.notes, Contains(HasSubstr("clock was set back")));
     }
-    // As stamped.
-    EXPECT_NEAR(log.scans[60].timestamp,
-                SecondsOf(kBagStart + 6 * kSecond - back), 1e-6);
-    EXPECT_EQ(log.time_reversals, 1);
-    EXPECT_THAT(log.notes, Contains(HasSubstr("clock was set back")));
   }
 }
 
-// Transforms are in the order of their time: whose they are is lost.
-TEST(BagLogTest, TransformsOfTimesThatCameTwiceAreNotUsed) {
-  Log log = ReadSetBack(100, 3 * kSecond, true);
-  EXPECT_EQ(log.scans.size(), 100u);
-  EXPECT_FALSE(log.has_odometry);
-  EXPECT_EQ(log.odometry_source, "");
-  EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("clock was set back"),
-                                        HasSubstr("not used"))));
-  // Few of them, and times that came once.
-  log = ReadSetBack(194, 2 * kSecond, true);
-  EXPECT_TRUE(log.has_odometry);
-  EXPECT_THAT(log.notes, Contains(HasSubstr("clock was set back")));
-  log = ReadSetBack(100, 500 * kSecond, true);
-  EXPECT_NEAR(log.scans[70].odometry[0], 7.0, 1e-9);
-  EXPECT_THAT(log.notes, Not(Contains(HasSubstr("clock was set back"))));
+// A recording that is played in a circle and recorded. The laser starts after
+// the base and ends before it, so that each topic goes back by another time.
+TEST(BagLogTest, OdometryOfTheSameTimeWhereARecordingIsPlayedInACircle) {
+  for (const bool is_tf : {false, true}) {
+    for (const bool is_recorder_set_back : {false, true}) {
+      std::vector<BagRecord> records;
+      for (int round = 0; round < 3; ++round) {
+        for (int i = 0; i < 200; ++i) {
+          const std::int64_t time = kBagStart + i * kSecond / 20;
+          const Pose2 pose(0.05 * i, 0.0, 0.0);
+          const auto add = [&](BagRecord record) {
+            if (!is_recorder_set_back) record.time += round * 10 * kSecond;
+            records.push_back(std::move(record));
+          };
+          add(is_tf ? TfRecord(Transform(time, "odom", "laser", pose), kRos1)
+                    : OdometryRecord(time, pose, kRos1));
+          if (i >= 60 && i < 160 && i % 2 == 0) {
+            add(Record(PlainScan(time), kRos1));
+          }
+        }
+      }
+      const Log log = ReadBytes(MakeRosbag1(records));
+      ASSERT_EQ(log.scans.size(), 150u);
+      for (std::size_t i = 0; i < log.scans.size(); ++i) {
+        ASSERT_NEAR(log.scans[i].odometry[0],
+                    3.0 + 0.1 * static_cast<double>(i % 50), 1e-9)
+            << i;
+      }
+      EXPECT_TRUE(log.has_odometry);
+      EXPECT_THAT(log.notes, Contains(HasSubstr("clock was set back")));
+    }
+  }
+}
+
+// Where that of the laser alone is set back, whose they are is lost.
+TEST(BagLogTest, OdometryOfTimesThatCameTwiceIsNotUsed) {
+  for (const bool is_tf : {false, true}) {
+    Log log = ReadSetBack(100, 3 * kSecond, is_tf, SetBackOf::kScans);
+    EXPECT_EQ(log.scans.size(), 100u);
+    EXPECT_FALSE(log.has_odometry);
+    EXPECT_EQ(log.odometry_source, "");
+    EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("clock was set back"),
+                                          HasSubstr("not used"))));
+    // Few of them.
+    log = ReadSetBack(194, 2 * kSecond, is_tf, SetBackOf::kScans);
+    EXPECT_TRUE(log.has_odometry);
+    EXPECT_THAT(log.notes, Contains(HasSubstr("clock was set back")));
+  }
 }
 
 // Of a laser that nobody stamps the times of recording are known only, which

@@ -45,7 +45,7 @@ class Collector {
     // Topics without messages are known, too.
     if (!source_->topics().empty()) StreamOf(0);
     messages_.topics = source_->topics();
-    messages_.tree.Sort();
+    for (auto& [space, tree] : messages_.trees) tree.Sort();
     messages_.skipped_by_source = source_->skipped();
     messages_.skipped = skips_.reports();
     source_->SetWanted(nullptr);
@@ -148,10 +148,10 @@ class Collector {
         if (!DecodeTransforms(message.data, encoding, &transforms, why)) {
           return false;
         }
+        TransformTree& tree = messages_.trees[NamespaceOf(stream->seen.name)];
         for (const TransformMessage& transform : transforms) {
-          if (!messages_.tree.Add(
-                  transform, message.time, position_,
-                  stream->kind == BagTopicKind::kStaticTransforms)) {
+          if (!tree.Add(transform, message.time, position_,
+                        stream->kind == BagTopicKind::kStaticTransforms)) {
             Skip("transform of '" + transform.child_frame.substr(0, 60) +
                  "' that has another parent, or no pose: expected one parent, "
                  "finite numbers and a quaternion of unit length");
@@ -276,6 +276,11 @@ bool IsNamed(const BagTopic& topic, const std::string& name) {
   return plain(topic.name) == plain(name);
 }
 
+std::string NamespaceOf(const std::string& topic) {
+  const std::string plain = PlainFrameName(topic);
+  return plain.substr(0, plain.rfind('/') + 1);
+}
+
 std::string BagMessages::Contents() const {
   if (streams.empty()) return "no topics";
   std::string text = std::to_string(streams.size()) +
@@ -315,12 +320,51 @@ std::string BagMessages::Losses() const {
   return text;
 }
 
+std::vector<std::string> BagMessages::SpacesOf(const std::string& topic) const {
+  const std::string space = NamespaceOf(topic);
+  std::vector<std::string> inner;
+  std::vector<std::string> all;
+  bool is_in_one = false;
+  // From the end: what begins with a namespace comes after that.
+  for (auto tree = trees.rbegin(); tree != trees.rend(); ++tree) {
+    all.push_back(tree->first);
+    if (space.compare(0, tree->first.size(), tree->first) != 0) continue;
+    inner.push_back(tree->first);
+    is_in_one |= !tree->first.empty();
+  }
+  return is_in_one ? inner : all;
+}
+
+TransformTree BagMessages::TreeOf(const std::string& topic) const {
+  TransformTree tree;
+  for (const std::string& space : SpacesOf(topic)) {
+    tree.AddFrames(trees.at(space));
+  }
+  return tree;
+}
+
+void BagMessages::ChooseTree(const std::string& topic) {
+  const std::vector<std::string> spaces = SpacesOf(topic);
+  tree = TreeOf(topic);
+  trees.clear();
+  for (BagStream& stream : streams) {
+    if ((stream.kind == BagTopicKind::kTransforms ||
+         stream.kind == BagTopicKind::kStaticTransforms) &&
+        stream.seen.messages > 0 &&
+        std::count(spaces.begin(), spaces.end(),
+                   NamespaceOf(stream.seen.name)) == 0) {
+      stream.seen.why_not = "it is of another namespace than the scans";
+    }
+  }
+}
+
 void BagMessages::NoteTransformsUsed(const std::string& use) {
   for (BagStream& stream : streams) {
     if (stream.kind != BagTopicKind::kTransforms &&
         stream.kind != BagTopicKind::kStaticTransforms) {
       continue;
     }
+    if (!stream.seen.why_not.empty()) continue;
     std::string& uses = stream.seen.use;
     if (uses.find(use) == std::string::npos) {
       uses += (uses.empty() ? "" : ", ") + use;

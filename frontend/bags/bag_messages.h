@@ -9,6 +9,7 @@
 #include <plumbline/frontend/scan.h>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,9 @@ BagTopicKind KindOf(const BagTopic& topic);
 
 /// Whether a topic has this name, with or without a slash in front.
 bool IsNamed(const BagTopic& topic, const std::string& name);
+
+/// "robot1/" of "/robot1/scan"; empty where there is none.
+std::string NamespaceOf(const std::string& topic);
 
 /// A scan of a bag. Times here and below are ns since the epoch of the clock
 /// that set them.
@@ -109,7 +113,10 @@ struct BagMessages {
   std::vector<BagStream> streams;
   /// Those of the topic that was chosen (bag_sources.h); empty before.
   BagScanSet scans;
-  /// Transforms between frames, in the order of time.
+  /// Transforms between frames, in the order of time, by the namespace of their
+  /// topics.
+  std::map<std::string, TransformTree> trees;
+  /// Those that hold for the scans' topic; empty before it is chosen.
   TransformTree tree;
   /// What the source passed over, and messages that could not be used.
   std::vector<SkipReport> skipped_by_source;
@@ -121,8 +128,17 @@ struct BagMessages {
   std::string ListOf(BagTopicKind kind) const;
   /// What was passed over, at most three reasons, each after a semicolon.
   std::string Losses() const;
-  /// Adds a use to those of the topics of transforms.
+  /// The transforms that hold for a topic: those of namespaces that it is in,
+  /// inner before outer ones, or all where it is in no namespace that has some.
+  TransformTree TreeOf(const std::string& topic) const;
+  /// Takes the transforms for the topic of the scans.
+  void ChooseTree(const std::string& topic);
+  /// Adds a use to those of the topics of transforms that hold.
   void NoteTransformsUsed(const std::string& use);
+
+ private:
+  // Namespaces whose transforms hold for a topic, inner before outer ones.
+  std::vector<std::string> SpacesOf(const std::string& topic) const;
 };
 
 /// Reads all messages of a bag. The options choose topics and set angles of

@@ -161,6 +161,7 @@ class SourceChooser {
     stream.seen.use = "scans";
     log_->scan_message = stream.seen.name;
     messages_->scans = std::move(stream.scans);
+    messages_->ChooseTree(stream.seen.name);
     for (BagStream& other : messages_->streams) {
       other.scans = {};
       if (other.kind != BagTopicKind::kScan || &other == &stream ||
@@ -228,7 +229,8 @@ class SourceChooser {
     FindTransform();
     if (wanted.empty()) {
       const std::vector<std::size_t> all = candidates;
-      candidates = OdometryTopicsThatMayBeMeant(all, transforms_, messages_);
+      candidates = OdometryTopicsThatMayBeMeant(all, log_->scan_message,
+                                                transforms_, messages_);
       if (candidates.size() < 2) {
         for (const std::size_t i : all) {
           const LogTopic& seen = messages_->streams[i].seen;

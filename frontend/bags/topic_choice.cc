@@ -155,7 +155,8 @@ std::vector<std::size_t> ScanTopicsThatMayBeMeant(BagMessages* messages) {
   std::vector<Attitude> attitudes(messages->streams.size());
   for (const std::size_t topic : topics) {
     attitudes[topic] =
-        AttitudeOf(messages->streams[topic].scans, messages->tree);
+        AttitudeOf(messages->streams[topic].scans,
+                   messages->TreeOf(messages->streams[topic].seen.name));
   }
   LeaveOut([&](std::size_t t) { return attitudes[t] == Attitude::kTilted; },
            "its laser is tilted by more than 20 degrees", &topics, messages);
@@ -200,7 +201,7 @@ std::vector<std::size_t> ScanTopicsThatMayBeMeant(BagMessages* messages) {
 }
 
 std::vector<std::size_t> OdometryTopicsThatMayBeMeant(
-    const std::vector<std::size_t>& topics,
+    const std::vector<std::size_t>& topics, const std::string& scan_topic,
     const std::vector<BagPose>& transform, BagMessages* messages) {
   std::vector<std::size_t> left = topics;
   const auto is_in_map = [&](std::size_t t) {
@@ -212,6 +213,15 @@ std::vector<std::size_t> OdometryTopicsThatMayBeMeant(
     return {};
   }
   LeaveOut(is_in_map, why, &left, messages);
+  const std::string space = NamespaceOf(scan_topic);
+  if (!space.empty()) {
+    LeaveOut(
+        [&](std::size_t t) {
+          return NamespaceOf(messages->streams[t].seen.name)
+                     .compare(0, space.size(), space) != 0;
+        },
+        "it is of another namespace than the scans", &left, messages);
+  }
   if (left.size() < 2 || transform.empty()) return left;
   std::vector<std::size_t> same;
   for (const std::size_t topic : left) {

@@ -19,13 +19,14 @@ std::vector<std::size_t> ScanTopicsThatMayBeMeant(BagMessages* messages);
 
 /// The same of topics with odometry. Left out are poses in a frame called map,
 /// which jump where a localization finds its error, if there is anything else;
-/// and of several topics all but the one whose poses are those of tf, which is
-/// what the robot itself goes by.
+/// those of other namespaces than `scan_topic`, if there is one of its own; and
+/// of several topics all but the one whose poses are those of tf, which is what
+/// the robot itself goes by.
 ///
 /// `transform`: the poses of the robot in a frame called odom by tf; empty
 /// where there are none.
 std::vector<std::size_t> OdometryTopicsThatMayBeMeant(
-    const std::vector<std::size_t>& topics,
+    const std::vector<std::size_t>& topics, const std::string& scan_topic,
     const std::vector<BagPose>& transform, BagMessages* messages);
 
 }  // namespace plumbline

@@ -89,6 +89,10 @@ bool TransformTree::Add(const TransformMessage& message, std::int64_t received,
   return true;
 }
 
+void TransformTree::AddFrames(const TransformTree& other) {
+  edges_.insert(other.edges_.begin(), other.edges_.end());
+}
+
 void TransformTree::Sort() {
   for (auto& [child, edge] : edges_) {
     std::stable_sort(

@@ -50,6 +50,9 @@ class TransformTree {
   bool Add(const TransformMessage& message, std::int64_t received, int position,
            bool is_static);
 
+  /// Adds the frames of another tree that this one does not have.
+  void AddFrames(const TransformTree& other);
+
   /// Puts what was added in the order of time. Call once all is in.
   void Sort();
 

@@ -733,6 +733,48 @@ TEST(BagLogTest, OdometryThatTheRobotGoesByIsMeant) {
             "tf odom -> base_link");
 }
 
+// Two robots with frames of the same names, of which one scans.
+TEST(BagLogTest, TransformsAndOdometryOfAnotherRobotAreNotUsed) {
+  for (const bool is_tf : {false, true}) {
+    std::vector<BagRecord> records;
+    for (const int robot : {2, 1}) {
+      const std::string space = "/robot" + std::to_string(robot);
+      for (BagRecord record : SmallDrive(kRos1)) {
+        if (record.topic == "/odom") {
+          const double way = 0.1 * robot *
+                             static_cast<double>(record.time - kBagStart) /
+                             static_cast<double>(kSecond / 10);
+          const Pose2 pose(way, 0.0, 0.0);
+          record =
+              is_tf
+                  ? TfRecord(Transform(record.time, "odom", "base_link", pose),
+                             kRos1, "/tf")
+                  : OdometryRecord(record.time, pose, kRos1);
+        } else if (record.topic == "/tf_static") {
+          record = TfRecord(Transform(kBagStart, "base_link", "laser",
+                                      Pose2(0.1 * robot, 0.0, 0.0)),
+                            kRos1, record.topic);
+        } else if (robot == 2) {
+          continue;
+        }
+        record.topic = space + record.topic;
+        records.push_back(record);
+      }
+    }
+    const Log log = ReadBytes(MakeRosbag1(records));
+    EXPECT_EQ(log.scan_message, "/robot1/scan");
+    EXPECT_EQ(log.odometry_source,
+              is_tf ? "tf odom -> base_link" : "/robot1/odom");
+    EXPECT_NEAR(log.scans[5].odometry[0], 0.5, 1e-9);
+    EXPECT_NEAR(log.scans[5].laser_offset[0], 0.1, 1e-9);
+    EXPECT_THAT(log.topics,
+                Contains(AllOf(Field(&LogTopic::name, "/robot2/tf_static"),
+                               Field(&LogTopic::use, ""),
+                               Field(&LogTopic::why_not,
+                                     HasSubstr("another namespace")))));
+  }
+}
+
 TEST(BagLogTest, ListsWhatIsThereWhenThereIsNoScan) {
   std::vector<LogTopic> topics;
   LaserOptions options;

@@ -26,6 +26,11 @@ constexpr std::size_t kOrderScans = 100;
 constexpr double kMostTwice = 0.1;
 // Odometry farther from a scan than this, s, is worth a word.
 constexpr double kFarOdometry = 1.0;
+// Odometry is left out where the robot goes faster, m/s, by the median of steps
+// longer than this, m, if there are so many.
+constexpr double kMostSpeed = 20.0;
+constexpr double kLeastWay = 0.02;
+constexpr std::size_t kFewestSpeeds = 20;
 // cos of the angle by which a laser's plane may be out of level.
 const double kLevel = std::cos(DegToRad(20.0));
 
@@ -47,6 +52,7 @@ class ScanPlacer {
     ChooseBase();
     FindMounts();
     LeaveAmbiguousOdometry();
+    LeaveAbsurdOdometry();
     AgreeOnClock();
     PlaceScans();
     Examine();
@@ -156,6 +162,38 @@ class ScanPlacer {
     }
     log_->notes.push_back(note +
                           ": odometry is not used, since it may be another's");
+    LeaveOdometry();
+  }
+
+  // Odometry in millimetres or centimetres sends the map miles away. A jump is
+  // no matter: what counts is how fast the robot goes as a rule.
+  void LeaveAbsurdOdometry() {
+    std::vector<double> speeds;
+    for (std::size_t i = 1; i < scans_.size(); ++i) {
+      const double step =
+          static_cast<double>(scans_[i].stamp - scans_[i - 1].stamp) /
+          kNanoseconds;
+      const double way = (sources_.motion.At(scans_[i].stamp) -
+                          sources_.motion.At(scans_[i - 1].stamp))
+                             .head<2>()
+                             .norm();
+      if (step > 0.0 && way > kLeastWay) speeds.push_back(way / step);
+    }
+    if (speeds.size() < kFewestSpeeds) return;
+    const auto middle =
+        speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() / 2);
+    std::nth_element(speeds.begin(), middle, speeds.end());
+    if (*middle <= kMostSpeed) return;
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  " has the robot go at %.0f m/s, as of another unit than "
+                  "metres: it is not used",
+                  *middle);
+    log_->notes.push_back(log_->odometry_source + text);
+    LeaveOdometry();
+  }
+
+  void LeaveOdometry() {
     sources_.motion = BagMotion();
     sources_.clock_difference = sources_.recording_delay = 0;
     log_->yaw_rates.clear();

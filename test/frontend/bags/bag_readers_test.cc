@@ -775,6 +775,27 @@ TEST(BagLogTest, TransformsAndOdometryOfAnotherRobotAreNotUsed) {
   }
 }
 
+TEST(BagLogTest, OdometryInMillimetresIsNotUsed) {
+  const auto read = [](double metre, double jump) {
+    std::vector<BagRecord> records;
+    for (int i = 0; i < 40; ++i) {
+      const std::int64_t time = kBagStart + i * kSecond / 10;
+      records.push_back(OdometryRecord(
+          time, Pose2(metre * 0.1 * i + (i < 20 ? 0.0 : jump), 0.0, 0.0),
+          kRos1));
+      records.push_back(Record(PlainScan(time), kRos1));
+    }
+    return ReadBytes(MakeRosbag1(records));
+  };
+  EXPECT_EQ(read(1.0, 0.0).odometry_source, "/odom");
+  EXPECT_EQ(read(10.0, 1e5).odometry_source, "/odom");
+  const Log log = read(1000.0, 0.0);
+  EXPECT_EQ(log.odometry_source, "");
+  EXPECT_FALSE(log.has_odometry);
+  EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("/odom has the robot go"),
+                                        HasSubstr("1000 m/s"))));
+}
+
 TEST(BagLogTest, ListsWhatIsThereWhenThereIsNoScan) {
   std::vector<LogTopic> topics;
   LaserOptions options;

@@ -259,19 +259,31 @@ class SourceChooser {
     if (sources_.base.empty()) sources_.base = standing_base_;
   }
 
+  bool IsOdometryOf(const std::string& parent, const std::string& child) const {
+    std::string low = parent;
+    std::transform(low.begin(), low.end(), low.begin(),
+                   [](unsigned char c) { return std::tolower(c); });
+    return low.find("odom") != std::string::npos &&
+           messages_->tree.IsMoving(child);
+  }
+
   // The frames from the laser to the root, odom -> base -> ... -> laser, and
-  // where odometry ties in.
+  // where odometry ties in. If tf does not know the laser, as where nobody
+  // recorded what stands still, the only robot that there is will be its.
   void FindTransform() {
-    const std::vector<std::string> chain =
+    std::vector<std::string> chain =
         messages_->tree.ChainOf(messages_->scans.frames[0]);
-    for (std::size_t i = 1; i < chain.size(); ++i) {
-      std::string low = chain[i];
-      std::transform(low.begin(), low.end(), low.begin(),
-                     [](unsigned char c) { return std::tolower(c); });
-      if (low.find("odom") == std::string::npos ||
-          !messages_->tree.IsMoving(chain[i - 1])) {
-        continue;
+    if (chain.size() == 1) {
+      std::vector<std::string> robots;
+      for (const std::string& frame : messages_->tree.Frames()) {
+        const std::vector<std::string> above = messages_->tree.ChainOf(frame);
+        if (IsOdometryOf(above[1], frame)) robots.push_back(frame);
       }
+      if (robots.size() != 1) return;
+      chain = messages_->tree.ChainOf(robots[0]);
+    }
+    for (std::size_t i = 1; i < chain.size(); ++i) {
+      if (!IsOdometryOf(chain[i], chain[i - 1])) continue;
       transform_frame_ = chain[i];
       transform_base_ = chain[i - 1];
       for (const TransformTree::Sample& sample :

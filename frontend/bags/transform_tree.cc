@@ -101,6 +101,12 @@ void TransformTree::Sort() {
   }
 }
 
+std::vector<std::string> TransformTree::Frames() const {
+  std::vector<std::string> frames;
+  for (const auto& [child, edge] : edges_) frames.push_back(child);
+  return frames;
+}
+
 std::vector<std::string> TransformTree::ChainOf(
     const std::string& frame) const {
   std::vector<std::string> chain = {PlainFrameName(frame)};

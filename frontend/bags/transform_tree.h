@@ -56,6 +56,9 @@ class TransformTree {
   /// Puts what was added in the order of time. Call once all is in.
   void Sort();
 
+  /// All frames that have a parent.
+  std::vector<std::string> Frames() const;
+
   /// `frame`, its parent, and so on to the root.
   std::vector<std::string> ChainOf(const std::string& frame) const;
 

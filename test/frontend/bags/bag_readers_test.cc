@@ -775,6 +775,36 @@ TEST(BagLogTest, TransformsAndOdometryOfAnotherRobotAreNotUsed) {
   }
 }
 
+// What stands still is said once, and many recordings begin after that.
+TEST(BagLogTest, TransformsOfTheOnlyRobotAreThoseOfALaserThatTfDoesNotKnow) {
+  std::vector<BagRecord> records;
+  const auto add = [&](const std::string& robot) {
+    for (int i = 0; i < 10; ++i) {
+      records.push_back(
+          TfRecord(Transform(kBagStart + i * kSecond / 10, "odom" + robot,
+                             "base_link" + robot, Pose2(0.1 * i, 0.0, 0.0)),
+                   kRos1));
+    }
+  };
+  for (int i = 0; i < 10; ++i) {
+    const std::int64_t time = kBagStart + i * kSecond / 10;
+    records.push_back(Record(PlainScan(time), kRos1));
+    records.push_back(TfRecord(
+        Transform(time, "map", "odom", Pose2(0.3 * i, 0.0, 0.0)), kRos1));
+    records.push_back(TfRecord(
+        Transform(time, "base_link", "arm", Pose2(0.0, 0.1 * i, 0.0)), kRos1));
+  }
+  add("");
+  const Log log = ReadBytes(MakeRosbag1(records));
+  EXPECT_EQ(log.odometry_source, "tf odom -> base_link");
+  EXPECT_NEAR(log.scans[5].odometry[0], 0.5, 1e-9);
+  EXPECT_THAT(log.notes, Contains(AllOf(HasSubstr("'laser' is in 'base_link'"),
+                                        HasSubstr("robot's centre"))));
+  // Of two it could be either.
+  add("_of_another");
+  EXPECT_EQ(ReadBytes(MakeRosbag1(records)).odometry_source, "");
+}
+
 TEST(BagLogTest, OdometryInMillimetresIsNotUsed) {
   const auto read = [](double metre, double jump) {
     std::vector<BagRecord> records;

@@ -31,6 +31,8 @@ constexpr double kFarOdometry = 1.0;
 constexpr double kMostSpeed = 20.0;
 constexpr double kLeastWay = 0.02;
 constexpr std::size_t kFewestSpeeds = 20;
+// A smaller share of readings that are returns is worth a word.
+constexpr double kFewestReturns = 0.02;
 // cos of the angle by which a laser's plane may be out of level.
 const double kLevel = std::cos(DegToRad(20.0));
 
@@ -331,9 +333,27 @@ class ScanPlacer {
           " scans are more than 1 s from the next odometry: they are placed "
           "by what is nearest");
     }
+    NoteReturns(maker);
     impossible_sweeps_ = maker.impossible_sweeps();
     hasty_sweeps_ = maker.hasty_sweeps();
     undone_ = maker.undone();
+  }
+
+  // A map of hardly any returns is none, and does not say why.
+  void NoteReturns(const ScanMaker& maker) {
+    const auto readings = static_cast<double>(maker.readings());
+    if (static_cast<double>(maker.returns()) >= kFewestReturns * readings) {
+      return;
+    }
+    char text[200];
+    std::snprintf(
+        text, sizeof text, "%.2g %% of the readings are returns%s",
+        100.0 * static_cast<double>(maker.returns()) / readings,
+        2.0 * static_cast<double>(maker.beyond()) > readings
+            ? ": most lie beyond the maximum range, as if they were of "
+              "another unit than metres"
+            : "");
+    log_->notes.push_back(text);
   }
 
   void NoteMount(const LaserPlacement& mount, const std::string& frame) {

@@ -100,6 +100,9 @@ Scan ScanMaker::Make(const BagScan& raw, const LaserPlacement& mount,
     const bool is_return = range > 0.0f && range >= static_cast<float>(least) &&
                            range < scan.maximum_range - kMaximumRangeMargin;
     scan.ranges.push_back(is_return ? range : 0.0f);
+    ++readings_;
+    if (is_return) ++returns_;
+    if (std::isfinite(range) && range > scan.maximum_range) ++beyond_;
   }
   scan.start_angle = message.angle_min;
   scan.angle_step = message.angle_increment * static_cast<double>(stride);

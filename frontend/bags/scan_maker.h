@@ -41,6 +41,11 @@ class ScanMaker {
   /// one scan to the next, or a whole turn hardly any of that time.
   std::int64_t impossible_sweeps() const { return impossible_sweeps_; }
   std::int64_t hasty_sweeps() const { return hasty_sweeps_; }
+  /// Readings of all scans, those that are returns, and those beyond the
+  /// maximum range.
+  std::int64_t readings() const { return readings_; }
+  std::int64_t returns() const { return returns_; }
+  std::int64_t beyond() const { return beyond_; }
   /// Scans in which motion was undone.
   std::int64_t undone() const { return undone_; }
 
@@ -59,6 +64,9 @@ class ScanMaker {
   const BagMotion* motion_;
   // Median time between scans, s; 0 where nothing is known.
   double period_ = 0.0;
+  std::int64_t readings_ = 0;
+  std::int64_t returns_ = 0;
+  std::int64_t beyond_ = 0;
   std::int64_t impossible_sweeps_ = 0;
   std::int64_t hasty_sweeps_ = 0;
   std::int64_t undone_ = 0;

@@ -805,6 +805,19 @@ TEST(BagLogTest, TransformsOfTheOnlyRobotAreThoseOfALaserThatTfDoesNotKnow) {
   EXPECT_EQ(ReadBytes(MakeRosbag1(records)).odometry_source, "");
 }
 
+TEST(BagLogTest, ScansWithoutReturnsAreSaid) {
+  const auto notes = [](float scale) {
+    LaserScanMessage scan = PlainScan(kBagStart);
+    for (float& range : scan.ranges) range *= scale;
+    return ReadBytes(MakeRosbag1({Record(scan, kRos1)})).notes;
+  };
+  EXPECT_THAT(notes(1.0f), Not(Contains(HasSubstr("are returns"))));
+  EXPECT_THAT(notes(0.0f), Contains("0 % of the readings are returns"));
+  // In millimetres.
+  EXPECT_THAT(notes(1000.0f), Contains(AllOf(HasSubstr("0 % of the readings"),
+                                             HasSubstr("another unit"))));
+}
+
 TEST(BagLogTest, OdometryInMillimetresIsNotUsed) {
   const auto read = [](double metre, double jump) {
     std::vector<BagRecord> records;

@@ -133,8 +133,11 @@ double CourseOf(const std::vector<Step>& steps, const std::vector<Scan>& scans,
         Between(scans[begin].odometry, scans[end].odometry);
     const Pose2 by_map = Between(trajectory[begin], trajectory[end]);
     if (std::abs(by_odometry[2]) > options.straight) continue;
-    along += by_odometry.head<2>().dot(by_map.head<2>());
-    aside += by_odometry[0] * by_map[1] - by_odometry[1] * by_map[0];
+    // A robot that was carried went far in the map and nowhere by odometry:
+    // that is one step of many.
+    const Eigen::Vector2d direction = by_map.head<2>().normalized();
+    along += by_odometry.head<2>().dot(direction);
+    aside += by_odometry[0] * direction[1] - by_odometry[1] * direction[0];
   }
   return std::atan2(aside, along);
 }

@@ -25,7 +25,7 @@ struct OdometryCheckOptions {
   /// this far from odometry's in its own frame, rad, where it goes straight on:
   /// turns by less than this between two scans that are looked at, rad.
   double min_way = 10.0;
-  double max_course = 0.35;
+  double max_course = 0.12;
   double straight = 0.3;
   /// Scans that turn the other way than odometry do so in all turns between
   /// scans of this much and more, rad: the correlation is below minus this, and

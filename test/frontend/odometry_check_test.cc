@@ -112,6 +112,26 @@ TEST(OdometryCheckTest, AWayToTheSideIsTold) {
   EXPECT_FALSE(Compare(scans, poses).is_course_disputed);
 }
 
+// By as little as a bracket may be bent, and not where the robot is carried
+// once while odometry has it going on.
+TEST(OdometryCheckTest, AWayALittleToTheSideIsTold) {
+  const std::vector<Pose2> poses = Squares(6);
+  const std::vector<Scan> scans =
+      ScansWithOdometry(poses, Pose2(1.0, 1.0, 1.0));
+  for (const double askew : {0.17, -0.17}) {
+    std::vector<Pose2> map = poses;
+    for (Pose2& pose : map) pose[2] = NormalizeAngle(pose[2] + askew);
+    const OdometryAgreement agreement = Compare(scans, map);
+    EXPECT_NEAR(agreement.course, -askew, 0.01);
+    EXPECT_TRUE(agreement.is_course_disputed);
+  }
+  std::vector<Pose2> map = poses;
+  for (std::size_t i = map.size() / 2; i < map.size(); ++i) {
+    map[i].head<2>() += Eigen::Vector2d(30.0, 100.0);
+  }
+  EXPECT_FALSE(Compare(scans, map).is_course_disputed);
+}
+
 TEST(OdometryCheckTest, JumpsOfOdometrySayNothing) {
   const std::vector<Pose2> poses = Squares(6);
   std::vector<Scan> scans = ScansWithOdometry(poses, Pose2(1.0, 1.0, 1.0));

@@ -143,6 +143,28 @@ TEST_F(FormatsTest, Ros2Folder) {
   EXPECT_EQ(log.scans.size(), carmen_.scans.size());
 }
 
+TEST_F(FormatsTest, Ros2FolderOfSeveralMcapFiles) {
+  const std::vector<BagRecord> messages =
+      SimulatedMessages(Drive(), Laser(), kCdr);
+  const Folder folder;
+  fs::create_directories(folder / "bag");
+  std::string description =
+      "rosbag2_bagfile_information:\n  storage_identifier: mcap\n"
+      "  relative_file_paths:\n";
+  // Names that are no longer in order when there are eleven.
+  for (std::size_t i = 0; i < 11; ++i) {
+    const std::string name = "bag_" + std::to_string(i) + ".mcap";
+    description += "    - " + name + '\n';
+    const auto cut = [&](std::size_t k) {
+      return messages.begin() +
+             static_cast<std::ptrdiff_t>(messages.size() * k / 11);
+    };
+    WriteText(folder / ("bag/" + name), MakeMcap({cut(i), cut(i + 1)}));
+  }
+  WriteText(folder / "bag/metadata.yaml", description);
+  ExpectSame(ReadPath(folder / "bag"));
+}
+
 // Of several echoes the first is meant, and a beam without any is no return.
 TEST_F(FormatsTest, MultiEcho) {
   for (const MessageEncoding encoding : {kRos1, kCdr}) {

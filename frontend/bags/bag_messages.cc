@@ -166,6 +166,9 @@ class Collector {
           *why = "has a turn rate that is not finite";
           return false;
         }
+        if (stream->rates.empty()) {
+          stream->frame = PlainFrameName(imu.header.frame);
+        }
         stream->rates.push_back({imu.header.stamp, message.time, imu.yaw_rate});
         return true;
       }

@@ -95,7 +95,8 @@ struct BagStream {
   LogTopic seen;
   /// When its last message was recorded.
   std::int64_t last_time = 0;
-  /// Frames of an odometry topic: that of the poses, and the robot's.
+  /// Frames of an odometry topic: that of the poses, and the robot's. Of an
+  /// IMU's: its own.
   std::string frame;
   std::string child_frame;
   /// Messages of an odometry topic.

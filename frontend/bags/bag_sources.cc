@@ -423,17 +423,7 @@ class SourceChooser {
 
   template <typename Align>
   void TakeYawRates(const Align& align) {
-    BagStream* chosen = nullptr;
-    for (BagStream& stream : messages_->streams) {
-      if (stream.kind != BagTopicKind::kImu || stream.rates.empty()) continue;
-      if (chosen == nullptr || stream.rates.size() > chosen->rates.size()) {
-        if (chosen != nullptr)
-          chosen->seen.why_not = "another has more messages";
-        chosen = &stream;
-      } else {
-        stream.seen.why_not = "another has more messages";
-      }
-    }
+    BagStream* const chosen = ChooseImu(messages_);
     if (chosen == nullptr) return;
     align(chosen->seen.name, &chosen->rates);
     std::stable_sort(chosen->rates.begin(), chosen->rates.end(),

@@ -39,21 +39,27 @@ std::size_t StrideOf(std::size_t count) {
 
 enum class Attitude { kUnknown, kLevel, kTilted };
 
+// Of a frame against the highest one above it.
+Attitude AttitudeAt(const std::string& frame, std::int64_t time,
+                    const TransformTree& tree) {
+  const std::vector<std::string> chain = tree.ChainOf(frame);
+  Pose3 pose;
+  if (chain.size() < 2 || !tree.Lookup(chain.back(), frame, time, &pose)) {
+    return Attitude::kUnknown;
+  }
+  return std::abs(pose.rotation.toRotationMatrix()(2, 2)) < kLevel
+             ? Attitude::kTilted
+             : Attitude::kLevel;
+}
+
 // Whether a laser looks level all the time: one that is tilted up and down
 // does now and then.
 Attitude AttitudeOf(const BagScanSet& set, const TransformTree& tree) {
   for (std::size_t i = 0; i < set.list.size(); i += StrideOf(set.list.size())) {
     const BagScan& scan = set.list[i];
-    const std::string& frame = set.frames[scan.frame];
-    const std::vector<std::string> chain = tree.ChainOf(frame);
-    Pose3 pose;
-    if (chain.size() < 2 ||
-        !tree.Lookup(chain.back(), frame, scan.stamp, &pose)) {
-      return Attitude::kUnknown;
-    }
-    if (std::abs(pose.rotation.toRotationMatrix()(2, 2)) < kLevel) {
-      return Attitude::kTilted;
-    }
+    const Attitude attitude =
+        AttitudeAt(set.frames[scan.frame], scan.stamp, tree);
+    if (attitude != Attitude::kLevel) return attitude;
   }
   return Attitude::kLevel;
 }
@@ -242,6 +248,30 @@ std::vector<std::size_t> OdometryTopicsThatMayBeMeant(
         "tf has the poses of " + messages->streams[best].seen.name;
   }
   return {best};
+}
+
+BagStream* ChooseImu(BagMessages* messages) {
+  BagStream* chosen = nullptr;
+  bool is_chosen_tilted = false;
+  for (BagStream& stream : messages->streams) {
+    if (stream.kind != BagTopicKind::kImu || stream.rates.empty()) continue;
+    const bool is_tilted = AttitudeAt(stream.frame, stream.rates.front().stamp,
+                                      messages->tree) == Attitude::kTilted;
+    const bool is_better =
+        chosen == nullptr || (is_tilted != is_chosen_tilted
+                                  ? is_chosen_tilted
+                                  : stream.rates.size() > chosen->rates.size());
+    BagStream* const other = is_better ? chosen : &stream;
+    if (other != nullptr) {
+      other->seen.why_not = is_tilted != is_chosen_tilted
+                                ? "it is tilted, and another is not"
+                                : "another has more messages";
+    }
+    if (!is_better) continue;
+    chosen = &stream;
+    is_chosen_tilted = is_tilted;
+  }
+  return chosen;
 }
 
 }  // namespace plumbline

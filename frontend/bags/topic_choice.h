@@ -29,6 +29,12 @@ std::vector<std::size_t> OdometryTopicsThatMayBeMeant(
     const std::vector<std::size_t>& topics, const std::string& scan_topic,
     const std::vector<BagPose>& transform, BagMessages* messages);
 
+/// The topic whose turn rates are taken: of an IMU that lies level by tf, or of
+/// which tf does not tell, rather than of one that does not, as those of
+/// cameras do; of several the one with the most messages. Null where there is
+/// none.
+BagStream* ChooseImu(BagMessages* messages);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_FRONTEND_BAGS_TOPIC_CHOICE_H_

@@ -1253,6 +1253,41 @@ TEST(BagLogTest, YawRatesServeWhereThereIsNoOdometry) {
   EXPECT_EQ(log.yaw_rate_source, "/imu");
 }
 
+// The sensor of a camera stands on its side, and says more.
+TEST(BagLogTest, YawRatesAreThoseOfASensorThatLiesLevel) {
+  for (const bool is_known : {true, false}) {
+    std::vector<BagRecord> records;
+    if (is_known) {
+      for (const char* frame : {"camera", "imu"}) {
+        TransformMessage mount =
+            Transform(kBagStart, "base_link", frame, Pose2::Zero());
+        if (frame == std::string("camera")) {
+          mount.transform.qx = mount.transform.qw = std::sqrt(0.5);
+        }
+        records.push_back(TfRecord(mount, kCdr, "/tf_static"));
+      }
+    }
+    for (int i = 0; i < 10; ++i) {
+      for (const char* frame : {"camera", "imu"}) {
+        if (frame == std::string("imu") && i % 2 == 1) continue;
+        ImuMessage imu;
+        imu.header = {kBagStart + i * kSecond / 10, frame};
+        imu.yaw_rate = 0.1 * i;
+        records.push_back({std::string("/") + frame + "/data",
+                           "sensor_msgs/Imu", imu.header.stamp,
+                           EncodeImu(imu, kCdr)});
+      }
+      records.push_back(Record(PlainScan(kBagStart + i * kSecond / 10), kCdr));
+    }
+    const Log log = ReadBytes(MakeMcap(records));
+    EXPECT_EQ(log.yaw_rate_source, is_known ? "/imu/data" : "/camera/data");
+    EXPECT_EQ(log.yaw_rates.size(), is_known ? 5u : 10u);
+    EXPECT_THAT(log.topics,
+                Contains(Field(&LogTopic::why_not,
+                               HasSubstr(is_known ? "tilted" : "more"))));
+  }
+}
+
 // Bad input.
 
 TEST(BadBagTest, OldVersionIsRefusedByName) {

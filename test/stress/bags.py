@@ -222,6 +222,11 @@ def parse():
                         help="tf_static is recorded last")
     parser.add_argument("--point_cloud", action="store_true",
                         help="scans are of type PointCloud2")
+    parser.add_argument("--multi_echo", action="store_true",
+                        help="scans are of type MultiEchoLaserScan, some beams "
+                        "with two echoes")
+    parser.add_argument("--sweep_said", type=float,
+                        help="that messages state, s, in place of the true one")
     parser.add_argument("--files", type=int, default=1,
                         help="that the bag is split into")
     parser.add_argument("--out_of_order", type=float, default=0.0,
@@ -293,15 +298,27 @@ def main():
         if options.bits > noise_of_order.random():
             ranges = ranges[:2]
         count = len(ranges)
+        increment = per_beam if options.time_increment else 0.0
+        if options.sweep_said is not None:
+            increment = options.sweep_said / beams
         message.put("f", start, start + step * (count - 1), step,
-                    per_beam if options.time_increment else 0.0, period, 0.15,
+                    increment, period, 0.15,
                     options.reach if options.range_max is None
                     else options.range_max)
-        message.put("I", count).numbers("f", ranges).put("I", 0)
+        message.put("I", count)
+        if options.multi_echo:
+            for i, value in enumerate(ranges):
+                echoes = [value, value + 0.5][:1 + (i % 5 == 0)]
+                echoes = echoes if np.isfinite(value) else []
+                message.put("I", len(echoes)).put("f", *echoes)
+        else:
+            message.numbers("f", ranges)
+        message.put("I", 0)
         late = period + 0.01 + options.scan_delay
         if options.out_of_order > noise_of_order.random():
             late += 1.5 * period
-        kind = "PointCloud2" if options.point_cloud else "LaserScan"
+        kind = ("PointCloud2" if options.point_cloud else
+                "MultiEchoLaserScan" if options.multi_echo else "LaserScan")
         bag.add(time + late, topic, "sensor_msgs/msg/" + kind, message)
         if options.twice > noise_of_order.random():
             bag.add(time + late + 0.001, topic, "sensor_msgs/msg/" + kind,

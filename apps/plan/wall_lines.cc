@@ -24,6 +24,18 @@ constexpr double kLargestBend = DegToRad(25.0);
 // What lies on one side of a wall, bent as the map is, is no farther apart than
 // this, m.
 constexpr double kOneSide = 0.2;
+// Two parts of one straight wall are offset by no more than this, m, and lie
+// beside each other along no more than that.
+constexpr double kInLineOffset = 0.1;
+constexpr double kInLineOverlap = 0.5;
+// The two faces of a thick wall lie beside each other along so much, m, and
+// this share of the shorter one. Along no more than this share of that may
+// anything look free between them: laser points go astray. And beside either
+// the other one is seen along no more than this, m.
+constexpr double kLongFace = 3.0;
+constexpr double kFacingEachOther = 0.6;
+constexpr double kSeenThrough = 0.1;
+constexpr double kBesideCupboards = 0.3;
 // Free cells before a face begin within this many cells of it, and lie beside
 // this share of a face that was seen from there.
 constexpr int kCellsBefore = 3;
@@ -339,6 +351,145 @@ void Add(const Face& face, Group* group) {
   line.high -= middle;
 }
 
+// Whether two groups are one straight wall: one goes on where the other one
+// ends. Each began with a long piece of its own, and shorter ones between them
+// went to either.
+bool AreInLine(const Group& a, const Group& b, const WallLineOptions& options) {
+  if (a.direction != b.direction ||
+      (a.direction < 0 && std::abs(a.line.along.dot(b.line.along)) <
+                              std::cos(options.same_direction))) {
+    return false;
+  }
+  const WallLine& line = a.line;
+  double low = line.low;
+  double high = line.high;
+  double begin = line.Along(b.faces.front().begin);
+  double end = begin;
+  for (const Face& face : b.faces) {
+    const double across =
+        0.5 * (line.Across(face.begin) + line.Across(face.end));
+    low = std::min(low, across);
+    high = std::max(high, across);
+    for (const Vector2d& at : {face.begin, face.end}) {
+      begin = std::min(begin, line.Along(at));
+      end = std::max(end, line.Along(at));
+    }
+  }
+  const double gap = std::max(begin - line.end, line.begin - end);
+  if (gap > options.in_line_gap || gap < -kInLineOverlap ||
+      high - low > options.max_thickness ||
+      high - low > kInLineOffset + std::max(line.high - line.low,
+                                            b.line.high - b.line.low)) {
+    return false;
+  }
+  return std::all_of(a.faces.begin(), a.faces.end(), [&](const Face& face) {
+    return std::all_of(b.faces.begin(), b.faces.end(), [&](const Face& other) {
+      return AreOneWall(line, face, other);
+    });
+  });
+}
+
+// Makes one group of those that are one straight wall.
+void JoinInLine(const WallLineOptions& options, std::vector<Group>* groups) {
+  for (std::size_t i = 0; i < groups->size(); ++i) {
+    for (std::size_t j = i + 1; j < groups->size();) {
+      if (!AreInLine((*groups)[i], (*groups)[j], options)) {
+        ++j;
+        continue;
+      }
+      for (const Face& face : (*groups)[j].faces) Add(face, &(*groups)[i]);
+      groups->erase(groups->begin() + static_cast<std::ptrdiff_t>(j));
+      // It reaches farther now.
+      j = i + 1;
+    }
+  }
+}
+
+// Whether two groups are the faces of one thick wall: each is seen from its own
+// side only, they face each other, and nothing was seen between them where they
+// do. Cupboards before a wall end somewhere, and the wall is seen beside them.
+bool AreThickWall(const Group& a, const Group& b, const SpaceGrid& space,
+                  const WallLineOptions& options) {
+  if (a.direction < 0 || a.direction != b.direction) return false;
+  const WallLine& line = a.line;
+  double low = line.Across(b.faces.front().begin);
+  double high = low;
+  double begin = line.begin;
+  double end = line.end;
+  for (const Face& face : b.faces) {
+    for (const Vector2d& at : {face.begin, face.end}) {
+      low = std::min(low, line.Across(at));
+      high = std::max(high, line.Across(at));
+      begin = std::min(begin, line.Along(at));
+      end = std::max(end, line.Along(at));
+    }
+  }
+  if (std::max(high, line.high) - std::min(low, line.low) >
+          options.thickest_solid ||
+      std::min(b.line.weight, line.weight) < kLongFace ||
+      !std::all_of(a.faces.begin(), a.faces.end(), [&](const Face& face) {
+        return std::all_of(
+            b.faces.begin(), b.faces.end(),
+            [&](const Face& other) { return AreOneWall(line, face, other); });
+      })) {
+    return false;
+  }
+  const double from = std::min(high, line.high) + options.cell_distance;
+  const double to = std::max(low, line.low) - options.cell_distance;
+  double both = 0.0;
+  double seen_through = 0.0;
+  double beside_a = 0.0;
+  double beside_b = 0.0;
+  const double step = space.resolution;
+  for (double t = begin; t < end; t += step) {
+    const auto at = [&](double v) {
+      return space.At(Vector2d(line.At(t) + v * line.normal()));
+    };
+    const auto has_face = [&](double first, double last) {
+      for (double v = first - options.cell_distance;
+           v <= last + options.cell_distance; v += step) {
+        if (at(v) == Space::kOccupied) return true;
+      }
+      return false;
+    };
+    int all = 0;
+    int free = 0;
+    for (double v = from; v <= to; v += step) {
+      ++all;
+      free += at(v) == Space::kFree;
+    }
+    const bool has_a = has_face(line.low, line.high);
+    const bool has_b = has_face(low, high);
+    if (has_a && has_b) {
+      both += step;
+      if (free > 0) seen_through += step;
+    } else if (all > 0 && free == all) {
+      if (has_a) beside_b += step;
+      if (has_b) beside_a += step;
+    }
+  }
+  return both >= std::max(
+                     kLongFace,
+                     kFacingEachOther * std::min(line.weight, b.line.weight)) &&
+         seen_through <= kSeenThrough * both &&
+         std::max(beside_a, beside_b) <= kBesideCupboards;
+}
+
+// Makes one group of the two faces of a thick wall.
+void JoinThickWalls(const SpaceGrid& space, const WallLineOptions& options,
+                    std::vector<Group>* groups) {
+  for (std::size_t i = 0; i < groups->size(); ++i) {
+    for (std::size_t j = i + 1; j < groups->size();) {
+      if (!AreThickWall((*groups)[i], (*groups)[j], space, options)) {
+        ++j;
+        continue;
+      }
+      for (const Face& face : (*groups)[j].faces) Add(face, &(*groups)[i]);
+      groups->erase(groups->begin() + static_cast<std::ptrdiff_t>(j));
+    }
+  }
+}
+
 // Whether one line goes on where the other one ends, as chords of a curved wall
 // do.
 bool GoesOn(const WallLine& a, const WallLine& b) {
@@ -428,6 +579,8 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
     }
     Add(face, &groups[static_cast<std::size_t>(best)]);
   }
+  JoinInLine(options, &groups);
+  JoinThickWalls(space, options, &groups);
   std::vector<WallLine> lines;
   lines.reserve(groups.size());
   for (const Group& group : groups) lines.push_back(group.line);

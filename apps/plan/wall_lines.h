@@ -29,6 +29,9 @@ struct WallLineOptions {
   double cell_distance = 0.1;
   /// Faces of one wall are no farther apart, m: the thickest wall.
   double max_thickness = 0.3;
+  /// The same for two faces that are each seen from outside of it only, along
+  /// most of the shorter one, with nothing seen between them, m.
+  double thickest_solid = 0.8;
   /// Pieces in line with a longer gap than this, m, are on lines of their own.
   double in_line_gap = 4.0;
 };

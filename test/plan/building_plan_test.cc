@@ -302,6 +302,64 @@ TEST(BuildingPlanTest, AWideOpeningJoins) {
 
 // An office that is open to a hall along half of its front is a room when the
 // wall of the front goes on beside it, and a part of the hall when it does not.
+// A long wall between piers: its ends are long pieces too far from each other,
+// and what is between them goes to either.
+TEST(BuildingPlanTest, AWallBetweenPiersIsOneLine) {
+  Drawing drawing(22.0, 12.0);
+  drawing.Room(1.0, 1.0, 20.0, 9.0);
+  for (const double pier : {7.0, 10.4, 14.0}) {
+    drawing.Fill(pier, 0.9, pier + 0.6, 1.3, Space::kUnknown);
+    drawing.Fill(pier, 1.3, pier + 0.6, 1.6, Space::kOccupied);
+  }
+  // A little off, as in a map.
+  for (const double begin : {11.0, 14.6}) {
+    const double end = begin < 14.0 ? 14.0 : 20.0;
+    drawing.Free(begin, 0.9, end, 1.0);
+    drawing.Fill(begin, 0.85, end, 0.9, Space::kOccupied);
+  }
+  int along_it = 0;
+  for (const WallLine& line : FindWallLines({}, {0.0}, drawing.space())) {
+    along_it += line.weight > 2.0 && std::abs(line.along[0]) > 0.9 &&
+                std::abs(line.Across({10.0, 1.0})) < 0.2;
+  }
+  EXPECT_EQ(along_it, 1);
+  const BuildingPlan plan = PlanOf(drawing);
+  ASSERT_EQ(plan.rooms.size(), 1u);
+  EXPECT_NEAR(plan.rooms[0].area, 19.0 * 8.0, 3.0);
+}
+
+// Two rooms with 0.5 m of wall between them, and a passage through it. Where
+// `beside` m of the wall are seen beside what stands before it on the right, it
+// is furniture that makes it so thick.
+Drawing RoomsWithAThickWall(double beside) {
+  Drawing drawing(16.0, 9.0);
+  drawing.Room(1.0, 1.0, 7.0, 7.0).Room(7.5, 1.0, 14.0, 7.0);
+  if (beside > 0.0) {
+    drawing.Room(7.1, 7.0 - beside, 8.0, 7.0).Free(8.0, 6.0 - beside, 9.0, 7.0);
+  }
+  drawing.Fill(6.95, 2.0, 7.55, 3.0, Space::kOccupied);
+  drawing.Free(6.95, 2.05, 7.55, 2.95);
+  return drawing;
+}
+
+TEST(BuildingPlanTest, AThickWallIsOneWall) {
+  const BuildingPlan plan = PlanOf(RoomsWithAThickWall(0.0));
+  ASSERT_EQ(plan.rooms.size(), 2u);
+  EXPECT_NEAR(plan.rooms[0].area, 6.5 * 6.0, 0.8);
+  EXPECT_NEAR(plan.rooms[1].area, 6.0 * 6.0, 0.8);
+  ASSERT_EQ(plan.doors.size(), 1u);
+  EXPECT_NEAR(plan.doors[0].begin[0], 7.25, 0.06);
+  EXPECT_NEAR(plan.doors[0].thickness, 0.55, 0.1);
+  EXPECT_NEAR(plan.doors[0].width(), 0.9, 0.11);
+}
+
+TEST(BuildingPlanTest, CupboardsBeforeAWallDoNotMakeItThick) {
+  for (const WallLine& line :
+       FindWallLines({}, {0.0}, RoomsWithAThickWall(0.9).space())) {
+    EXPECT_LT(line.high - line.low, 0.31);
+  }
+}
+
 TEST(BuildingPlanTest, AnOpenFrontInALongWallKeepsAnOfficeApart) {
   const auto plan = [](double begin) {
     Drawing drawing(16.0, 14.0);

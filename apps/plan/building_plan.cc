@@ -2,6 +2,7 @@
 #include <plumbline/plan/arrangement.h>
 #include <plumbline/plan/building_plan.h>
 #include <plumbline/plan/drawn_lines.h>
+#include <plumbline/plan/free_standing.h>
 #include <plumbline/plan/furniture_rows.h>
 #include <plumbline/plan/room_shape.h>
 #include <plumbline/plan/rooms_with_doors.h>
@@ -30,6 +31,9 @@ constexpr double kLongestJog = 1.0;
 // A wide opening is a door when the wall between the two rooms goes on beside
 // it for so many samples.
 constexpr int kLeastJamb = 6;
+// So many samples of a line are wall beside an opening, more than those where
+// another wall meets it.
+constexpr int kLeastOwnJamb = 5;
 // What stands along a wall leaves less free space behind it than this, m; and
 // how many rays to each side look for it.
 constexpr double kDeeperThanFurniture = 1.0;
@@ -55,6 +59,11 @@ constexpr double kLeastWay = 0.25;
 constexpr double kWholeWidth = 0.6;
 // Doors between the same rooms nearer to each other than this are one, m.
 constexpr double kSameDoor = 0.8;
+// Doors at both ends of a passage through a wall face each other, by a cosine,
+// so far from each other at most, m, and so far aside, m.
+constexpr double kFacing = 0.95;
+constexpr double kDeepestPassage = 2.0;
+constexpr double kOffsetInPassage = 0.3;
 // Walls with nearly one direction, by its cosine, whose middles are so near to
 // each other, m, along so much, m, are one; what is left of the shorter one is
 // a wall from this length on, m.
@@ -322,6 +331,8 @@ Division Divide(std::vector<DrawnLine> drawn, const SpaceGrid& space,
   division.region = FindRegions(division.arrangement, options.regions);
   JoinAcrossFurniture(division.arrangement, division.drawn, path,
                       &division.region);
+  JoinAcrossFreeStanding(space, division.arrangement, division.drawn,
+                         &division.region);
   return division;
 }
 
@@ -435,6 +446,22 @@ bool HasJamb(const Sides& sides, const std::vector<bool>& is_open, int first,
          has_wall(last, last + 2 * kLeastJamb);
 }
 
+// Whether an opening, from sample `first` to `last` (not included), has a piece
+// of its own wall on both sides, and not the wall across its end on one: beside
+// the end of a bed or of a shelf there is a gap up to the wall.
+bool HasBothJambs(const WallProfile& profile, int first, int last) {
+  const auto wall = [&](int from, int step) {
+    int count = 0;
+    for (int k = from; k >= 0 && k < profile.size() && count < kLeastOwnJamb &&
+                       profile.At(k) == Mark::kWall;
+         k += step) {
+      ++count;
+    }
+    return count >= kLeastOwnJamb;
+  };
+  return wall(first - 1, -1) && wall(last, 1);
+}
+
 // Walls and doors along a line.
 void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
               const BuildingPlanOptions& options, BuildingPlan* plan) {
@@ -503,6 +530,10 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
     const bool is_door =
         has_both ||
         LeadsSomewhere(on, i, j, door.rooms[0] >= 0 ? -1 : 1, space);
+    if (!has_both && is_door && !HasBothJambs(on.profile, i, j)) {
+      i = j;
+      continue;
+    }
     if (is_between && is_door && door.width() >= options.min_door &&
         door.width() <= (!has_both ? options.doors.narrow
                          : on.profile.marks[middle] == Mark::kDoor
@@ -577,6 +608,58 @@ void DropDoubleDoors(std::vector<PlanDoor>* doors) {
     if (!is_double) kept.push_back(door);
   }
   *doors = std::move(kept);
+}
+
+// Makes one door of two that face each other through a thick wall, each between
+// a room and the passage, which is too small to be one.
+void JoinDoorsOfPassages(const SpaceGrid& space, std::vector<PlanDoor>* doors) {
+  const auto middle = [](const PlanDoor& door) {
+    return Vector2d(0.5 * (door.begin + door.end));
+  };
+  // Where the passage lies: 0 left, 1 right, -1: it is no such door.
+  const auto side_of_passage = [](const PlanDoor& door) {
+    if ((door.rooms[0] < 0) == (door.rooms[1] < 0)) return -1;
+    return door.rooms[0] < 0 ? 0 : 1;
+  };
+  const auto to_passage = [&](const PlanDoor& door) {
+    const Vector2d along = (door.end - door.begin).normalized();
+    const Vector2d left(-along[1], along[0]);
+    return Vector2d(side_of_passage(door) == 0 ? left : Vector2d(-left));
+  };
+  const auto are_one = [&](const PlanDoor& a, const PlanDoor& b) {
+    if (side_of_passage(a) < 0 || side_of_passage(b) < 0) return false;
+    const Vector2d way = middle(b) - middle(a);
+    const Vector2d through = to_passage(a);
+    if (through.dot(to_passage(b)) > -kFacing ||
+        through.dot(way) > kDeepestPassage || through.dot(way) <= 0.0 ||
+        (way - through.dot(way) * through).norm() > kOffsetInPassage) {
+      return false;
+    }
+    const double length = way.norm();
+    for (double t = 0.0; t < length; t += 0.5 * space.resolution) {
+      if (space.At(Vector2d(middle(a) + t / length * way)) != Space::kFree) {
+        return false;
+      }
+    }
+    return true;
+  };
+  for (std::size_t i = 0; i < doors->size(); ++i) {
+    for (std::size_t j = i + 1; j < doors->size(); ++j) {
+      PlanDoor& door = (*doors)[i];
+      const PlanDoor& other = (*doors)[j];
+      if (!are_one(door, other)) continue;
+      const int side = side_of_passage(door);
+      door.rooms[static_cast<std::size_t>(side)] =
+          other.rooms[static_cast<std::size_t>(1 - side_of_passage(other))];
+      door.thickness = (middle(other) - middle(door)).norm();
+      const bool is_reversed =
+          (door.end - door.begin).dot(other.end - other.begin) < 0.0;
+      door.begin = 0.5 * (door.begin + (is_reversed ? other.end : other.begin));
+      door.end = 0.5 * (door.end + (is_reversed ? other.begin : other.end));
+      doors->erase(doors->begin() + static_cast<std::ptrdiff_t>(j));
+      break;
+    }
+  }
 }
 
 // Marks the rooms that the robot was in; returns whether it was in one of them
@@ -763,6 +846,7 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
   }
   plan.walls = WithoutDoubles(plan.walls);
   DropDoubleDoors(&plan.doors);
+  JoinDoorsOfPassages(space, &plan.doors);
   TakePath(path, &plan);
   return plan;
 }

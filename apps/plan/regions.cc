@@ -29,6 +29,8 @@ constexpr double kLongestFurniture = 2.5;
 constexpr double kLeastDepth = 0.3;
 constexpr double kGoesOn = 0.3;
 constexpr double kSeenOfIt = 0.25;
+// Rows of racks and benches in a hall are narrower than this, m.
+constexpr double kWidestRow = 2.5;
 // Share of the border of what lies within a wall, between two rooms; and of
 // walls on the border, with what is no room, of what stands behind furniture.
 constexpr double kWithinRooms = 0.7;
@@ -490,7 +492,8 @@ std::vector<char> WideFaces(const Arrangement& arrangement,
       outline.holes.erase(
           std::remove_if(outline.holes.begin(), outline.holes.end(),
                          [](const Ring& hole) {
-                           return std::abs(SignedArea(hole)) <= kMaxPocket;
+                           return std::abs(SignedArea(hole)) <= kMaxPocket ||
+                                  IsNarrow(Polygon{hole, {}}, kWidestRow);
                          }),
           outline.holes.end());
       for (const Polygon& core : Offset(outline, -0.5 * width)) {

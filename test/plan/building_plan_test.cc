@@ -360,6 +360,75 @@ TEST(BuildingPlanTest, CupboardsBeforeAWallDoNotMakeItThick) {
   }
 }
 
+TEST(BuildingPlanTest, APassageThroughAVeryThickWallIsOneDoor) {
+  Drawing drawing(18.0, 9.0);
+  drawing.Room(1.0, 1.0, 7.0, 7.0).Room(8.3, 1.0, 14.0, 7.0);
+  drawing.Fill(6.95, 2.0, 8.35, 3.0, Space::kOccupied);
+  drawing.Free(6.95, 2.05, 8.35, 2.95);
+  const BuildingPlan plan =
+      PlanOf(drawing, {Pose2(4.0, 2.5, 0.0), Pose2(10.0, 2.5, 0.0)});
+  ASSERT_EQ(plan.rooms.size(), 2u);
+  ASSERT_EQ(plan.doors.size(), 1u);
+  const PlanDoor& door = plan.doors[0];
+  EXPECT_NEAR(door.begin[0], 7.65, 0.1);
+  EXPECT_NEAR(door.end[0], 7.65, 0.1);
+  EXPECT_NEAR(door.width(), 0.9, 0.11);
+  EXPECT_NEAR(door.thickness, 1.3, 0.15);
+  EXPECT_TRUE(door.is_driven);
+  // Left and right of begin to end.
+  const bool is_upwards = door.end[1] > door.begin[1];
+  ASSERT_GE(std::min(door.rooms[0], door.rooms[1]), 0);
+  const PlanRoom& left = plan.rooms[static_cast<std::size_t>(door.rooms[0])];
+  EXPECT_EQ(left.outline.Contains({4.0, 4.0}), is_upwards);
+  EXPECT_EQ(plan.rooms[0].neighbors.size(), 1u);
+}
+
+// A bed of 3 by 3 m stands at a wall; `gap` m between it and the next wall.
+BuildingPlan RoomWithABed(double gap) {
+  Drawing drawing(12.0, 12.0);
+  drawing.Room(1.0, 1.0, 9.0, 6.0 + gap);
+  drawing.Fill(6.0, 3.0, 9.2, 6.2 + gap, Space::kUnknown);
+  drawing.Fill(6.0, 3.0, 9.0, 3.05, Space::kOccupied);
+  drawing.Fill(6.0, 3.0, 6.05, 6.0, Space::kOccupied);
+  drawing.Fill(6.0, 6.0, 7.6, 6.05, Space::kOccupied);
+  drawing.Free(6.0, 6.05, 7.6, 6.0 + gap);
+  drawing.Fill(6.0, 6.0 + gap, 7.6, 6.05 + gap, Space::kOccupied);
+  return PlanOf(drawing);
+}
+
+TEST(BuildingPlanTest, AGapBesideABedIsNoDoor) {
+  const BuildingPlan plan = RoomWithABed(1.0);
+  EXPECT_EQ(plan.rooms.size(), 1u);
+  EXPECT_TRUE(plan.doors.empty());
+}
+
+TEST(BuildingPlanTest, RowsOfRacksDoNotDivideAHall) {
+  Drawing drawing(32.0, 18.0);
+  drawing.Room(1.0, 1.0, 30.0, 16.0);
+  for (const double low : {3.4, 6.8, 10.2, 13.4}) {
+    drawing.Fill(5.0, low, 26.0, low + 1.0, Space::kOccupied);
+    drawing.Fill(5.05, low + 0.05, 25.95, low + 0.95, Space::kUnknown);
+  }
+  EXPECT_EQ(PlanOf(drawing).rooms.size(), 1u);
+}
+
+// Two screens of 2.8 m across a room, with gaps of `gap` between and beside
+// them.
+std::size_t RoomsWithScreens(double gap) {
+  Drawing drawing(16.0, 12.0);
+  drawing.Room(1.0, 1.0, 6.6 + 3.0 * gap, 10.0);
+  for (const double begin : {1.0 + gap, 3.8 + 2.0 * gap}) {
+    drawing.Fill(begin, 5.5, begin + 2.8, 5.55, Space::kOccupied);
+  }
+  return PlanOf(drawing).rooms.size();
+}
+
+TEST(BuildingPlanTest, WhatStandsFreeDividesNoRoom) {
+  EXPECT_EQ(RoomsWithScreens(1.6), 1u);
+  // The wall between two doors stands free as well.
+  EXPECT_EQ(RoomsWithScreens(0.9), 2u);
+}
+
 TEST(BuildingPlanTest, AnOpenFrontInALongWallKeepsAnOfficeApart) {
   const auto plan = [](double begin) {
     Drawing drawing(16.0, 14.0);

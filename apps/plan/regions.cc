@@ -718,6 +718,36 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
     seen[pocket[i]] += arrangement.free[i];
     areas[pocket[i]] += arrangement.faces[i].Area();
   }
+  // Wall between hidden spaces as a whole and rooms, by line: lines that meet
+  // there cut what stands behind a wall into faces, whose fronts are shorter.
+  std::map<std::pair<int, int>, std::map<int, double>> fronts;
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    for (const auto& [a, b] : {std::make_pair(edge.left, edge.right),
+                               std::make_pair(edge.right, edge.left)}) {
+      if (a < 0 || b < 0) continue;
+      const int space = hidden[static_cast<std::size_t>(a)];
+      const int room = (*region)[static_cast<std::size_t>(b)];
+      if (space < 0 || room < 0) continue;
+      fronts[{space, room}][edge.line] += edge.lengths.Of(Mark::kWall);
+    }
+  }
+  // The longest wall that a pocket has before it.
+  const auto front_of = [&](int id, int room, const Border& border) {
+    double longest = 0.0;
+    for (const auto& [line, lengths] : border.of_line) {
+      double front = lengths.Of(Mark::kWall);
+      const auto found =
+          fronts.find({hidden[static_cast<std::size_t>(id)], room});
+      if (found != fronts.end()) {
+        const auto on_line = found->second.find(line);
+        if (on_line != found->second.end()) {
+          front = std::max(front, on_line->second);
+        }
+      }
+      longest = std::max(longest, front);
+    }
+    return longest;
+  };
   for (;;) {
     // Borders of pockets with rooms.
     std::map<std::pair<int, int>, Border> borders;
@@ -802,10 +832,7 @@ void FillPockets(const Arrangement& arrangement, const RegionOptions& options,
           beside_rooms[pair.first] < kWithinRooms * around[pair.first] &&
           walled[pair.first] <
               kWalled * (around[pair.first] - beside_rooms[pair.first]) &&
-          std::any_of(border.of_line.begin(), border.of_line.end(),
-                      [](const auto& entry) {
-                        return entry.second.Of(Mark::kWall) > kLongestFurniture;
-                      })) {
+          front_of(pair.first, pair.second, border) > kLongestFurniture) {
         continue;
       }
       const bool is_furniture = std::none_of(

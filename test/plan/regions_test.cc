@@ -69,6 +69,42 @@ TEST(RegionsTest, UnseenSpaceBehindALongWallIsNoPocketWhereLinesAloneCloseIt) {
   EXPECT_EQ(FindRegions(arrangement), (std::vector<int>{0, -1}));
 }
 
+// The same where a line that ends there cuts the space in two: the wall before
+// it is as long as it was.
+TEST(RegionsTest, WallBeforeASpaceIsAsLongAsTheSpace) {
+  Arrangement arrangement = Stack({3.0, 0.7});
+  std::vector<ArrangementEdge> edges;
+  const auto add = [&](const Vector2d& begin, const Vector2d& end, int left,
+                       int right, Mark mark, double holds) {
+    ArrangementEdge edge;
+    edge.begin = begin;
+    edge.end = end;
+    edge.left = left;
+    edge.right = right;
+    edge.lengths.metres[static_cast<std::size_t>(mark)] = edge.length();
+    edge.lengths.holds = holds * edge.length();
+    edges.push_back(edge);
+  };
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    if (edge.left == 0 && edge.right < 0) edges.push_back(edge);
+  }
+  arrangement.faces[1].shell = {{0.0, 3.0}, {2.0, 3.0}, {2.0, 3.7}, {0.0, 3.7}};
+  Polygon other;
+  other.shell = {{2.0, 3.0}, {4.0, 3.0}, {4.0, 3.7}, {2.0, 3.7}};
+  arrangement.faces.push_back(other);
+  arrangement.free.push_back(0.0);
+  arrangement.unknown = {0.0, 1.4, 1.4};
+  add({2.0, 3.0}, {0.0, 3.0}, 0, 1, Mark::kWall, 1.0);
+  add({4.0, 3.0}, {2.0, 3.0}, 0, 2, Mark::kWall, 1.0);
+  add({2.0, 3.0}, {2.0, 3.7}, 1, 2, Mark::kUnknown, 0.2);
+  add({2.0, 3.7}, {0.0, 3.7}, 1, -1, Mark::kUnknown, 0.9);
+  add({0.0, 3.7}, {0.0, 3.0}, 1, -1, Mark::kUnknown, 0.9);
+  add({4.0, 3.0}, {4.0, 3.7}, 2, -1, Mark::kUnknown, 0.9);
+  add({4.0, 3.7}, {2.0, 3.7}, 2, -1, Mark::kUnknown, 0.9);
+  arrangement.edges = edges;
+  EXPECT_EQ(FindRegions(arrangement), (std::vector<int>{0, -1, -1}));
+}
+
 // Nothing is known between the two upper faces: they are one space, and that is
 // no narrow one.
 TEST(RegionsTest, UnseenSpaceBehindAWallIsNoPocket) {

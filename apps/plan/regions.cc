@@ -49,6 +49,15 @@ constexpr double kWholeWidth = 0.6;
 // m^2: niches and entrances belong to their rooms.
 constexpr double kLeastLength = 2.0;
 constexpr double kLeastCorridor = 5.0;
+// A corridor goes straight on behind a bay that is wider than it is by less
+// than this factor, and longer than it is wide by less than that: its two
+// mouths face each other, by a cosine, with no more than this offset and these
+// widths, as shares of the narrower one.
+constexpr double kLargestBay = 2.0;
+constexpr double kLongestBay = 5.0;
+constexpr double kFacing = 0.95;
+constexpr double kOffsetOfMouths = 0.5;
+constexpr double kSameWidth = 1.3;
 // Corners nearer to each other are one, m.
 constexpr double kSameCorner = 2e-3;
 // A side of a room has so much wall at least, m: else furniture stands there.
@@ -546,6 +555,60 @@ double WidestChain(const std::vector<StraightPiece>& pieces) {
   return widest;
 }
 
+// Where a corridor opens into a wide space.
+struct Mouth {
+  std::size_t corridor = 0;
+  Vector2d middle = Vector2d::Zero();
+  // Out of the corridor.
+  Vector2d out = Vector2d::Zero();
+  double width = 0.0;
+};
+
+Mouth MouthOf(std::size_t corridor, const Polygon& outline,
+              const std::vector<StraightPiece>& border) {
+  Mouth mouth;
+  mouth.corridor = corridor;
+  mouth.width = WidestChain(border);
+  double length = 0.0;
+  Vector2d across = Vector2d::Zero();
+  for (const auto& [begin, end] : border) {
+    const double piece = (end - begin).norm();
+    mouth.middle += 0.5 * piece * (begin + end);
+    // Pieces run either way.
+    const double sign = across.dot(end - begin) < 0.0 ? -1.0 : 1.0;
+    across += sign * (end - begin);
+    length += piece;
+  }
+  if (!(length > 0.0) || !(across.norm() > 0.0)) return mouth;
+  mouth.middle /= length;
+  const Vector2d normal = Vector2d(-across[1], across[0]).normalized();
+  Vector2d center = Vector2d::Zero();
+  for (const Vector2d& corner : outline.shell) center += corner;
+  center /= static_cast<double>(outline.shell.size());
+  mouth.out = normal.dot(mouth.middle - center) < 0.0 ? -normal : normal;
+  return mouth;
+}
+
+// Whether a corridor goes on where another one, as wide as it is, leaves the
+// same wide space opposite to it, no farther away than `kLongestBay` widths.
+bool GoesStraightOn(std::size_t corridor, const std::vector<Mouth>& mouths) {
+  for (const Mouth& mouth : mouths) {
+    if (mouth.corridor != corridor) continue;
+    for (const Mouth& other : mouths) {
+      const Vector2d way = other.middle - mouth.middle;
+      const double along = mouth.out.dot(way);
+      const double least = std::min(mouth.width, other.width);
+      if (other.corridor != corridor && mouth.out.dot(other.out) < -kFacing &&
+          along > 0.0 && along <= kLongestBay * least &&
+          (way - along * mouth.out).norm() <= kOffsetOfMouths * least &&
+          std::max(mouth.width, other.width) <= kSameWidth * least) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 // Makes regions of their own of corridors that open into wide spaces.
 void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
                   std::vector<int>* region) {
@@ -591,19 +654,32 @@ void CutCorridors(const Arrangement& arrangement, const RegionOptions& options,
       return !Offset(space, -least).empty();
     });
   };
-  DisjointSets joined(region->size());
+  std::set<std::size_t> corridors;
+  std::map<std::size_t, std::vector<Mouth>> mouths;
   for (const auto& [narrow, wides] : borders) {
     const std::vector<Polygon> outlines = UnionOf(faces[narrow]);
     Extent extent;
     extent.area = outlines.front().Area();
     extent.perimeter = outlines.front().Perimeter();
     const double width = extent.Width();
-    const bool is_corridor = extent.area >= kLeastLength * width * width &&
-                             extent.area >= kLeastCorridor &&
-                             width >= options.min_width;
+    if (extent.area < kLeastLength * width * width ||
+        extent.area < kLeastCorridor || width < options.min_width) {
+      continue;
+    }
+    corridors.insert(narrow);
     for (const auto& [wide, border] : wides) {
-      const double least = 0.5 * options.widening * WidestChain(border);
-      if (!is_corridor || !is_space(wide, least)) joined.Join(narrow, wide);
+      mouths[wide].push_back(MouthOf(narrow, outlines.front(), border));
+    }
+  }
+  DisjointSets joined(region->size());
+  for (const auto& [narrow, wides] : borders) {
+    for (const auto& [wide, border] : wides) {
+      const double widening =
+          GoesStraightOn(narrow, mouths[wide]) ? kLargestBay : options.widening;
+      if (corridors.count(narrow) == 0 ||
+          !is_space(wide, 0.5 * widening * WidestChain(border))) {
+        joined.Join(narrow, wide);
+      }
     }
   }
   for (std::size_t i = 0; i < region->size(); ++i) {

@@ -113,6 +113,20 @@ TEST(BuildingPlanTest, ACorridorThatWidensALittleIsOne) {
   EXPECT_EQ(CorridorIntoHall(2.6).rooms.size(), 1u);
 }
 
+// A corridor of 2 m with a bay of `depth` m on one side.
+std::size_t RoomsOfACorridorWithABay(double depth) {
+  Drawing drawing(26.0, 12.0);
+  drawing.Room(8.0, 5.0 - depth, 14.0, 7.0).Room(1.0, 5.0, 22.0, 7.0);
+  drawing.Free(8.0, 4.9, 14.0, 5.1);
+  return PlanOf(drawing).rooms.size();
+}
+
+TEST(BuildingPlanTest, ACorridorGoesStraightOnBehindABay) {
+  EXPECT_EQ(RoomsOfACorridorWithABay(1.5), 1u);
+  // A hall between two corridors.
+  EXPECT_EQ(RoomsOfACorridorWithABay(3.5), 3u);
+}
+
 // No wall stands in a door, and each is joined to others at its ends.
 TEST(BuildingPlanTest, WallsCloseTheRooms) {
   const BuildingPlan plan = PlanOf(TwoRooms());

@@ -255,8 +255,9 @@ class Search {
       if (!is_told) untold_rival_ = rival.support();
     }
     placement.misfit = Misfit(*best);
-    placement.why_not = WhyNot(best, &placement);
-    if (placement.why_not.empty()) {
+    const bool is_plain = IsPlain(best);
+    placement.why_not = WhyNot(best, is_plain, &placement);
+    if (placement.why_not.empty() && !is_plain) {
       const std::string uncertain = WhyUncertain(*best, placement);
       (start_ ? placement.doubt : placement.why_not) = uncertain;
       placement.is_candidate = !start_ && !uncertain.empty();
@@ -264,8 +265,8 @@ class Search {
     placement.found = placement.why_not.empty();
     if (placement.found) {
       AddDoubts(*best, placement, &placement.doubt);
-      TakeTie(*best, &placement);
     }
+    if (placement.found || placement.is_candidate) TakeTie(*best, &placement);
     return placement;
   }
 
@@ -361,15 +362,17 @@ class Search {
   }
 
   // Nothing when it is its place.
-  std::string WhyNot(Candidate* best, TrackPlacement* placement) {
+  std::string WhyNot(Candidate* best, bool is_plain,
+                     TrackPlacement* placement) {
     const int least =
         start_ ? options_.min_agreeing_at_start : options_.min_agreeing;
     if (best->agreeing < least) {
       return "only " + Parts(best->agreeing) + " of " +
              std::to_string(windows_.size()) + " found a place in the map";
     }
-    if (best->contradicting >
-        options_.max_contradicting * (best->agreeing + best->contradicting)) {
+    if (!is_plain &&
+        best->contradicting > options_.max_contradicting *
+                                  (best->agreeing + best->contradicting)) {
       return "where " + Parts(best->agreeing) + " of it would fit, " +
              Parts(best->contradicting) + " would contradict";
     }
@@ -392,12 +395,44 @@ class Search {
     placement->walls_through_track =
         static_cast<int>(contradictions.of_map.size());
     placement->contradicting_length = contradictions.length();
+    if (is_plain) return "";
     const int moved = CountMovedDoors(contradictions);
     placement->is_candidate =
         contradictions.longest() <= options_.max_contradicting_stretch &&
         moved >= options_.min_moved_doors &&
         moved < options_.min_moved_doors_at_start;
     return WhyAnother(best->agreeing, contradictions);
+  }
+
+  // Whether so much agrees, and so little contradicts, that doors which were
+  // opened or shut do not make another building of it.
+  bool IsPlain(Candidate* place) {
+    const int agreeing = place->agreeing;
+    if (agreeing < options_.min_plain_agreeing ||
+        place->contradicting > options_.max_plain_contradicting *
+                                   (agreeing + place->contradicting) ||
+        InformationShare(*place) < options_.min_certain_information_share) {
+      return false;
+    }
+    double compared = 0.0;
+    double contradicted = 0.0;
+    for (const WindowJudgement& judgement : place->judgements) {
+      compared += judgement.compared;
+      contradicted += judgement.contradicted;
+    }
+    if (contradicted > options_.max_plain_contradicted_share * compared) {
+      return false;
+    }
+    const WallContradictions& contradictions = ContradictionsOf(place);
+    const auto changed = static_cast<double>(contradictions.number());
+    return contradictions.longest() <= options_.max_contradicting_stretch &&
+           changed * options_.min_plain_agreeing_per_change <= agreeing &&
+           CountMovedDoors(contradictions) *
+                   options_.min_plain_agreeing_per_moved_door <=
+               agreeing &&
+           CountMovedDoors(contradictions, options_.min_door_spacing) == 0 &&
+           MirroredSupport() <=
+               options_.max_plain_mirrored_share * place->support();
   }
 
   // What the returns say of the direction that they say least of, as a share of
@@ -454,7 +489,7 @@ class Search {
   // Why the place may well be another, or of another building, though nothing
   // says that it is; empty when it is clear.
   std::string WhyUncertain(const Candidate& best,
-                           const TrackPlacement& placement) const {
+                           const TrackPlacement& placement) {
     if (InformationShare(best) < options_.min_certain_information_share) {
       return "what it shares with the map is little more than a straight "
              "corridor, and corridors look alike";
@@ -495,7 +530,7 @@ class Search {
 
   // What else is to be said of the place that was found.
   void AddDoubts(const Candidate& best, const TrackPlacement& placement,
-                 std::string* doubt) const {
+                 std::string* doubt) {
     const auto add = [doubt](const std::string& reason) {
       *doubt += (doubt->empty() ? "" : "; ") + reason;
     };
@@ -503,14 +538,22 @@ class Search {
       add("only " + std::to_string(best.agreeing) + " of " +
           std::to_string(windows_.size()) + " parts of it agree with the map");
     }
+    // Two corridors and a corner, say, of which there are many.
+    if (!start_ && best.agreeing < options_.min_plain_agreeing &&
+        MirroredSupport() >
+            options_.max_plain_mirrored_share * best.support()) {
+      add("its mirror image fits in the map nearly as well, as it does where "
+          "buildings look alike");
+    }
     if (placement.walls_through_map > 0 || placement.walls_through_track > 0) {
       add(Changed(placement) +
           ": doors that were opened or shut, or another building");
     }
   }
 
-  // How much of the track's mirror image finds a place in the map.
-  double MirroredSupport() const;
+  // How much of the track's mirror image finds a place in the map; looked for
+  // once.
+  double MirroredSupport();
 
   // Where the tie is best.
   void TakeTie(const Candidate& best, TrackPlacement* placement) const {
@@ -550,6 +593,7 @@ class Search {
   std::vector<Candidate> judged_;
   // Support of the rival of the best place that nobody told from it.
   double untold_rival_ = 0.0;
+  std::optional<double> mirrored_support_;
 };
 
 // A track through the mirror image of the building.
@@ -565,7 +609,8 @@ std::vector<KeyView> Mirrored(std::vector<KeyView> track) {
   return track;
 }
 
-double Search::MirroredSupport() const {
+double Search::MirroredSupport() {
+  if (mirrored_support_) return *mirrored_support_;
   const std::vector<KeyView> mirrored = Mirrored(track_);
   Search search(map_, mirrored, std::nullopt, options_);
   const std::size_t windows = search.num_windows();
@@ -574,7 +619,8 @@ double Search::MirroredSupport() const {
     search.Look((2 * i + 1) * windows / (2 * searches));
   }
   search.JudgeFound(static_cast<std::size_t>(options_.max_candidates), nullptr);
-  return search.MostSupport();
+  mirrored_support_ = search.MostSupport();
+  return *mirrored_support_;
 }
 
 }  // namespace

@@ -85,6 +85,25 @@ struct TrackPlacementOptions {
   double max_certain_rival = 0.3;
   int min_agreeing_per_change = 6;
   double max_mirrored_share = 0.5;
+  /// What makes a place plain though doors were opened and shut and furniture
+  /// was moved, so that of the bounds on changes and rivals above only
+  /// rival_share keeps the logs apart, and that the map shares more than a
+  /// straight corridor with the track: so many windows agree, no more than
+  /// these shares contradict, of the windows that say yes or no and of all that
+  /// either has where the other one knows, and the mirror image of the track
+  /// finds no more than this share of its support (where fewer agree more is a
+  /// doubt: two corridors and a corner are like others). For each place with a
+  /// wall in one and an opening in the other so many windows agree, and for
+  /// each pair of these which may be a door that stands elsewhere; which is one
+  /// for certain where the two are nearer to each other than two doors of a
+  /// wall can be, m.
+  int min_plain_agreeing = 12;
+  double max_plain_contradicting = 0.15;
+  double max_plain_contradicted_share = 0.03;
+  double max_plain_mirrored_share = 0.67;
+  double min_plain_agreeing_per_change = 1.5;
+  int min_plain_agreeing_per_moved_door = 12;
+  double min_door_spacing = 1.2;
   /// With a start that somebody gave: windows that have to agree, doors that
   /// stand elsewhere, and how far from it the track may start, m and rad. Where
   /// it would start farther from there by more than start_precision, m, is no

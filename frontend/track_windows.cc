@@ -99,6 +99,8 @@ WindowJudgement JudgeWindow(const std::vector<KeyView>& map,
                      std::abs(moved[2]) <= options.max_turn;
   const ScanAgreement sum = compare(stays ? match.pose : guess);
   const int known = sum.hits + sum.intruders;
+  judgement.compared = known + sum.seen;
+  judgement.contradicted = sum.intruders + sum.seen_through;
   const double known_share =
       static_cast<double>(known) / std::max(1, known + sum.unknown);
   if (known < kLeastReturns) return judgement;

@@ -42,6 +42,11 @@ struct WindowJudgement {
   Pose2 pose = Pose2::Zero();
   /// How clearly it agrees, 0 to 1.
   double quality = 0.0;
+  /// Returns of the window, and of the map where the window sees, that are
+  /// known to the other; those of either that the other contradicts, standing
+  /// where it is free or looked through.
+  int compared = 0;
+  int contradicted = 0;
   /// What the returns say of the middle's position, map's frame.
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
 };

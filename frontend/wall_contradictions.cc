@@ -22,11 +22,9 @@ constexpr double kSameStretch = 0.7;
 constexpr double kThroughWall = 0.15;
 constexpr double kLeastPiece = 0.1;
 // A door that stands elsewhere: an opening and a wall in the place of one, in
-// one wall (m beside each other, and directions) no farther from each other
-// than this, m.
+// one wall (m beside each other, and directions).
 constexpr double kSameWall = 0.3;
 constexpr double kSameWallTurn = DegToRad(20.0);
-constexpr double kMovedDoor = 3.0;
 
 // Which points of a view lie where the matcher's reference looks through the
 // surface: it is free there and on both sides. A beam along a wall is free
@@ -147,11 +145,11 @@ double WallContradictions::longest() const {
   return most;
 }
 
-int CountMovedDoors(const WallContradictions& contradictions) {
+int CountMovedDoors(const WallContradictions& contradictions, double reach) {
   std::vector<bool> is_taken(contradictions.of_map.size(), false);
   int moved = 0;
   for (const WallStretch& shut : contradictions.of_track) {
-    double nearest = kMovedDoor;
+    double nearest = reach;
     std::size_t taken = is_taken.size();
     for (std::size_t i = 0; i < is_taken.size(); ++i) {
       const WallStretch& opened = contradictions.of_map[i];

@@ -39,9 +39,10 @@ struct WallContradictions {
 };
 
 /// Doors that stand elsewhere in the same wall: an opening and a wall in the
-/// place of one, up to 3 m from each other, either way. People shut one door
-/// and open another, but hardly twice in neighbouring ones.
-int CountMovedDoors(const WallContradictions& contradictions);
+/// place of one, up to `reach` from each other, m, either way. People shut one
+/// door and open another, but hardly twice in neighbouring ones.
+int CountMovedDoors(const WallContradictions& contradictions,
+                    double reach = 3.0);
 
 /// What the windows of a track that agree with a map (`judgements`, one for
 /// each) say of it, and the map of them. Cost: linear in the returns of the

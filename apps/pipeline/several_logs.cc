@@ -22,6 +22,10 @@ constexpr double kTieSigma = 0.1;
 constexpr double kTieSigmaPerMetre = 0.02;
 constexpr double kTieAngle = DegToRad(1.0);
 constexpr double kTieAnglePerMetre = DegToRad(0.1);
+// Two placements of a log in a map are one place when they put it so near to
+// each other where they are firmest, m and rad.
+constexpr double kSamePlace = 1.0;
+constexpr double kSamePlaceTurn = DegToRad(5.0);
 
 // Key scans of an earlier map, as those of a log that was solved.
 LogSolverResult ResultOf(const KeyScanArchive& earlier) {
@@ -311,10 +315,16 @@ class Merger {
     FirstMap& log = maps_[i];
     const double noise_scale =
         std::max(group->noise_scale, log.result.noise_scale);
+    const TrackPlacementOptions options = PlacementWith(noise_scale);
+    const std::optional<Pose2> start =
+        TakesStarts(*group) ? StartOf(i) : std::nullopt;
     const auto place = [&] {
-      return PlaceTrack(group->views, log.views,
-                        TakesStarts(*group) ? StartOf(i) : std::nullopt,
-                        PlacementWith(noise_scale), control_.run.stop);
+      TrackPlacement placement = PlaceTrack(group->views, log.views, start,
+                                            options, control_.run.stop);
+      if (placement.is_candidate && !placement.found && !start) {
+        PlaceTheOtherWay(group->views, log.views, options, &placement);
+      }
+      return placement;
     };
     TrackPlacement placement = place();
     // First maps are bent: what nearly fits may do so when they are not.
@@ -326,16 +336,7 @@ class Merger {
         placement = again;
       }
     }
-    // What came nearest to being its place is what there is to say of it.
-    TrackPlacement& told = result_.logs[i].placement;
-    if (placement.found || placement.agreeing >= told.agreeing) {
-      told = placement;
-      std::optional<Pose2>& candidate = result_.logs[i].candidate;
-      candidate.reset();
-      if (placement.is_candidate && TakesStarts(*group)) {
-        candidate = Compose(placement.pose, log.views.front().pose);
-      }
-    }
+    Tell(i, *group, placement);
     if (!placement.found) return false;
     log.tie = TieOf(placement, log, *group);
     log.pose = placement.pose;
@@ -347,6 +348,47 @@ class Merger {
     }
     group->is_straight = false;
     return true;
+  }
+
+  // A log of which only a part is in the map says less than the map says that
+  // has all of its place in the log: whether two logs are one building must not
+  // hang on which comes first. Finds a mere candidate when the map finds its
+  // place in the log there.
+  void PlaceTheOtherWay(const std::vector<KeyView>& map,
+                        const std::vector<KeyView>& track,
+                        const TrackPlacementOptions& options,
+                        TrackPlacement* placement) {
+    const TrackPlacement other =
+        PlaceTrack(track, map, std::nullopt, options, control_.run.stop);
+    if (!other.found) return;
+    const Pose2& seen_from = track[static_cast<std::size_t>(other.from)].pose;
+    const Pose2 apart = Between(Compose(Inverse(other.pose), seen_from),
+                                Compose(placement->pose, seen_from));
+    if (apart.head<2>().norm() > kSamePlace ||
+        std::abs(apart[2]) > kSamePlaceTurn) {
+      return;
+    }
+    placement->found = true;
+    placement->is_candidate = false;
+    placement->doubt = placement->why_not + "; but the map fits in it";
+    placement->why_not.clear();
+  }
+
+  // What came nearest to being its place is what there is to say of it; a
+  // candidate is what somebody can use.
+  void Tell(std::size_t i, const Group& group,
+            const TrackPlacement& placement) {
+    LogInMap& log = result_.logs[i];
+    const bool is_candidate = placement.is_candidate && TakesStarts(group);
+    const bool is_more = is_candidate == log.candidate.has_value()
+                             ? placement.agreeing >= log.placement.agreeing
+                             : is_candidate;
+    if (!placement.found && !is_more) return;
+    log.placement = placement;
+    log.candidate.reset();
+    if (is_candidate) {
+      log.candidate = Compose(placement.pose, maps_[i].views.front().pose);
+    }
   }
 
   // Adjusts the poses that the views of the group and of a log are seen from,

@@ -412,6 +412,164 @@ TEST_F(SeveralLogsTest, CorridorsThatLookAlikeAreKeptApart) {
   EXPECT_FALSE(known.logs[1].candidate.has_value());
 }
 
+// An L of two corridors of 23 m, with shut doors in niches; by wall, from the
+// left or from below.
+Log NichedBend(double depth, const std::vector<std::vector<double>>& niches,
+               std::uint64_t seed) {
+  std::ostringstream world;
+  const auto wall = [&world](const Eigen::Vector2d& a,
+                             const Eigen::Vector2d& b) {
+    world << "wall " << a.x() << ' ' << a.y() << ' ' << b.x() << ' ' << b.y()
+          << " 0.12\n";
+  };
+  wall({0.0, -1.0}, {0.0, 1.0});
+  wall({23.0, 22.0}, {25.0, 22.0});
+  const Eigen::Vector2d ends[][2] = {{{0.0, -1.0}, {25.0, -1.0}},
+                                     {{0.0, 1.0}, {23.0, 1.0}},
+                                     {{23.0, 1.0}, {23.0, 22.0}},
+                                     {{25.0, -1.0}, {25.0, 22.0}}};
+  const Eigen::Vector2d back[] = {
+      {0.0, -depth}, {0.0, depth}, {-depth, 0.0}, {depth, 0.0}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d along = (ends[i][1] - ends[i][0]).normalized();
+    Eigen::Vector2d from = ends[i][0];
+    for (const double door : niches[i]) {
+      Eigen::Vector2d middle = ends[i][0];
+      middle[i < 2 ? 0 : 1] = door;
+      const Eigen::Vector2d first = middle - 0.45 * along;
+      const Eigen::Vector2d last = middle + 0.45 * along;
+      wall(from, first);
+      wall(first, first + back[i]);
+      wall(first + back[i], last + back[i]);
+      wall(last + back[i], last);
+      from = last;
+    }
+    wall(from, ends[i][1]);
+  }
+  world << "path 1 0 24 0 24 21\n";
+  return DriveThrough(world.str(), seed);
+}
+
+// All parts of two corridors and a corner may agree with others, and so does
+// their mirror image: that is said.
+TEST_F(SeveralLogsTest, BendsThatLookAlikeAreNotTakenForOneSilently) {
+  const Log one = NichedBend(0.25,
+                             {{7.13, 10.3, 11.89, 16.47, 18.43, 21.3},
+                              {5.73, 7.3, 10.83, 14.18, 17.86, 20.3},
+                              {4.03, 6.81, 9.99, 15.7, 17.54},
+                              {2.57, 6.64, 9.9, 13.49, 18.38}},
+                             204);
+  const Log other = NichedBend(0.4,
+                               {{3.25, 5.3, 7.16, 12.48, 16.87, 22.69},
+                                {2.81, 7.28, 12.27, 17.03, 20.77},
+                                {5.76, 10.85, 13.56, 17.43},
+                                {6.0, 11.12, 16.81}},
+                               206);
+  for (const auto& logs : {std::vector<Log>{one, other}, {other, one}}) {
+    const SeveralLogsResult result = SolveSeveralLogs(registry_, logs, {});
+    const TrackPlacement& placement = result.logs[1].placement;
+    EXPECT_THAT(placement.doubt + placement.why_not,
+                ::testing::HasSubstr("mirror image fits"));
+  }
+}
+
+// Rooms along both sides of a corridor that is not its own mirror image, as
+// they are on a day.
+struct Floor {
+  std::vector<double> ends[2] = {{0.0, 5.0, 12.0, 18.0, 23.5, 30.0, 36.0},
+                                 {0.0, 7.5, 11.5, 20.5, 27.0, 36.0}};
+  std::vector<double> doors[2] = {{1.6, 7.9, 16.2, 19.5, 26.3, 34.5},
+                                  {3.1, 9.5, 13.2, 22.5, 29.3}};
+  // Rooms whose doors are shut; the robot drives into the second and the fifth
+  // above and into the third below.
+  std::set<std::size_t> shut[2];
+  bool is_back = false;
+};
+
+Log DriveAlong(const Floor& floor, std::uint64_t seed) {
+  std::ostringstream world;
+  const auto wall = [&world](double x1, double y1, double x2, double y2) {
+    world << "wall " << x1 << ' ' << y1 << ' ' << x2 << ' ' << y2 << " 0.12\n";
+  };
+  wall(0.0, -6.1, 0.0, 6.1);
+  wall(36.0, -6.1, 36.0, 6.1);
+  std::vector<std::pair<double, double>> visits;
+  for (const std::size_t row : {0, 1}) {
+    const double side = row == 0 ? 1.0 : -1.0;
+    double from = 0.0;
+    for (std::size_t room = 0; room < floor.doors[row].size(); ++room) {
+      const double door = floor.doors[row][room];
+      const double begin = floor.ends[row][room];
+      const double end = floor.ends[row][room + 1];
+      if (floor.shut[row].count(room) == 0) {
+        wall(from, 1.1 * side, door - 0.45, 1.1 * side);
+        from = door + 0.45;
+      }
+      if (room > 0) wall(begin, 1.1 * side, begin, 6.1 * side);
+      // A desk and a shelf.
+      wall(begin + 0.7, 5.2 * side, 0.5 * (begin + end), 5.2 * side);
+      wall(end - 0.4, 3.5 * side, end - 0.4, 5.0 * side);
+      if (row == 0 ? room == 1 || room == 4 : room == 2) {
+        visits.emplace_back(door, side);
+      }
+    }
+    wall(from, 1.1 * side, 36.0, 1.1 * side);
+    wall(0.0, 6.1 * side, 36.0, 6.1 * side);
+  }
+  std::vector<std::pair<double, double>> way = {{1.0, 0.0}};
+  std::sort(visits.begin(), visits.end());
+  for (const auto& [x, side] : visits) {
+    for (const double y : {0.0, 2.6, 3.6, 2.6, 0.0}) {
+      way.emplace_back(x, y * side);
+    }
+  }
+  way.emplace_back(35.0, 0.0);
+  if (floor.is_back) std::reverse(way.begin(), way.end());
+  world << "path";
+  for (const auto& [x, y] : way) world << ' ' << x << ' ' << y;
+  world << "\n";
+  return DriveThrough(world.str(), seed);
+}
+
+// So many doors that were opened or shut meanwhile would be another building's
+// if fewer parts agreed.
+TEST_F(SeveralLogsTest, DoorsOpenedAndShutMakeNoOtherBuilding) {
+  Floor monday;
+  monday.shut[0] = {0, 3};
+  monday.shut[1] = {0, 3};
+  Floor tuesday;
+  tuesday.shut[0] = {2, 5};
+  tuesday.shut[1] = {1, 4};
+  tuesday.is_back = true;
+  const Log one = DriveAlong(monday, 1);
+  const Log other = DriveAlong(tuesday, 2);
+  for (const bool is_turned : {false, true}) {
+    SCOPED_TRACE(is_turned);
+    const SeveralLogsResult result =
+        is_turned ? SolveSeveralLogs(registry_, {other, one}, {})
+                  : SolveSeveralLogs(registry_, {one, other}, {});
+    const TrackPlacement& placement = result.logs[1].placement;
+    ASSERT_EQ(result.maps.size(), 1u) << placement.why_not;
+    EXPECT_GE(placement.walls_through_map + placement.walls_through_track, 5);
+    EXPECT_FALSE(placement.doubt.empty());
+    // Odometry begins where the way does.
+    const Pose2 first = result.maps[0].result.trajectory[result.logs[1].begin];
+    EXPECT_LT(std::hypot(first[0] - (is_turned ? 1.0 : 35.0), first[1]), 0.3);
+  }
+}
+
+// The same corridor and doors, but walls between other rooms.
+TEST_F(SeveralLogsTest, AnotherFloorIsKeptApart) {
+  Floor upstairs;
+  upstairs.ends[0] = {0.0, 4.0, 10.0, 17.5, 25.0, 32.5, 36.0};
+  upstairs.ends[1] = {0.0, 5.0, 12.0, 17.0, 24.0, 36.0};
+  upstairs.is_back = true;
+  const Log one = DriveAlong({}, 1);
+  const Log other = DriveAlong(upstairs, 2);
+  EXPECT_EQ(SolveSeveralLogs(registry_, {one, other}, {}).maps.size(), 2u);
+  EXPECT_EQ(SolveSeveralLogs(registry_, {other, one}, {}).maps.size(), 2u);
+}
+
 // What was seen far off makes the building large, but no place in it harder to
 // find: a search of all of it would be given up.
 TEST_F(SeveralLogsTest, ATrackIsFoundInALargeBuilding) {
@@ -456,6 +614,24 @@ TEST_F(SeveralLogsTest, AWrongStartKeepsALogApart) {
       Between(TruthOf(first.scans.front()), TruthOf(second.scans.front()));
   EXPECT_EQ(solve(Compose(truth, Pose2(0.5, -0.5, 0.2))).maps.size(), 1u);
   EXPECT_EQ(solve(Compose(truth, Pose2(20.0, 5.0, 3.0))).maps.size(), 2u);
+}
+
+// A corridor that agrees with the first log's is told as its candidate, though
+// another map was compared with it later, and as closely.
+TEST_F(SeveralLogsTest, ACandidateStaysOneWhenOtherMapsAreAsked) {
+  const std::vector<double> left = {5.35,  7.01, 9.6,   14.69, 18.05,
+                                    20.33, 24.3, 28.96, 33.5,  36.68};
+  const std::vector<double> right = {4.99,  9.99,  13.84, 17.1, 20.81,
+                                     22.44, 24.14, 28.8,  34.73};
+  const SeveralLogsResult result =
+      SolveSeveralLogs(registry_,
+                       {NichedCorridor(0.25, left, right, false, 3),
+                        NichedCorridor(0.25, left, right, true, 4),
+                        NichedCorridor(0.25, left, right, false, 5)},
+                       {});
+  ASSERT_EQ(result.maps.size(), 3u);
+  EXPECT_TRUE(result.logs[1].candidate.has_value());
+  EXPECT_TRUE(result.logs[2].candidate.has_value());
 }
 
 // Of a log by itself, as map.json keeps it.

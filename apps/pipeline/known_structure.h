@@ -74,9 +74,12 @@ struct KnownStructure {
   double max_angle = DegToRad(4.0);
   /// What it takes to believe a place of the plan: length of walls that lie on
   /// lines, m, their share of the length of all walls, and the share of that
-  /// which a second place may have at most.
+  /// which a second place may have at most. Of a plan of a part of the building
+  /// it takes a greater length, and a greater share of the walls of that part.
   double min_agreeing_length = 8.0;
   double min_agreeing_share = 0.4;
+  double min_agreeing_length_of_part = 20.0;
+  double min_agreeing_share_of_part = 0.7;
   double rival_share = 0.85;
   /// Where the plan's frame lies in the map's, roughly: its middle is not
   /// looked for farther away than `max_pose_offset`, m, nor turned by more than

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
@@ -50,6 +51,19 @@ constexpr double kKnownTurn = DegToRad(2.0);
 constexpr double kLeastSpread = DegToRad(25.0);
 // Lines reach so far beyond their ends, m.
 constexpr double kOverhang = 0.2;
+// Walls are in the plan's part of the building within this of a box around its
+// lines, m.
+constexpr double kAroundPlan = 0.5;
+// Where so much of the walls agrees the plan is not drawn mirrored.
+constexpr double kClearShare = 0.75;
+// Units that a drawing may have in place of the one that it says: millimetres,
+// centimetres, inches or feet for metres, one of them for another, and the
+// other way round. They are looked for where they make the plan between so
+// large and so large, in sizes of the map.
+constexpr double kUnitRatios[] = {1000.0, 100.0, 39.37, 25.4,
+                                  12.0,   10.0,  3.281, 2.54};
+constexpr double kLeastSizeRatio = 0.5;
+constexpr double kMostSizeRatio = 4.0;
 
 // Difference of two directions without sense, in [0, pi/2].
 double AngleBetween(double a, double b) {
@@ -249,12 +263,34 @@ std::vector<Eigen::Vector2d> PartAround(const Eigen::Vector2d& middle,
   return part;
 }
 
+// A box around points.
+struct Box {
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e300);
+  Eigen::Vector2d high = Eigen::Vector2d::Constant(-1e300);
+
+  explicit Box(const std::vector<Wall>& walls) {
+    for (const Wall& wall : walls) {
+      for (const double end : {wall.begin, wall.end}) {
+        low = low.cwiseMin(wall.At(end));
+        high = high.cwiseMax(wall.At(end));
+      }
+    }
+  }
+  double size() const { return (high - low).norm(); }
+  bool Has(const Eigen::Vector2d& point) const {
+    return ((point - low).array() >= -kAroundPlan).all() &&
+           ((high - point).array() >= -kAroundPlan).all();
+  }
+};
+
 // A place of the map in the plan.
 struct Place {
   Pose2 pose = Pose2::Zero();
   // Length of walls that lie on lines, m, and the largest angle between these.
   double agreeing = 0.0;
   double spread = 0.0;
+  // Length of walls that lie where the plan is, m.
+  double inside = 0.0;
   // That length with its weights.
   double score = 0.0;
 };
@@ -263,13 +299,15 @@ Place Judged(const std::vector<WallPoint>& points,
              const std::vector<Wall>& lines, const Pose2& pose) {
   Place place;
   place.pose = pose;
+  const Box box(lines);
   const PoseTransform transform(place.pose);
   double first = 0.0;
   for (const WallPoint& point : points) {
+    const Eigen::Vector2d position = transform.Point(point.position);
+    if (box.Has(position)) place.inside += kJudgeSpacing;
     double offset = 0.0;
-    if (NearestLine(lines, transform.Point(point.position),
-                    point.direction + place.pose[2], kAgreeDistance,
-                    kAgreeAngle, &offset) < 0) {
+    if (NearestLine(lines, position, point.direction + place.pose[2],
+                    kAgreeDistance, kAgreeAngle, &offset) < 0) {
       continue;
     }
     if (place.agreeing == 0.0) first = point.direction;
@@ -385,14 +423,22 @@ std::vector<Place> FindPlaces(const KnownStructure& known,
   return places;
 }
 
+// Whether so much agrees at a place that it is to be believed, of all walls of
+// this length, m, or of those in the part of the building that the plan is of.
+bool IsEnough(const KnownStructure& known, const Place& place, double length) {
+  return place.spread >= kLeastSpread &&
+         ((place.agreeing >= known.min_agreeing_length &&
+           place.agreeing >= known.min_agreeing_share * length) ||
+          (place.agreeing >= known.min_agreeing_length_of_part &&
+           place.agreeing >= known.min_agreeing_share_of_part * place.inside));
+}
+
 // Why the best of these places is not to be believed; empty when it is.
 // `length`: of all walls, m; `middle`: of a part of the map.
 std::string WhyRefused(const KnownStructure& known,
                        const std::vector<Place>& places, double length,
                        const Eigen::Vector2d& middle) {
-  if (places.empty() || places.front().agreeing < known.min_agreeing_length ||
-      places.front().agreeing < known.min_agreeing_share * length ||
-      places.front().spread < kLeastSpread) {
+  if (places.empty() || !IsEnough(known, places.front(), length)) {
     return "the plan is not used: " +
            Fixed(places.empty() ? 0.0 : places.front().agreeing, 1) + " m of " +
            Fixed(length, 1) +
@@ -420,6 +466,33 @@ std::string WhyRefused(const KnownStructure& known,
   return {};
 }
 
+double MedianLength(const std::vector<Wall>& lines) {
+  std::vector<double> lengths;
+  for (const Wall& line : lines) lengths.push_back(line.length());
+  const auto middle =
+      lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  return *middle;
+}
+
+PlanPlacement Placed(const Place& place, double length) {
+  return {place.pose, "the plan agrees with " + Fixed(place.agreeing, 1) +
+                          " m of " + Fixed(length, 1) +
+                          " m of walls where it is placed"};
+}
+
+// A plan in another unit, or its mirror image.
+std::vector<PlanLine> Redrawn(std::vector<PlanLine> plan, double scale,
+                              bool is_mirrored) {
+  for (PlanLine& line : plan) {
+    for (Eigen::Vector2d* end : {&line.begin, &line.end}) {
+      *end *= scale;
+      if (is_mirrored) end->x() = -end->x();
+    }
+  }
+  return plan;
+}
+
 }  // namespace
 
 Wall MakePlanWall(const PlanLine& line) {
@@ -441,14 +514,69 @@ PlanPlacement PlacePlan(const KnownStructure& known,
   double length = 0.0;
   for (const Wall& wall : walls) length += wall.length();
   const std::vector<Eigen::Vector2d> middles = PartMiddles(walls);
-  const std::vector<Place> places =
-      FindPlaces(known, walls, PointsOn(walls), middles, lines, stop);
+  const std::vector<WallPoint> points = PointsOn(walls);
+  const double size = Box(lines).size();
+  const double map_size = Box(walls).size();
+  std::vector<Place> places;
+  std::string why;
+  const double usual_length = MedianLength(lines);
+  const bool is_absurd = usual_length > map_size;
+  if (is_absurd) {
+    why = "the plan is not used: half of its lines are longer than " +
+          Fixed(usual_length, 1) + " m, and the whole map is only " +
+          Fixed(map_size, 1) + " m large";
+  } else {
+    places = FindPlaces(known, walls, points, middles, lines, stop);
+    why = WhyRefused(known, places, length, middles.front());
+  }
   if (stop && stop()) return {};
-  const std::string why = WhyRefused(known, places, length, middles.front());
-  if (!why.empty()) return {std::nullopt, why};
-  return {places.front().pose,
-          "the plan agrees with " + Fixed(places.front().agreeing, 1) +
-              " m of " + Fixed(length, 1) + " m of walls where it is placed"};
+  if (why.empty() && places.front().agreeing >= kClearShare * length) {
+    return Placed(places.front(), length);
+  }
+  // What it would be if it were drawn otherwise. Where that lies nobody said.
+  KnownStructure other = known;
+  other.plan_pose.reset();
+  const auto places_of = [&](double scale, bool is_mirrored) {
+    other.plan = Redrawn(known.plan, scale, is_mirrored);
+    std::vector<Wall> redrawn;
+    for (const PlanLine& line : other.plan) {
+      redrawn.push_back(MakePlanWall(line));
+    }
+    return FindPlaces(other, walls, points, middles, redrawn, stop);
+  };
+  if (!is_absurd) {
+    const std::vector<Place> mirrored = places_of(1.0, true);
+    if (stop && stop()) return {};
+    if (WhyRefused(other, mirrored, length, middles.front()).empty() &&
+        (places.empty() ||
+         known.rival_share * mirrored.front().score > places.front().score)) {
+      return {std::nullopt,
+              "the plan is not used: its mirror image agrees with " +
+                  Fixed(mirrored.front().agreeing, 1) + " m of " +
+                  Fixed(length, 1) + " m of walls, and the plan itself with " +
+                  Fixed(places.empty() ? 0.0 : places.front().agreeing, 1) +
+                  " m: it is drawn mirrored"};
+    }
+  }
+  if (why.empty()) return Placed(places.front(), length);
+  for (const double ratio : kUnitRatios) {
+    for (const double scale : {1.0 / ratio, ratio}) {
+      if (size * scale < kLeastSizeRatio * map_size ||
+          size * scale > kMostSizeRatio * map_size) {
+        continue;
+      }
+      const std::vector<Place> scaled = places_of(scale, false);
+      if (stop && stop()) return {};
+      if (!WhyRefused(other, scaled, length, middles.front()).empty()) continue;
+      return {std::nullopt,
+              why + "; " +
+                  (scale < 1.0 ? Fixed(ratio, 2) + " times smaller"
+                               : Fixed(ratio, 2) + " times larger") +
+                  " it agrees with " + Fixed(scaled.front().agreeing, 1) +
+                  " m: the drawing's unit ($INSUNITS) is another one"};
+    }
+  }
+  return {std::nullopt, why};
 }
 
 }  // namespace plumbline

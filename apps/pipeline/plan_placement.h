@@ -30,9 +30,11 @@ struct PlanPlacement {
 /// are visible, map frame. Walls around a few long ones are looked for in the
 /// plan at every turn that gives them directions of it; the place that most
 /// walls of the whole map agree with counts, when KnownStructure's bounds let
-/// it and no second place comes near. Where `plan_pose` is given it is tried as
-/// well, and only places near it count. Asks `stop` between the steps, and ends
-/// when it returns true.
+/// it and no second place comes near, nor the plan's mirror image fits better.
+/// A plan that is not used is tried in other units of length, so that the note
+/// can name a wrong one. Where `plan_pose` is given it is tried as well, and
+/// only places near it count. Asks `stop` between the steps, and ends when it
+/// returns true.
 PlanPlacement PlacePlan(const KnownStructure& known,
                         const std::vector<Wall>& walls,
                         const std::function<bool()>& stop = nullptr);

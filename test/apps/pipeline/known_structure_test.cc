@@ -575,6 +575,60 @@ TEST(PlanPlacementTest, ARoomThatFitsTwiceIsNotPlaced) {
   EXPECT_THAT(placement.note, HasSubstr("fits in two places"));
 }
 
+// Much of a mirrored plan agrees at one place or another.
+TEST(PlanPlacementTest, AMirroredPlanIsToldAsOne) {
+  KnownStructure known;
+  const Eigen::Vector2d corners[] = {{0.0, 0.0}, {14.0, 0.0}, {14.0, 9.0},
+                                     {4.0, 9.0}, {4.0, 3.0},  {10.0, 3.0},
+                                     {10.0, 6.0}};
+  for (std::size_t i = 0; i + 1 < std::size(corners); ++i) {
+    PlanLine line;
+    line.begin = corners[i];
+    line.end = corners[i + 1];
+    known.plan.push_back(line);
+  }
+  const std::vector<Wall> walls = WallsOf(known.plan, Pose2(1.0, 2.0, 0.3));
+  for (PlanLine& line : known.plan) {
+    line.begin.x() *= -1.0;
+    line.end.x() *= -1.0;
+  }
+  const PlanPlacement placement = PlacePlan(known, walls);
+  EXPECT_FALSE(placement.map_in_plan);
+  EXPECT_THAT(placement.note, HasSubstr("drawn mirrored"));
+}
+
+TEST(PlanPlacementTest, APlanInAnotherUnitIsToldAsOne) {
+  for (const double scale : {1000.0, 3.281, 0.0254}) {
+    KnownStructure known;
+    known.plan = UnevenRoom();
+    const std::vector<Wall> walls = WallsOf(known.plan, Pose2(1.0, 2.0, 0.3));
+    for (PlanLine& line : known.plan) {
+      line.begin *= scale;
+      line.end *= scale;
+    }
+    const PlanPlacement placement = PlacePlan(known, walls);
+    EXPECT_FALSE(placement.map_in_plan) << scale;
+    EXPECT_THAT(placement.note, HasSubstr("$INSUNITS")) << scale;
+  }
+}
+
+// A third of the walls at most can agree, but nearly all of those there.
+TEST(PlanPlacementTest, APlanOfAPartOfTheBuildingIsUsed) {
+  KnownStructure known;
+  known.plan = UnevenRoom();
+  std::vector<PlanLine> building = known.plan;
+  for (const double y : {1.0, 3.0}) {
+    PlanLine line;
+    line.begin = {12.0, y};
+    line.end = {62.0, y};
+    building.push_back(line);
+  }
+  const Pose2 pose(40.0, -25.0, 2.3);
+  const PlanPlacement placement = PlacePlan(known, WallsOf(building, pose));
+  ASSERT_TRUE(placement.map_in_plan) << placement.note;
+  EXPECT_LT(Between(pose, *placement.map_in_plan).head<2>().norm(), 0.05);
+}
+
 TEST(PlanPlacementTest, SaysNothingWhenItIsStopped) {
   KnownStructure known;
   known.plan = UnevenRoom();

@@ -254,6 +254,7 @@ class Search {
       placement.rival = std::max(placement.rival, rival.support());
       if (!is_told) untold_rival_ = rival.support();
     }
+    placement.has_twin = HasTwin(*best);
     placement.misfit = Misfit(*best);
     const bool is_plain = IsPlain(best);
     placement.why_not = WhyNot(best, is_plain, &placement);
@@ -404,6 +405,32 @@ class Search {
     return WhyAnother(best->agreeing, contradictions);
   }
 
+  // Whether next to nothing contradicts of what both have seen at a place.
+  bool IsClean(const Candidate& place) const {
+    double compared = 0.0;
+    double contradicted = 0.0;
+    for (const WindowJudgement& judgement : place.judgements) {
+      compared += judgement.compared;
+      contradicted += judgement.contradicted;
+    }
+    return contradicted <= options_.max_plain_contradicted_share * compared;
+  }
+
+  // Whether there is another place that it may be as well: a rival that is more
+  // than a straight corridor, and that nothing speaks against.
+  bool HasTwin(const Candidate& best) const {
+    return std::any_of(
+        judged_.begin(), judged_.end(), [&](const Candidate& rival) {
+          return &rival != &best &&
+                 rival.support() >
+                     options_.max_certain_rival * best.support() &&
+                 !AreOne(best, rival, windows_, kRivalDistance, kRivalTurn) &&
+                 IsClean(rival) &&
+                 InformationShare(rival) >=
+                     options_.min_certain_information_share;
+        });
+  }
+
   // Whether so much agrees, and so little contradicts, that doors which were
   // opened or shut do not make another building of it.
   bool IsPlain(Candidate* place) {
@@ -414,15 +441,7 @@ class Search {
         InformationShare(*place) < options_.min_certain_information_share) {
       return false;
     }
-    double compared = 0.0;
-    double contradicted = 0.0;
-    for (const WindowJudgement& judgement : place->judgements) {
-      compared += judgement.compared;
-      contradicted += judgement.contradicted;
-    }
-    if (contradicted > options_.max_plain_contradicted_share * compared) {
-      return false;
-    }
+    if (!IsClean(*place) || HasTwin(*place)) return false;
     const WallContradictions& contradictions = ContradictionsOf(place);
     const auto changed = static_cast<double>(contradictions.number());
     return contradictions.longest() <= options_.max_contradicting_stretch &&

@@ -26,6 +26,10 @@ struct TrackPlacement {
   int contradicting = 0;
   int doubtful = 0;
   double rival = 0.0;
+  /// It may as well be in another place, which nothing speaks against, as in a
+  /// building that looks the same from its other end: which one it is the other
+  /// way round cannot tell, either.
+  bool has_twin = false;
   /// How far the agreeing windows lie from where `pose` puts them: the RMS, m.
   double misfit = 0.0;
   /// Pieces of wall of the track that the map looks through, those of the map

@@ -484,6 +484,10 @@ struct Floor {
   // above and into the third below.
   std::set<std::size_t> shut[2];
   bool is_back = false;
+  // The rooms below are those above turned by 180 degrees.
+  bool is_turned = false;
+  // How far along the corridor the robot drives.
+  double until = 36.0;
 };
 
 Log DriveAlong(const Floor& floor, std::uint64_t seed) {
@@ -507,9 +511,13 @@ Log DriveAlong(const Floor& floor, std::uint64_t seed) {
       }
       if (room > 0) wall(begin, 1.1 * side, begin, 6.1 * side);
       // A desk and a shelf.
-      wall(begin + 0.7, 5.2 * side, 0.5 * (begin + end), 5.2 * side);
-      wall(end - 0.4, 3.5 * side, end - 0.4, 5.0 * side);
-      if (row == 0 ? room == 1 || room == 4 : room == 2) {
+      const bool is_mirrored = floor.is_turned && row == 1;
+      wall(is_mirrored ? end - 0.7 : begin + 0.7, 5.2 * side,
+           0.5 * (begin + end), 5.2 * side);
+      const double shelf = is_mirrored ? begin + 0.4 : end - 0.4;
+      wall(shelf, 3.5 * side, shelf, 5.0 * side);
+      if (door < floor.until &&
+          (row == 0 || floor.is_turned ? room == 1 || room == 4 : room == 2)) {
         visits.emplace_back(door, side);
       }
     }
@@ -523,7 +531,7 @@ Log DriveAlong(const Floor& floor, std::uint64_t seed) {
       way.emplace_back(x, y * side);
     }
   }
-  way.emplace_back(35.0, 0.0);
+  way.emplace_back(floor.until - 1.0, 0.0);
   if (floor.is_back) std::reverse(way.begin(), way.end());
   world << "path";
   for (const auto& [x, y] : way) world << ' ' << x << ' ' << y;
@@ -555,6 +563,33 @@ TEST_F(SeveralLogsTest, DoorsOpenedAndShutMakeNoOtherBuilding) {
     // Odometry begins where the way does.
     const Pose2 first = result.maps[0].result.trajectory[result.logs[1].begin];
     EXPECT_LT(std::hypot(first[0] - (is_turned ? 1.0 : 35.0), first[1]), 0.3);
+  }
+}
+
+// A building that looks the same from its other end: a log of one half may be
+// of either, and which one comes first does not tell.
+TEST_F(SeveralLogsTest, AHalfThatFitsAtBothEndsIsKeptApart) {
+  Floor whole;
+  whole.is_turned = true;
+  whole.ends[1].clear();
+  whole.doors[1].clear();
+  for (std::size_t i = whole.ends[0].size(); i-- > 0;) {
+    whole.ends[1].push_back(36.0 - whole.ends[0][i]);
+  }
+  for (std::size_t i = whole.doors[0].size(); i-- > 0;) {
+    whole.doors[1].push_back(36.0 - whole.doors[0][i]);
+  }
+  Floor half = whole;
+  half.until = 17.0;
+  const Log one = DriveAlong(whole, 1);
+  const Log other = DriveAlong(half, 2);
+  for (const auto& logs : {std::vector<Log>{one, other}, {other, one}}) {
+    const SeveralLogsResult result = SolveSeveralLogs(registry_, logs, {});
+    EXPECT_EQ(result.maps.size(), 2u);
+    EXPECT_TRUE(result.logs[1].candidate.has_value());
+    EXPECT_TRUE(result.logs[1].placement.has_twin);
+    EXPECT_THAT(result.logs[1].placement.why_not,
+                ::testing::HasSubstr("place"));
   }
 }
 

@@ -353,14 +353,18 @@ class Merger {
   // A log of which only a part is in the map says less than the map says that
   // has all of its place in the log: whether two logs are one building must not
   // hang on which comes first. Finds a mere candidate when the map finds its
-  // place in the log there. Which of two places is meant nobody can say.
+  // place in the log there, by more than a corner that others have, too. Which
+  // of two places is meant nobody can say.
   void PlaceTheOtherWay(const std::vector<KeyView>& map,
                         const std::vector<KeyView>& track,
                         const TrackPlacementOptions& options,
                         TrackPlacement* placement) {
     const TrackPlacement other =
         PlaceTrack(track, map, std::nullopt, options, control_.run.stop);
-    if (!other.found || other.has_twin) return;
+    if (!other.found || other.has_twin ||
+        other.agreeing < options.min_plain_agreeing) {
+      return;
+    }
     const Pose2& seen_from = track[static_cast<std::size_t>(other.from)].pose;
     const Pose2 apart = Between(Compose(Inverse(other.pose), seen_from),
                                 Compose(placement->pose, seen_from));

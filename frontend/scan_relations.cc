@@ -3,6 +3,7 @@
 #include <plumbline/frontend/frontend_state.h>
 #include <plumbline/frontend/scan_relations.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -21,6 +22,11 @@ constexpr std::size_t kSubmapsAtOnce = 16;
 // fewer each than two do.
 constexpr std::size_t kMany = 40;
 constexpr double kShareOfMany = 0.7;
+
+// The part of the weakest direction that is a shift, m, from which on it is one
+// along something; keeps numbers finite, 1/m^2.
+constexpr double kLeastShift = 0.5;
+constexpr double kLeastInformation = 1e-9;
 
 // Places [begin, end).
 struct Submap {
@@ -134,6 +140,54 @@ std::vector<int> Spread(const std::vector<std::pair<double, int>>& near,
     chosen.push_back(unknown[(2 * i + 1) * unknown.size() / (2 * room)]);
   }
   return chosen;
+}
+
+// What a match says of the pose of a scan, given where the scan was before.
+struct MatchMeasurement {
+  Pose2 mean = Pose2::Zero();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+};
+
+// Along what shows no place along it, as a corridor, a match moves a scan by
+// what normals scatter, and matches against the way back all to one side. That
+// is taken back but for what the returns know of it. What they know across it
+// holds for where the scan is: it is uncertain by what may be different where
+// the scan turns out to be, or else matches with slightly different directions
+// of "along" would hold a scan in place where none of them knows one.
+MatchMeasurement WithoutSlide(const Pose2& pose,
+                              const Eigen::Matrix3d& information,
+                              const MatchPrior& prior,
+                              const ScanRelationOptions& options) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
+  const Eigen::Vector3d along = solver.eigenvectors().col(0);
+  const double shift = along.head<2>().norm();
+  // A turn that nothing shows is no slide.
+  if (shift < kLeastShift) return {pose, information};
+  const Eigen::Vector3d by_metre = along / shift;
+  const double by_returns = by_metre.dot(information * by_metre);
+  const double by_prior = by_metre.dot(prior.information * by_metre);
+  const double moved = by_metre.head<2>().dot((pose - prior.pose).head<2>());
+  MatchMeasurement measurement;
+  measurement.mean =
+      pose - by_metre * (moved * by_prior / (by_prior + by_returns));
+  measurement.mean[2] = NormalizeAngle(measurement.mean[2]);
+  const double square =
+      1.0 / std::max(by_returns,
+                     1.0 / (options.longest_slide * options.longest_slide));
+  const Eigen::Vector3d per_metre(options.slide_across, options.slide_across,
+                                  options.slide_turn);
+  const Eigen::Matrix<double, 3, 2> across =
+      solver.eigenvectors().rightCols<2>();
+  Eigen::Matrix2d covariance =
+      square * across.transpose() * per_metre.cwiseAbs2().asDiagonal() * across;
+  for (int i = 0; i < 2; ++i) {
+    covariance(i, i) +=
+        1.0 / std::max(kLeastInformation, solver.eigenvalues()[i + 1]);
+  }
+  measurement.information =
+      across * covariance.inverse() * across.transpose() +
+      std::max(0.0, solver.eigenvalues()[0]) * along * along.transpose();
+  return measurement;
 }
 
 // For each submap the places to match with it, ascending. `is_known`: whether
@@ -275,8 +329,11 @@ std::vector<ScanRelation> ScanMatchFinder::Find(
         const MatchResult match = matcher.Refine(scan, here.pose, here);
         if (match.inlier_ratio >= options_.min_inlier_ratio) {
           attempt.is_match = true;
-          attempt.relation = {middle, k, match.pose,
-                              static_cast<double>(stride) * match.information};
+          const MatchMeasurement measurement = WithoutSlide(
+              match.pose, static_cast<double>(stride) * match.information, here,
+              options_);
+          attempt.relation = {middle, k, measurement.mean,
+                              measurement.information};
         }
       }
       attempts.emplace(k, attempt);

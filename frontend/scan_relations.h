@@ -32,6 +32,13 @@ struct ScanRelationOptions {
   /// Standard deviations of the present poses while matching, m and rad.
   double prior_translation = 0.3;
   double prior_rotation = DegToRad(3.0);
+  /// By how much another place and heading would be measured across a corridor,
+  /// m and rad, for each metre that the scan turns out to be farther along it,
+  /// and the farthest that it may, m: walls bend and normals scatter by so
+  /// much.
+  double slide_across = 0.02;
+  double slide_turn = 0.002;
+  double longest_slide = 1.0;
   /// Two places whose relative pose has changed by more, m or rad, since they
   /// were matched or tried are matched anew.
   double retry_distance = 0.1;
@@ -79,7 +86,8 @@ struct ScanRelation {
   /// Pose of `to` in the frame of `from`.
   Pose2 mean = Pose2::Zero();
   /// Inverse covariance of `mean` in the frame of `from` from the returns alone
-  /// (m, m, rad): rank deficient along a corridor.
+  /// (m, m, rad): rank deficient along a corridor, where `mean` is as before
+  /// the match.
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
 };
 

@@ -3,6 +3,7 @@
 #include <plumbline/frontend/scan_relations.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "frontend/synthetic_world.h"
@@ -92,6 +93,46 @@ TEST_F(ScanRelationsTest, ACorridorSaysNothingAlong) {
     EXPECT_LT(along.dot(relation.information * along),
               0.02 * across.dot(relation.information * across));
   }
+}
+
+// Scatter of normals would move it by centimetres, and what it knows across the
+// corridor hold it there.
+TEST_F(ScanRelationsTest, ACorridorLeavesAScanWhereItWasAlong) {
+  Drive(testing::Corridor());
+  const std::vector<Pose2> poses = Drifted(Pose2(0.2, 0.0, 0.0));
+  double farthest = 0.0;
+  for (const ScanRelation& relation :
+       FindScanRelations(places_, poses, options_)) {
+    const Pose2 before = Between(poses[relation.from], poses[relation.to]);
+    const double heading = truth_[relation.from][2];
+    const Eigen::Vector2d along(std::cos(heading), -std::sin(heading));
+    farthest = std::max(
+        farthest, std::abs(along.dot((relation.mean - before).head<2>())));
+  }
+  EXPECT_LT(farthest, 0.01);
+}
+
+// A metre farther along, another place across may be measured.
+TEST_F(ScanRelationsTest, AcrossACorridorLessIsKnownWhereAlongItNothingIs) {
+  const auto least_across = [this](const std::vector<WallEnds>& walls) {
+    places_.clear();
+    truth_.clear();
+    Drive(walls);
+    double least = 1e9;
+    for (const ScanRelation& relation :
+         FindScanRelations(places_, truth_, options_)) {
+      const double heading = truth_[relation.from][2];
+      const Eigen::Vector3d across(std::sin(heading), std::cos(heading), 0.0);
+      least = std::min(least, across.dot(relation.information * across));
+    }
+    return least;
+  };
+  // 0.02 m for each of up to 1 m, and 3 mm or so of the returns.
+  EXPECT_NEAR(least_across(testing::Corridor()), 1.0 / (0.02 * 0.02), 250.0);
+  EXPECT_GT(least_across(testing::Room(10.0, 6.0)), 8000.0);
+  options_.slide_across = 0.0;
+  options_.slide_turn = 0.0;
+  EXPECT_GT(least_across(testing::Corridor()), 8000.0);
 }
 
 TEST_F(ScanRelationsTest, NothingWhereNothingIsSeenByBoth) {

@@ -454,9 +454,12 @@ TEST_F(LogSolverTest, TellsOfATrackThatHangsByAGuess) {
   }
   LogSolver solver(registry_, {});
   const LogSolverResult result = solver.Run(log);
-  ASSERT_FALSE(result.loose.empty());
-  EXPECT_FALSE(result.loose.front().found);
-  EXPECT_NEAR(result.loose.front().begin, 199, 2);
+  // Odometry has another metre in the other building: ways may be told, too.
+  const auto guess =
+      std::find_if(result.loose.begin(), result.loose.end(),
+                   [](const LooseTrack& track) { return !track.found; });
+  ASSERT_NE(guess, result.loose.end());
+  EXPECT_NEAR(guess->begin, 199, 2);
 }
 
 TEST_F(LogSolverTest, SameBytesEveryTime) {

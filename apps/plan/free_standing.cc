@@ -19,9 +19,11 @@ constexpr double kLongest = 5.0;
 // So much of it, m, and of all that is wall between two regions this share
 // makes them one, if a gap between them is wider than a door, m, as the wall
 // between two doors stands free as well, and no more than this share of the
-// border was not seen.
+// border was not seen; and no more than this share of it is drawn as wall: the
+// front of a room between its door and a glazed stretch is more.
 constexpr double kLeastStanding = 1.5;
 constexpr double kStandingShare = 0.9;
+constexpr double kMostWall = 0.6;
 constexpr double kLeastGap = 1.4;
 constexpr double kMostUnseen = 0.1;
 constexpr double kStep = WallProfile::kStep;
@@ -153,6 +155,7 @@ void JoinAcrossFreeStanding(const SpaceGrid& space,
   for (const auto& [pair, divider] : borders) {
     if (divider.standing < kLeastStanding ||
         divider.standing < kStandingShare * divider.wall ||
+        divider.wall > kMostWall * divider.all ||
         divider.widest_gap < kLeastGap ||
         divider.unseen > kMostUnseen * divider.all) {
       continue;

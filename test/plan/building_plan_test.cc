@@ -443,6 +443,18 @@ TEST(BuildingPlanTest, WhatStandsFreeDividesNoRoom) {
   EXPECT_EQ(RoomsWithScreens(0.9), 2u);
 }
 
+TEST(BuildingPlanTest, TheFrontBetweenADoorAndAGlazedStretchIsAWall) {
+  const auto rooms = [](double wall) {
+    Drawing drawing(16.0, 12.0);
+    drawing.Room(1.0, 1.0, 3.4 + wall, 10.0);
+    drawing.Fill(1.9, 5.5, 1.9 + wall, 5.55, Space::kOccupied);
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms(4.6), 2u);
+  // A screen leaves as much open.
+  EXPECT_EQ(rooms(2.0), 1u);
+}
+
 TEST(BuildingPlanTest, AnOpenFrontInALongWallKeepsAnOfficeApart) {
   const auto plan = [](double begin) {
     Drawing drawing(16.0, 14.0);

@@ -85,10 +85,7 @@ Comparison Compare(const std::vector<ScanPoint>& before,
     const ScanPoint& point = now[i];
     if (point.range > options.max_range || point.is_between) continue;
     const Vector2d was = transform.Point(point.position);
-    const Vector2d shift = was - point.position;
-    const double says = point.normal.isZero()
-                            ? shift.norm()
-                            : std::abs(point.normal.dot(shift));
+    const double says = ShiftAlongNormal(point, was);
     if (says < options.least_shift) continue;
     const bool stays = near.DistanceTo(point.position, point.normal) <=
                        std::min(NearPoints::kGate, options.stays * says);

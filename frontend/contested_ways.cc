@@ -81,11 +81,7 @@ class Comparison {
         continue;
       }
       const Vector2d was = transform.Point(point.position);
-      const Vector2d shift = was - point.position;
-      const double says = point.normal.isZero()
-                              ? shift.norm()
-                              : std::abs(point.normal.dot(shift));
-      if (says < options_.least_shift) continue;
+      if (ShiftAlongNormal(point, was) < options_.least_shift) continue;
       const bool stays =
           near.DistanceTo(point.position, point.normal) <= options_.near;
       const bool stands =

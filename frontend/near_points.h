@@ -49,6 +49,17 @@ class NearPoints {
   std::vector<Eigen::Vector2d> places_;
 };
 
+/// How far apart, along its normal, a return is where its surface stands and
+/// where it goes along with the robot, m: `was` is where the scan before would
+/// have had it if it stood, and its own position (robot's frame) where it has
+/// it if it goes along. Along every direction where the normal is zero.
+inline double ShiftAlongNormal(const ScanPoint& point,
+                               const Eigen::Vector2d& was) {
+  const Eigen::Vector2d shift = was - point.position;
+  return point.normal.isZero() ? shift.norm()
+                               : std::abs(point.normal.dot(shift));
+}
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_FRONTEND_NEAR_POINTS_H_

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace plumbline {
 
@@ -39,37 +40,51 @@ std::optional<SightCrossing> CrossingOf(const Wall& wall,
 
 PlacedLooks::PlacedLooks(const Looks& looks, const Graph& graph) {
   placed_.reserve(looks.size());
+  positions_.reserve(looks.size());
+  // Looks of one frame mostly follow each other.
+  FeatureId last = kNoId;
+  Placed placed;
+  PoseTransform to_map(placed.frame);
+  bool has_place = true;
   for (const Look& look : looks) {
-    Placed placed;
-    placed.look = &look;
-    if (look.frame != kNoId) {
-      const Feature* feature = graph.FindFeature(look.frame);
-      if (feature == nullptr || !feature->type->frame) continue;
-      placed.frame = feature->type->frame(*feature);
+    if (look.frame != last) {
+      last = look.frame;
+      placed.frame = Pose2::Zero();
+      has_place = true;
+      if (last != kNoId) {
+        const Feature* feature = graph.FindFeature(last);
+        has_place = feature != nullptr && feature->type->frame;
+        if (has_place) placed.frame = feature->type->frame(*feature);
+      }
+      to_map = PoseTransform(placed.frame);
+      placed.axis = to_map.Direction(Eigen::Vector2d::UnitX());
     }
-    placed.axis =
-        Eigen::Vector2d(std::cos(placed.frame[2]), std::sin(placed.frame[2]));
-    const Eigen::Vector2d sensor = TransformPoint(placed.frame, look.sensor);
-    by_x_.push_back({sensor.x(), sensor.y(), placed_.size()});
+    if (!has_place) continue;
+    placed.look = &look;
+    placed.sensor = to_map.Point(look.sensor);
+    positions_.push_back({RowAt(placed.sensor.y()), placed.sensor.x(),
+                          placed.sensor.y(), placed_.size()});
     placed_.push_back(placed);
   }
-  std::sort(by_x_.begin(), by_x_.end(),
+  std::sort(positions_.begin(), positions_.end(),
             [](const Position& a, const Position& b) {
-              return a.x < b.x || (a.x == b.x && a.index < b.index);
+              return std::tie(a.row, a.x, a.index) <
+                     std::tie(b.row, b.x, b.index);
             });
+}
+
+double PlacedLooks::RowAt(double y) {
+  // As high as what is asked for reaches: few rows, and little else in them.
+  constexpr double kHeight = 4.0;
+  return std::floor(y / kHeight);
 }
 
 Wall PlacedLooks::Seen(std::size_t i, const Wall& wall) const {
   const Placed& placed = placed_[i];
-  const auto turned = [&placed](const Eigen::Vector2d& vector) {
-    return Eigen::Vector2d(
-        placed.axis.dot(vector),
-        placed.axis.x() * vector.y() - placed.axis.y() * vector.x());
-  };
   Wall seen;
-  seen.position = turned(wall.position - placed.frame.head<2>());
+  seen.position = DirectionSeen(i, wall.position - placed.frame.head<2>());
   seen.angle = NormalizeAngle(wall.angle - placed.frame[2]);
-  seen.direction = turned(wall.direction);
+  seen.direction = DirectionSeen(i, wall.direction);
   seen.begin = wall.begin;
   seen.end = wall.end;
   return seen;
@@ -85,17 +100,27 @@ std::vector<std::size_t> PlacedLooks::Near(const Wall& wall,
   const double above = std::max(begin.y(), end.y());
   std::vector<std::size_t> near;
   if (!(wall.begin <= wall.end)) return near;
+  const double last_row = RowAt(above + range);
   auto entry = std::lower_bound(
-      by_x_.begin(), by_x_.end(), left - range,
-      [](const Position& position, double x) { return position.x < x; });
-  for (; entry != by_x_.end() && entry->x <= right + range; ++entry) {
-    if (entry->y < below - range || entry->y > above + range) continue;
-    const Eigen::Vector2d sensor(entry->x, entry->y);
-    const double along = std::clamp(wall.Along(sensor), wall.begin, wall.end);
-    if ((sensor - wall.At(along)).squaredNorm() > range * range) continue;
-    near.push_back(entry->index);
+      positions_.begin(), positions_.end(), RowAt(below - range),
+      [](const Position& position, double row) { return position.row < row; });
+  while (entry != positions_.end() && entry->row <= last_row) {
+    const auto row_end =
+        std::upper_bound(entry, positions_.end(), entry->row,
+                         [](double row, const Position& position) {
+                           return row < position.row;
+                         });
+    entry = std::lower_bound(
+        entry, row_end, left - range,
+        [](const Position& position, double x) { return position.x < x; });
+    for (; entry != row_end && entry->x <= right + range; ++entry) {
+      const Eigen::Vector2d sensor(entry->x, entry->y);
+      const double along = std::clamp(wall.Along(sensor), wall.begin, wall.end);
+      if ((sensor - wall.At(along)).squaredNorm() > range * range) continue;
+      near.push_back(entry->index);
+    }
+    entry = row_end;
   }
-  std::sort(near.begin(), near.end());
   return near;
 }
 

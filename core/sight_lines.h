@@ -76,8 +76,19 @@ class PlacedLooks {
   /// The frame of a look in the map.
   const Pose2& frame(std::size_t i) const { return placed_[i].frame; }
   /// Those whose sensor stands within `range`, m, of the visible part of a
-  /// wall (map frame), ascending.
+  /// wall (map frame), in no order that means anything.
   std::vector<std::size_t> Near(const Wall& wall, double range) const;
+  /// Where the sensor of a look stands in the map, m.
+  const Eigen::Vector2d& sensor(std::size_t i) const {
+    return placed_[i].sensor;
+  }
+  /// A direction of the map in the frame of a look.
+  Eigen::Vector2d DirectionSeen(std::size_t i,
+                                const Eigen::Vector2d& direction) const {
+    const Eigen::Vector2d& axis = placed_[i].axis;
+    return {axis.dot(direction),
+            axis.x() * direction.y() - axis.y() * direction.x()};
+  }
   /// A wall of the map in the frame of a look.
   Wall Seen(std::size_t i, const Wall& wall) const;
 
@@ -87,16 +98,22 @@ class PlacedLooks {
     Pose2 frame = Pose2::Zero();
     // The frame's x axis in the map.
     Eigen::Vector2d axis = Eigen::Vector2d::UnitX();
+    // The sensor in the map.
+    Eigen::Vector2d sensor = Eigen::Vector2d::Zero();
   };
-  // Position of a sensor in the map.
+  // Position of a sensor in the map, which is cut into rows along x.
   struct Position {
+    double row = 0.0;
     double x = 0.0;
     double y = 0.0;
     std::size_t index = 0;
   };
+  // The row of a place, by its y.
+  static double RowAt(double y);
+
   std::vector<Placed> placed_;
-  // Ascending by x.
-  std::vector<Position> by_x_;
+  // Ascending by row, and by x within each.
+  std::vector<Position> positions_;
 };
 
 /// When a piece of a wall counts as seen through.

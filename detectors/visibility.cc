@@ -50,6 +50,15 @@ void Bind(ParameterBinder* parameters, VisibilityOptions* options) {
            "... with lines that end this far behind");
 }
 
+// How far a box reaches along a direction, m.
+double Farthest(const Eigen::AlignedBox2d& box,
+                const Eigen::Vector2d& direction) {
+  const auto most = [&](int i) {
+    return direction[i] * (direction[i] > 0.0 ? box.max()[i] : box.min()[i]);
+  };
+  return box.isEmpty() ? 0.0 : most(0) + most(1);
+}
+
 // A wall of the graph with its feature.
 struct GraphWall {
   FeatureId id = kNoId;
@@ -58,6 +67,7 @@ struct GraphWall {
 
 // A sight line that went through a wall.
 struct Violation {
+  std::size_t look = 0;
   FeatureId frame = kNoId;
   // End in the frame, cut by the margin, and side of the sensor.
   Eigen::Vector3d expected;
@@ -68,7 +78,7 @@ struct Violation {
 
 // What looks say about a wall.
 struct WallFinding {
-  // The worst few of each look, the worst first.
+  // The worst few of each look, the worst first, by look.
   std::vector<Violation> worst;
   std::int64_t looks = 0;
   std::int64_t crossings = 0;
@@ -108,6 +118,8 @@ SectoredLook InSectors(const Look& look) {
     const std::size_t sector = SectorOf(end - look.sensor);
     sectored.reach[sector] = std::max(
         sectored.reach[sector], static_cast<float>((end - look.sensor).norm()));
+    sectored.boxes[sector / SectoredLook::kGroup].extend(end - look.sensor);
+    sectored.box.extend(end - look.sensor);
     ++sectored.begin[sector + 1];
     ends.emplace_back(sector, end);
   }
@@ -236,6 +248,7 @@ class Search {
       const Look& look = placed_.look(i);
       if (look.frame == kNoId || Contains(measured_by, look.frame)) continue;
       ++finding.looks;
+      if (!MayGoThrough(i, of.wall)) continue;
       const Wall wall = placed_.Seen(i, of.wall);
       crossings.clear();
       VisitThrough(look, wall, begin, end, [&](const Eigen::Vector2d& at) {
@@ -262,11 +275,31 @@ class Search {
         const Eigen::Vector2d cut =
             at - options_.margin / (crossing.slant * line.norm()) * line;
         finding.worst.push_back(
-            {look.frame, Eigen::Vector3d(cut.x(), cut.y(), crossing.side),
+            {i, look.frame, Eigen::Vector3d(cut.x(), cut.y(), crossing.side),
              wall.normal(), crossing.beyond});
       }
     }
+    std::stable_sort(finding.worst.begin(), finding.worst.end(),
+                     [](const Violation& one, const Violation& other) {
+                       return one.look < other.look;
+                     });
     return finding;
+  }
+
+  // Whether a look has ends farther away than a wall (map frame), as far as its
+  // box tells.
+  bool MayGoThrough(std::size_t i, const Wall& wall) const {
+    // More than the rounding between the two frames.
+    constexpr double kRounding = 1e-6;
+    const double distance = wall.Across(placed_.sensor(i));
+    const Eigen::Vector2d behind = placed_.DirectionSeen(
+        i, distance > 0.0 ? -wall.normal() : wall.normal());
+    return Farthest(SectoredOf(placed_.look(i)).box, behind) + kRounding >
+           std::abs(distance) + options_.margin;
+  }
+
+  const SectoredLook& SectoredOf(const Look& look) const {
+    return sectored_[static_cast<std::size_t>(&look - looks_.data())];
   }
 
   // Calls visit(end) for the sight lines of a look, and few others, that go
@@ -276,26 +309,35 @@ class Search {
                     double end, const Visit& visit) const {
     // A line may reach this much farther than along the edges of its sector.
     constexpr double kBetweenEdges = 1.01;
-    const SectoredLook& sectored =
-        sectored_[static_cast<std::size_t>(&look - looks_.data())];
+    const SectoredLook& sectored = SectoredOf(look);
     const auto& edges = SectorEdges();
     const double distance = wall.Across(look.sensor);
     const double least = std::abs(distance) + options_.margin;
     const Eigen::Vector2d normal = wall.normal();
+    const Eigen::Vector2d behind = distance > 0.0 ? -normal : normal;
     // Counterclockwise, for a sensor to the left of the wall.
     const std::size_t first =
         SectorOf(wall.At(distance > 0.0 ? begin : end) - look.sensor);
     const std::size_t last =
         SectorOf(wall.At(distance > 0.0 ? end : begin) - look.sensor);
-    for (std::size_t k = first;; k = (k + 1) % SectoredLook::kSectors) {
-      const double steepness = std::max(std::abs(normal.dot(edges[k])),
-                                        std::abs(normal.dot(edges[k + 1])));
-      if (kBetweenEdges * steepness * sectored.reach[k] > least) {
-        for (int e = sectored.begin[k]; e < sectored.begin[k + 1]; ++e) {
-          visit(sectored.ends[static_cast<std::size_t>(e)]);
+    for (std::size_t k = first;;) {
+      const std::size_t group = k / SectoredLook::kGroup;
+      // The loop ends in this group, or goes on behind it.
+      const std::size_t group_last = (group + 1) * SectoredLook::kGroup - 1;
+      const bool is_last = k <= last && last <= group_last;
+      if (Farthest(sectored.boxes[group], behind) > least) {
+        for (const std::size_t end_of = is_last ? last : group_last;
+             k <= end_of; ++k) {
+          const double steepness = std::max(std::abs(normal.dot(edges[k])),
+                                            std::abs(normal.dot(edges[k + 1])));
+          if (kBetweenEdges * steepness * sectored.reach[k] <= least) continue;
+          for (int e = sectored.begin[k]; e < sectored.begin[k + 1]; ++e) {
+            visit(sectored.ends[static_cast<std::size_t>(e)]);
+          }
         }
       }
-      if (k == last) break;
+      if (is_last) break;
+      k = (group_last + 1) % SectoredLook::kSectors;
     }
   }
 
@@ -384,15 +426,19 @@ class Search {
   // The features that live measurements tie to a wall, and the wall, ascending:
   // looks of these frames know where it is.
   std::vector<FeatureId> FramesOf(FeatureId wall) const {
-    std::vector<FeatureId> frames = {wall};
-    for (const ConstraintId id : graph_.ConstraintsOf(wall)) {
+    const auto& constraints = graph_.ConstraintsOf(wall);
+    std::vector<FeatureId> frames;
+    frames.reserve(constraints.size() + 1);
+    frames.push_back(wall);
+    for (const ConstraintId id : constraints) {
       const Constraint& constraint = *graph_.FindConstraint(id);
       if (constraint.state != ConstraintState::kLive ||
           constraint.kind != ConstraintClass::kMeasurement) {
         continue;
       }
-      frames.insert(frames.end(), constraint.features.begin(),
-                    constraint.features.end());
+      for (const FeatureId feature : constraint.features) {
+        if (feature != wall) frames.push_back(feature);
+      }
     }
     std::sort(frames.begin(), frames.end());
     return frames;

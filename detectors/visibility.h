@@ -7,6 +7,7 @@
 #include <plumbline/factors/angle.h>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
 #include <memory>
@@ -54,6 +55,12 @@ struct SectoredLook {
   std::array<int, kSectors + 1> begin{};
   /// Length of the longest in each sector, m.
   std::array<float, kSectors> reach{};
+  /// Sectors in each of the groups that are looked at together.
+  static constexpr std::size_t kGroup = 8;
+  /// Box around the ends of each group and of all, from the sensor on along the
+  /// axes of its frame, m; empty where there are none.
+  std::array<Eigen::AlignedBox2d, kSectors / kGroup> boxes;
+  Eigen::AlignedBox2d box;
 };
 
 /// Holds walls back from where the sensor has looked through: proposes, for

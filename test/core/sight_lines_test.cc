@@ -4,8 +4,10 @@
 #include <plumbline/core/registry.h>
 #include <plumbline/core/sight_lines.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -81,7 +83,7 @@ TEST_F(PlacedLooksTest, MovesWithItsFrame) {
   // The sensor is at (5, 2), the wall 2 in front of it.
   EXPECT_EQ(placed.Near(wall, 2.01), (std::vector<std::size_t>{0}));
   EXPECT_TRUE(placed.Near(wall, 1.99).empty());
-  EXPECT_EQ(placed.Near(wall, 30.0), (std::vector<std::size_t>{0, 1}));
+  EXPECT_EQ(placed.Near(wall, 30.0).size(), 2u);
   // One whose ends are the wrong way round has no visible part.
   EXPECT_TRUE(placed.Near(AlongX(4.0, 10.0, 0.0), 30.0).empty());
   const Wall seen = placed.Seen(0, wall);
@@ -91,6 +93,37 @@ TEST_F(PlacedLooksTest, MovesWithItsFrame) {
 
   graph_.GetFeature(pose).parameters[1] = 0.5;
   EXPECT_TRUE(PlacedLooks(looks, graph_).Near(wall, 2.01).empty());
+}
+
+TEST_F(PlacedLooksTest, NearIsWhatIsWithinRange) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> place(-25.0, 25.0);
+  Looks looks(400);
+  for (Look& look : looks) {
+    look.frame = Add("pose", Pose2(place(random), place(random), 1.0));
+    look.sensor = Vector2d(0.3, -0.1);
+  }
+  const PlacedLooks placed(looks, graph_);
+  ASSERT_EQ(placed.size(), looks.size());
+  std::size_t found = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Wall wall = MakeWall(Vector2d(place(random), place(random)), 0.13 * k,
+                               -0.1 * k, 0.05 * k);
+    const double range = 0.1 + 0.03 * k;
+    std::vector<std::size_t> near = placed.Near(wall, range);
+    std::sort(near.begin(), near.end());
+    std::vector<std::size_t> expected;
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      const Vector2d sensor =
+          TransformPoint(placed.frame(i), placed.look(i).sensor);
+      EXPECT_NEAR((placed.sensor(i) - sensor).norm(), 0.0, 1e-12);
+      const double along = std::clamp(wall.Along(sensor), wall.begin, wall.end);
+      if ((sensor - wall.At(along)).norm() <= range) expected.push_back(i);
+    }
+    EXPECT_EQ(near, expected) << k;
+    found += near.size();
+  }
+  EXPECT_GT(found, 2000u);
 }
 
 // Looks from y = 2 straight down at the wall y = 0, 0.05 apart: to y = 0 where

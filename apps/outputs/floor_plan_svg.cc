@@ -59,10 +59,27 @@ Box BuildingBounds(const FloorPlan& plan, const Matrix2d& rotation) {
   return box;
 }
 
+// Whether a wall is a scrap seen through a window, far outside of the building
+// (its bounds, turned by `rotation`): it would make the drawing small.
+bool IsScrap(const FloorPlanWall& wall, const Box& building,
+             const Matrix2d& rotation) {
+  // m.
+  constexpr double kLength = 1.5;
+  constexpr double kAround = 3.0;
+  if ((wall.end - wall.begin).norm() > kLength) return false;
+  const Vector2d middle = rotation * (0.5 * (wall.begin + wall.end));
+  return !((middle - building.low).minCoeff() > -kAround &&
+           (building.high - middle).minCoeff() > -kAround);
+}
+
 // Bounds of all that is drawn, turned by `rotation`, m.
 Box BoundsOf(const FloorPlan& plan, const Matrix2d& rotation) {
   Box box = BuildingBounds(plan, rotation);
+  const Box building = box;
   for (const FloorPlanWall& wall : plan.walls) {
+    if (!plan.building.rooms.empty() && IsScrap(wall, building, rotation)) {
+      continue;
+    }
     box.Add(rotation * wall.begin);
     box.Add(rotation * wall.end);
   }
@@ -328,7 +345,10 @@ std::string PlanGroup(const FloorPlan& plan, const Sheet& sheet) {
     std::string walls;
     for (const FloorPlanWall& wall : plan.walls) {
       if (wall.direction != direction) continue;
-      if (has_rooms && IsShown(plan.building, wall)) continue;
+      if (has_rooms && (IsShown(plan.building, wall) ||
+                        IsScrap(wall, sheet.measured, sheet.rotation))) {
+        continue;
+      }
       walls += "<line x1=\"" + Metres(wall.begin[0]) + "\" y1=\"" +
                Metres(wall.begin[1]) + "\" x2=\"" + Metres(wall.end[0]) +
                "\" y2=\"" + Metres(wall.end[1]) + "\" data-features=\"";

@@ -425,6 +425,32 @@ TEST_F(FloorPlanTest, SvgOfRooms) {
   EXPECT_THAT(svg, Not(HasSubstr("x2=\"4.0000\"")));
 }
 
+TEST_F(FloorPlanTest, SvgWithoutScrapsFarOutside) {
+  const auto svg_with = [](double length, double y) {
+    FloorPlan plan = PlanWithRooms();
+    FloorPlanWall wall;
+    wall.begin = {3.0, y};
+    wall.end = {3.0 + length, y};
+    wall.features = {4711};
+    plan.walls.push_back(wall);
+    return Svg(plan);
+  };
+  const std::string feature = "data-features=\"4711\"";
+  EXPECT_THAT(svg_with(1.4, 60.0), Not(HasSubstr(feature)));
+  EXPECT_THAT(svg_with(1.4, 60.0), HasSubstr("Scale 1:100;"));
+  EXPECT_THAT(svg_with(1.6, 60.0), HasSubstr(feature));
+  EXPECT_THAT(svg_with(1.6, 60.0), Not(HasSubstr("Scale 1:100;")));
+  EXPECT_THAT(svg_with(1.4, 7.0), HasSubstr(feature));
+  // Without a building nothing is outside of it.
+  FloorPlan plan;
+  plan.walls.resize(2);
+  plan.walls[0].end = {5.0, 0.0};
+  plan.walls[1].begin = {50.0, 0.0};
+  plan.walls[1].end = {50.5, 0.0};
+  plan.walls[1].features = {4711};
+  EXPECT_THAT(Svg(plan), HasSubstr(feature));
+}
+
 TEST_F(FloorPlanTest, MapJsonOfRooms) {
   Feature wall;
   wall.type = &registry_.GetFeature("segment");

@@ -112,6 +112,24 @@ bool Stands(const Pose2& motion) {
          std::abs(NormalizeAngle(motion[2])) <= kStandsTurn;
 }
 
+// By so much odometry that turned by `turn` may be wrong, rad: by less than a
+// quarter of a circle, after which much of a building looks the same.
+double MostWrongTurn(double turn) {
+  return std::min(DegToRad(75.0), DegToRad(30.0) + 0.3 * std::abs(turn));
+}
+
+// Farther than robots are shaken to while they are carried.
+bool IsFar(const Pose2& motion) {
+  return motion.head<2>().norm() > kJumpWay ||
+         std::abs(NormalizeAngle(motion[2])) > kJumpTurn;
+}
+
+// Whether odometry tells of a way over a gap in the log, and has not begun anew
+// in it.
+bool GoesOn(const Pose2& before, const Pose2& after) {
+  return IsFar(Between(before, after)) && (IsFar(after) || !IsFar(before));
+}
+
 // Chi-square of what a match leaves the prior by.
 double SquaredInnovation(const MatchResult& match, const MatchPrior& prior) {
   Eigen::Vector3d left = match.pose - prior.pose;
@@ -497,12 +515,20 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
     innovation = SquaredInnovation(*match, prior);
   }
   // Few returns fit in many places: they may leave odometry by little, and by
-  // less the more places odometry leaves open.
+  // less the more places odometry leaves open. On a way over a gap in the log
+  // it leaves too many open for that, and may be off by less than a look-alike.
+  const bool is_far =
+      track_.after_gap && IsFar(Between(track_.last_pose, prior.pose));
+  const bool may_agree =
+      !is_far || (here.hits >= tracking.min_hits &&
+                  std::abs(NormalizeAngle(match->pose[2] - prior.pose[2])) <=
+                      MostWrongTurn(last_motion_[2]));
   const bool agrees =
-      here.hits >= tracking.min_hits
-          ? innovation <= tracking.max_innovation
-          : innovation + room <=
-                tracking.max_innovation * here.hits / tracking.min_hits;
+      may_agree &&
+      (here.hits >= tracking.min_hits
+           ? innovation <= tracking.max_innovation
+           : innovation + room <=
+                 tracking.max_innovation * here.hits / tracking.min_hits);
   // What contradicted the scan before already is no news.
   const double before =
       track_.after_gap
@@ -821,6 +847,7 @@ void OdometryRefiner::Lose(int scan, const Outcome& outcome) {
       pending_.size() < kMostPending;
   if (open_ != nullptr && !tiny) Tie(true);
   ++losses_;
+  bool goes_on = false;
   if (open_ == nullptr) {
     // The scans that were refused are settled already.
     open_ = std::make_unique<OpenTie>(std::move(track_));
@@ -834,6 +861,9 @@ void OdometryRefiner::Lose(int scan, const Outcome& outcome) {
     open_->is_late =
         open_->before.after_gap &&
         Stands(Between(open_->before.matched_odometry, last_odometry_));
+    // Where it is off on a long way what is seen contradicts, too.
+    goes_on = open_->before.after_gap &&
+              GoesOn(open_->before.matched_odometry, last_odometry_);
   } else {
     // What has been tracked since is too little to be a track.
     for (SettledScan& pending : pending_) {
@@ -848,7 +878,8 @@ void OdometryRefiner::Lose(int scan, const Outcome& outcome) {
     open_->keys.clear();
   }
   open_->seen_through = outcome.seen_through;
-  open_->odometry_holds = open_->odometry_holds && !contradicted && !jumped;
+  open_->odometry_holds =
+      open_->odometry_holds && (!contradicted || goes_on) && !jumped;
   open_->first = scan;
   open_->blind_way = open_->way;
   open_->blind_turn = open_->turn;
@@ -1202,7 +1233,8 @@ bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
       predicted.covariance + Diagonal(kTieSigma, kTieAngle);
   const double innovation = left.dot(covariance.inverse() * left);
   if (trace_) trace_("odometry against it " + std::to_string(innovation));
-  return innovation <= options_.tracking.max_innovation;
+  return innovation <= options_.tracking.max_innovation &&
+         std::abs(left[2]) <= MostWrongTurn(open_->blind_turn);
 }
 
 void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {

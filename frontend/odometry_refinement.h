@@ -279,7 +279,7 @@ class OdometryRefiner {
     double blind_way = 0.0;
     double blind_turn = 0.0;
     double blind_seconds = 0.0;
-    // Neither a gap nor a contradiction.
+    // Neither a gap that odometry does not tell of nor a contradiction.
     bool odometry_holds = true;
     // Odometry has not moved over the gap in the log, and may not know of the
     // way yet; so many scans ago, when it does not know of it still.

@@ -1265,6 +1265,54 @@ TEST(OdometryRefinerTest, CarriedToAPlaceThatLooksAlikeAtFirst) {
   EXPECT_EQ(refiner.loose()[0].begin, kCarried - 1);
 }
 
+// Scans are missing while it drives into another hall, which looks like the one
+// that it comes from. Where odometry goes on in the meantime, it tells that
+// this is another one.
+std::vector<RefinedScan> DriveIntoAHallOfTheSameKind(bool odometry_goes_on) {
+  std::vector<WallEnds> hall = Room(20.0, 6.0);
+  for (const WallEnds& side : Pillars(-10.0)) hall.push_back(side);
+  // Of the second hall in the frame of the first.
+  const Pose2 second(3.0, 9.0, kPi / 2);
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(8);
+  OdometryRefiner refiner(RefinerOptions());
+  constexpr int kMissing = 45;
+  std::vector<RefinedScan> refined;
+  Pose2 odometry(-9.0, 0.0, 0.0);
+  Pose2 last = odometry;
+  for (int i = 0; i < 2 * kMissing; ++i) {
+    const Pose2 seen(-9.0 + 0.1 * (i % kMissing), 0.0, 0.0);
+    const Pose2 truth = i < kMissing ? seen : Compose(second, seen);
+    if (i != kMissing || odometry_goes_on) {
+      Pose2 motion = Between(last, truth);
+      // It is none too good.
+      motion[2] *= 1.05;
+      odometry = Compose(odometry, motion);
+    }
+    last = truth;
+    Scan scan = MakeScan(hall, seen, laser, &noise);
+    scan.timestamp = 100.0 + 0.2 * i + (i < kMissing ? 0.0 : 20.0);
+    scan.odometry = odometry;
+    refiner.Process(scan);
+    refined = TakeAll(&refiner, std::move(refined));
+  }
+  refiner.Finish();
+  return TakeAll(&refiner, std::move(refined));
+}
+
+TEST(OdometryRefinerTest, OdometryThatGoesOnOverAGapTellsLookalikesApart) {
+  const std::vector<RefinedScan> carried = DriveIntoAHallOfTheSameKind(false);
+  ASSERT_EQ(carried.size(), 90u);
+  EXPECT_EQ(carried[45].tie, TrackTie::kMatched);
+  const std::vector<RefinedScan> driven = DriveIntoAHallOfTheSameKind(true);
+  ASSERT_EQ(driven.size(), 90u);
+  EXPECT_EQ(driven[45].tie, TrackTie::kLoose);
+  // Where odometry has it.
+  EXPECT_NEAR(driven[45].pose[0], 3.0, 1.0);
+  EXPECT_NEAR(driven[45].pose[1], 0.0, 1.0);
+}
+
 // Carried to where it has not been, from where it drives back through what it
 // saw at first: when all scans are in its way there is known.
 TEST(OdometryRefinerTest, CarriedAndFoundInTheEnd) {

@@ -24,6 +24,7 @@ Relations stay true; those whose scans are gone are left out. Kinds, with what V
   wheels      normal noise on each step of odometry, a share VALUE (0.2) of it
   still       odometry says nothing at all
   late        odometry is VALUE scans (2) late
+  gaps        four stretches of VALUE scans (100) are missing; odometry goes on
 """
 
 import bz2
@@ -33,7 +34,8 @@ import random
 import sys
 
 DEFAULTS = {"mirror": 0, "reverse": 0, "every": 3, "noise": 0.03, "steps": 0.05, "spikes": 0.05, "holes": 0.2, "near": 6.0, "beams": 2, "view": 120.0,
-            "long": 1.01, "offset": 0.05, "askew": 1.5, "drift": 1.0, "slip": 5.0, "wheels": 0.2, "still": 0, "late": 2}
+            "long": 1.01, "offset": 0.05, "askew": 1.5, "drift": 1.0, "slip": 5.0, "wheels": 0.2, "still": 0, "late": 2,
+            "gaps": 100}
 NO_RETURN = 81.83
 
 
@@ -78,6 +80,12 @@ def on_steps(scans, change):
         scans[k + 1].odometry = compose(scans[k].odometry, change(k, step))
 
 
+def between_scans(scans, relations):
+    """The relations between scans that are there."""
+    there = {round(float(scan.time), 4) for scan in scans}
+    return [r for r in relations if all(round(float(t), 4) in there for t in r[:2])]
+
+
 def main():
     arguments = [a for a in sys.argv[1:] if not a.startswith("--seed=")]
     seed = [a[7:] for a in sys.argv[1:] if a.startswith("--seed=")]
@@ -111,8 +119,7 @@ def main():
             r[0], r[1] = (near.get(round(float(t), 4), "%.6f" % (total - float(t))) for t in r[:2])
     elif kind == "every":
         scans = scans[::int(value)]
-        there = {round(float(scan.time), 4) for scan in scans}
-        relations = [r for r in relations if all(round(float(t), 4) in there for t in r[:2])]
+        relations = between_scans(scans, relations)
     elif kind == "noise":
         on_ranges(scans, lambda r: max(0.02, rnd.gauss(r, value)))
     elif kind == "steps":
@@ -151,6 +158,14 @@ def main():
         odometry = [scan.odometry for scan in scans]
         for k, scan in enumerate(scans):
             scan.odometry = odometry[max(0, k - int(value))]
+    elif kind == "gaps":
+        size, begins = int(value), []
+        for _ in range(10000):
+            begin = rnd.randrange(30, max(31, len(scans) - size - 30))
+            if len(begins) < 4 and all(abs(begin - other) > 2 * size for other in begins):
+                begins.append(begin)
+        scans = [scan for k, scan in enumerate(scans) if not any(begin <= k < begin + size for begin in begins)]
+        relations = between_scans(scans, relations)
 
     with open(target, "w") as out:
         out.write("\n".join(scan.text() for scan in scans) + "\n")

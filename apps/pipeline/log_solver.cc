@@ -7,6 +7,7 @@
 #include <plumbline/detectors/visibility.h>
 #include <plumbline/frontend/looks.h>
 #include <plumbline/frontend/missed_motion.h>
+#include <plumbline/frontend/missed_steps.h>
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/frontend/returns_ahead.h>
 #include <plumbline/pipeline/glimpsed_walls.h>
@@ -520,12 +521,44 @@ void LogSolver::ScaleToNoise(double scale) {
   options_.way_check.ScaleToNoise(scale);
 }
 
+std::vector<LooseTrack> LogSolver::CorrectMissedSteps(Context* context) {
+  if (!options_.odometry.match_scans) return {};
+  MissedStepOptions options;
+  options.points = options_.odometry.points;
+  options.points.ScaleToNoise(refiner_.noise_scale());
+  options.num_threads = options_.check.num_threads;
+  std::vector<MotionCorrection> corrections;
+  std::vector<LooseTrack> told;
+  for (const MissedStep& step :
+       FindMissedSteps(context->scans, refined_, options,
+                       [context] { return context->IsStopped(); })) {
+    if (step.is_sure) corrections.push_back(step.correction);
+    LooseTrack track;
+    track.begin = step.begin;
+    track.end = step.end;
+    track.found = true;
+    char why[160];
+    std::snprintf(why, sizeof why,
+                  step.is_sure
+                      ? "odometry missed %.1f m of the way here, and nothing "
+                        "near showed it: what was seen from afar did"
+                      : "odometry missed %.1f m of the way here, or the one "
+                        "thing in sight was moved by as much",
+                  std::abs(step.length));
+    track.why = why;
+    told.push_back(std::move(track));
+  }
+  if (!corrections.empty()) CorrectMotions(corrections, &refined_);
+  return told;
+}
+
 LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
                                       const RunControl& control) {
   is_finished_ = true;
   Context context(scans, control, this);
   LogSolverResult& result = context.result;
   result.interrupted = refined_.size() < scans.size();
+  std::vector<LooseTrack> missed;
   {
     const Stopwatch watch;
     double em_seconds = 0.0;
@@ -538,7 +571,9 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
         result.notes.push_back(NoteOf(late, options_.late_metre));
         CorrectMotions(late.corrections, &refined_);
       }
-      if (!refiner_.late_ties().empty() || !late.corrections.empty()) {
+      missed = CorrectMissedSteps(&context);
+      if (!refiner_.late_ties().empty() || !late.corrections.empty() ||
+          !missed.empty()) {
         TakeAnew(scans, &em_seconds);
       }
     }
@@ -558,6 +593,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
   result.noise_scale = refiner_.noise_scale();
   ScaleToNoise(result.noise_scale);
   result.loose = refiner_.loose();
+  result.loose.insert(result.loose.end(), missed.begin(), missed.end());
   result.feature_matches = builder_->num_matches();
   result.features_created = builder_->num_created();
   result.records = builder_->records();

@@ -303,6 +303,9 @@ class LogSolver {
   // Makes the map once more: parts of the track that hung loose were found
   // when all scans were in.
   void TakeAnew(const std::vector<Scan>& scans, double* em_seconds);
+  // Takes the steps that neither odometry nor the matches noticed into the
+  // track, and tells of them.
+  std::vector<LooseTrack> CorrectMissedSteps(Context* context);
   void RunEmNearRobot();
 
   // Allows for the laser's noise in what follows once all scans are in.

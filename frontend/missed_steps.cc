@@ -1,0 +1,552 @@
+#include <plumbline/core/error.h>
+#include <plumbline/core/parallel_for.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/frontend/cell_index.h>
+#include <plumbline/frontend/missed_steps.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+using Eigen::Vector2d;
+
+// Cells in which points lie on one surface, or next to it, m.
+constexpr double kCell = 0.1;
+// Returns that are counted lie so far from each other, m.
+constexpr double kApart = 0.15;
+// Cosine of the largest angle between the normals of one surface.
+constexpr double kSameSide = 0.7;
+// Bearings by which it is told how far a scan looks.
+constexpr std::size_t kBearings = 360;
+// A longer motion between key scans is a jump, not a way, m.
+constexpr double kLongestStep = 1.5;
+// Key scans that one thread reads in a row, and rounds of the search, each with
+// the steps found before it made.
+constexpr std::size_t kInTurn = 32;
+constexpr int kMostRounds = 4;
+// Between two times that `stop` is asked.
+constexpr std::size_t kAtOnce = 256;
+
+// What a key scan saw, in the frame of the track.
+class View {
+ public:
+  void Read(const Scan& scan, const Pose2& pose,
+            const MissedStepOptions& options) {
+    std::vector<ScanPoint> points;
+    ExtractScanPoints(scan, options.points, &points);
+    const PoseTransform transform(pose);
+    eye_ = transform.Point(scan.laser_offset.head<2>());
+    for (const ScanPoint& point : points) {
+      if (point.range > options.max_range) continue;
+      points_.push_back(Moved(point, transform));
+      const Vector2d ray = points_.back().position - eye_;
+      double& nearest = looks_[BearingOf(ray)];
+      const double range = ray.norm();
+      nearest = nearest == 0.0 ? range : std::min(nearest, range);
+    }
+    // What lies next to a point is that surface, unless another one is there.
+    for (int radius = 0; radius <= 1; ++radius) {
+      for (const ScanPoint& point : points_) {
+        for (int dx = -radius; dx <= radius; ++dx) {
+          for (int dy = -radius; dy <= radius; ++dy) {
+            Add(point, dx, dy);
+          }
+        }
+      }
+    }
+  }
+
+  const std::vector<ScanPoint>& points() const { return points_; }
+
+  // Whether a point lies on what this saw.
+  bool Has(const Vector2d& point, const Vector2d& normal) const {
+    const int cell = cells_.Find(KeyOf(point, 0, 0));
+    if (cell < 0) return false;
+    const Vector2d& there = normals_[static_cast<std::size_t>(cell)];
+    return there.isZero() || there.dot(normal) >= kSameSide;
+  }
+
+  // Whether this looked through where it lies.
+  bool LooksThrough(const Vector2d& point,
+                    const MissedStepOptions& options) const {
+    const Vector2d ray = point - eye_;
+    const std::size_t bearing = BearingOf(ray);
+    double free = 0.0;
+    for (const std::size_t k :
+         {bearing + kBearings - 1, bearing, bearing + 1}) {
+      const double look = looks_[k % kBearings];
+      if (look > 0.0) free = free == 0.0 ? look : std::min(free, look);
+    }
+    return free > ray.norm() * (1.0 + options.free_share) + options.free_margin;
+  }
+
+ private:
+  static std::size_t BearingOf(const Vector2d& ray) {
+    const double turn = std::atan2(ray.y(), ray.x()) / (2.0 * kPi) + 0.5;
+    return static_cast<std::size_t>(turn * kBearings) % kBearings;
+  }
+
+  static std::int64_t KeyOf(const Vector2d& point, int dx, int dy) {
+    return CellKey(
+        static_cast<std::int64_t>(std::floor(point.x() / kCell)) + dx,
+        static_cast<std::int64_t>(std::floor(point.y() / kCell)) + dy);
+  }
+
+  void Add(const ScanPoint& point, int dx, int dy) {
+    const int next = static_cast<int>(normals_.size());
+    if (cells_.FindOrAdd(KeyOf(point.position, dx, dy), next) == next) {
+      normals_.push_back(point.normal);
+    }
+  }
+
+  Vector2d eye_ = Vector2d::Zero();
+  std::vector<ScanPoint> points_;
+  std::array<double, kBearings> looks_{};
+  CellIndex cells_;
+  std::vector<Vector2d> normals_;
+};
+
+// How many returns fit, and how many stand in the way.
+struct Fit {
+  int on = 0;
+  int intruding = 0;
+
+  int value() const { return on - intruding; }
+  Fit& operator+=(const Fit& other) {
+    on += other.on;
+    intruding += other.intruding;
+    return *this;
+  }
+};
+
+// Two views of one way, which lie some way apart.
+class Comparison {
+ public:
+  // The views must outlive it. `along`: from the earlier one to the later.
+  Comparison(const View& earlier, const View& later, const Vector2d& along,
+             const MissedStepOptions& options)
+      : earlier_(earlier),
+        later_(later),
+        along_(along),
+        options_(options),
+        of_earlier_(Telling(earlier)),
+        of_later_(Telling(later)) {}
+
+  // Returns that say something of a step.
+  int telling() const {
+    return static_cast<int>(of_earlier_.size() + of_later_.size());
+  }
+
+  // How the two fit when the later one lies farther by a step.
+  Fit FitWith(double step) const {
+    Fit fit;
+    Compare(step, [&](const View& view, const Vector2d& place,
+                      const Vector2d& normal, const Vector2d&) {
+      if (view.Has(place, normal)) {
+        ++fit.on;
+      } else if (view.LooksThrough(place, options_)) {
+        ++fit.intruding;
+      }
+    });
+    return fit;
+  }
+
+  // How many returns fit then, at a fraction of the cost.
+  int NumOn(double step) const {
+    int on = 0;
+    Compare(step,
+            [&](const View& view, const Vector2d& place, const Vector2d& normal,
+                const Vector2d&) { on += view.Has(place, normal); });
+    return on;
+  }
+
+  // Adds the places of these, along the way and across it.
+  void AddPlaces(double step, std::vector<Vector2d>* places) const {
+    Compare(step, [&](const View& view, const Vector2d& place,
+                      const Vector2d& normal, const Vector2d& by_earlier) {
+      if (!view.Has(place, normal)) return;
+      places->emplace_back(along_.dot(by_earlier),
+                           Vector2d(-along_.y(), along_.x()).dot(by_earlier));
+    });
+  }
+
+ private:
+  std::vector<const ScanPoint*> Telling(const View& view) const {
+    std::vector<const ScanPoint*> telling;
+    for (const ScanPoint& point : view.points()) {
+      if (std::abs(point.normal.dot(along_)) < options_.min_cosine) continue;
+      if (!telling.empty() &&
+          (point.position - telling.back()->position).norm() < kApart) {
+        continue;
+      }
+      telling.push_back(&point);
+    }
+    return telling;
+  }
+
+  // Calls `use` with the view that a return is compared with, its place there
+  // and its normal, and its place as the earlier view has it.
+  template <typename Use>
+  void Compare(double step, const Use& use) const {
+    for (const ScanPoint* point : of_later_) {
+      const Vector2d place = point->position + step * along_;
+      use(earlier_, place, point->normal, place);
+    }
+    for (const ScanPoint* point : of_earlier_) {
+      use(later_, point->position - step * along_, point->normal,
+          point->position);
+    }
+  }
+
+  const View& earlier_;
+  const View& later_;
+  const Vector2d along_;
+  const MissedStepOptions& options_;
+  std::vector<const ScanPoint*> of_earlier_;
+  std::vector<const ScanPoint*> of_later_;
+};
+
+// Compares key scans of one track.
+class Search {
+ public:
+  Search(const std::vector<Scan>& scans, std::vector<RefinedScan> refined,
+         const MissedStepOptions& options, const std::function<bool()>& stop)
+      : scans_(scans),
+        refined_(std::move(refined)),
+        options_(options),
+        stop_(stop),
+        half_(static_cast<int>(
+            std::lround(options.max_step / options.resolution))) {}
+
+  std::vector<MissedStep> Run();
+
+ private:
+  // A key scan that is compared.
+  struct Station {
+    std::size_t scan = 0;
+    // From the first scan, m.
+    double way = 0.0;
+    // The robot came here from the station before, all the way.
+    bool follows = false;
+  };
+  // Two stations, the first one earlier, and the direction between them.
+  struct Pair {
+    std::size_t first = 0;
+    std::size_t second = 0;
+    Vector2d along = Vector2d::Zero();
+    // How they fit as they are, and of how many returns.
+    Fit fit;
+    int telling = 0;
+  };
+
+  bool Stops() const { return stop_ && stop_(); }
+  const Pose2& PoseOf(std::size_t station) const {
+    return refined_[stations_[station].scan].pose;
+  }
+  double StepOf(int index) const { return index * options_.resolution; }
+  void FindStations();
+  void FindPairs();
+  void ReadViews();
+  void ComparePairs();
+  Comparison Compared(const Pair& pair) const {
+    return Comparison(views_[pair.first], views_[pair.second], pair.along,
+                      options_);
+  }
+  // All pairs that the way to a station lies between.
+  std::vector<Comparison> Over(std::size_t station) const;
+  // The step that was missed on the way to a station; 0: none.
+  double StepTo(std::size_t station, Fit* with) const;
+  // Whether what fits with a step is more than one thing that may have moved.
+  bool IsSure(std::size_t station, double step) const;
+  // Where on this way it was.
+  MissedStep Locate(std::size_t station, double step) const;
+  std::vector<MissedStep> RunOnce();
+
+  const std::vector<Scan>& scans_;
+  std::vector<RefinedScan> refined_;
+  const MissedStepOptions& options_;
+  const std::function<bool()>& stop_;
+  const int half_;
+  std::vector<Station> stations_;
+  std::vector<View> views_;
+  std::vector<Pair> pairs_;
+  // By station: pairs that the way to it lies between.
+  std::vector<std::vector<std::size_t>> over_;
+};
+
+void Search::FindStations() {
+  stations_.clear();
+  double way = 0.0;
+  bool follows = false;
+  const RefinedScan* last = nullptr;
+  for (std::size_t i = 0; i < refined_.size(); ++i) {
+    const RefinedScan& now = refined_[i];
+    if (!now.is_key) continue;
+    const double step =
+        last == nullptr ? 0.0 : (now.pose - last->pose).head<2>().norm();
+    const bool jumps =
+        step > kLongestStep || now.tie != TrackTie::kNone || now.since >= 0;
+    way += step;
+    last = &now;
+    if (!jumps && !stations_.empty() &&
+        way - stations_.back().way < options_.spacing) {
+      continue;
+    }
+    stations_.push_back({i, way, follows && !jumps});
+    follows = true;
+  }
+}
+
+void Search::FindPairs() {
+  pairs_.clear();
+  over_.assign(stations_.size(), {});
+  for (std::size_t j = 1; j < stations_.size(); ++j) {
+    for (std::size_t i = j; i-- > 0 && stations_[i + 1].follows;) {
+      const double way = stations_[j].way - stations_[i].way;
+      if (way > options_.reach) break;
+      const Vector2d between = (PoseOf(j) - PoseOf(i)).head<2>();
+      if (between.norm() < options_.min_straightness * way) continue;
+      for (std::size_t k = i + 1; k <= j; ++k)
+        over_[k].push_back(pairs_.size());
+      pairs_.push_back({i, j, between.normalized(), {}, 0});
+    }
+  }
+}
+
+void Search::ReadViews() {
+  views_.assign(stations_.size(), View());
+  ParallelFor((stations_.size() + kInTurn - 1) / kInTurn, options_.num_threads,
+              [&](std::size_t turn) {
+                const std::size_t end =
+                    std::min(stations_.size(), (turn + 1) * kInTurn);
+                for (std::size_t k = turn * kInTurn; k < end; ++k) {
+                  views_[k].Read(scans_[stations_[k].scan], PoseOf(k),
+                                 options_);
+                }
+              });
+}
+
+void Search::ComparePairs() {
+  ParallelFor((pairs_.size() + kInTurn - 1) / kInTurn, options_.num_threads,
+              [&](std::size_t turn) {
+                const std::size_t end =
+                    std::min(pairs_.size(), (turn + 1) * kInTurn);
+                for (std::size_t p = turn * kInTurn; p < end; ++p) {
+                  const Comparison comparison = Compared(pairs_[p]);
+                  pairs_[p].fit = comparison.FitWith(0.0);
+                  pairs_[p].telling = comparison.telling();
+                }
+              });
+}
+
+std::vector<Comparison> Search::Over(std::size_t station) const {
+  std::vector<Comparison> comparisons;
+  for (const std::size_t p : over_[station]) {
+    comparisons.push_back(Compared(pairs_[p]));
+  }
+  return comparisons;
+}
+
+double Search::StepTo(std::size_t station, Fit* with) const {
+  Fit without;
+  int telling = 0;
+  for (const std::size_t p : over_[station]) {
+    const Pair& pair = pairs_[p];
+    without += pair.fit;
+    telling += pair.telling;
+  }
+  // Most ways are right.
+  if (telling < options_.min_returns ||
+      without.value() > options_.max_without * telling) {
+    return 0.0;
+  }
+  const std::vector<Comparison> over = Over(station);
+  std::vector<Fit> fits;
+  int best = 0;
+  for (int k = -half_; k <= half_; ++k) {
+    int on = 0;
+    for (const Comparison& pair : over) on += pair.NumOn(StepOf(k));
+    Fit fit;
+    if (on >= options_.min_returns) {
+      for (const Comparison& pair : over) fit += pair.FitWith(StepOf(k));
+    }
+    fits.push_back(fit);
+    if (fit.value() > fits[static_cast<std::size_t>(best)].value()) {
+      best = k + half_;
+    }
+  }
+  *with = fits[static_cast<std::size_t>(best)];
+  if (best == 0 || best == 2 * half_ || with->value() < options_.min_returns ||
+      without.on > options_.max_without * with->on) {
+    return 0.0;
+  }
+  const double before = fits[static_cast<std::size_t>(best) - 1].value();
+  const double after = fits[static_cast<std::size_t>(best) + 1].value();
+  const double bend = before + after - 2.0 * with->value();
+  const double step =
+      StepOf(best - half_) +
+      (bend < 0.0 ? 0.5 * options_.resolution * (before - after) / bend : 0.0);
+  if (std::abs(step) < options_.min_step) return 0.0;
+  return step;
+}
+
+bool Search::IsSure(std::size_t station, double step) const {
+  // Of what fits: along the way, and across it.
+  std::vector<Vector2d> places;
+  for (const Comparison& pair : Over(station)) pair.AddPlaces(step, &places);
+  std::sort(places.begin(), places.end(),
+            [](const Vector2d& a, const Vector2d& b) { return a.x() < b.x(); });
+  std::size_t begin = 0;
+  std::size_t most = 0;
+  for (std::size_t first = 0, end = 0; first < places.size(); ++first) {
+    while (end < places.size() &&
+           places[end].x() <= places[first].x() + options_.thing) {
+      ++end;
+    }
+    if (end - first > most) {
+      begin = first;
+      most = end - first;
+    }
+  }
+  if (static_cast<double>(most) <=
+      options_.of_one_thing * static_cast<double>(places.size())) {
+    return true;
+  }
+  std::vector<double> sides;
+  for (std::size_t i = begin; i < begin + most; ++i) {
+    sides.push_back(places[i].y());
+  }
+  std::sort(sides.begin(), sides.end());
+  const std::size_t few = sides.size() / 20;
+  return sides[sides.size() - 1 - few] - sides[few] >= options_.min_width;
+}
+
+MissedStep Search::Locate(std::size_t station, double step) const {
+  std::vector<std::size_t> keys;
+  for (std::size_t i = stations_[station - 1].scan;
+       i <= stations_[station].scan; ++i) {
+    if (refined_[i].is_key) keys.push_back(i);
+  }
+  // How much better a key scan between the two fits as one after the step.
+  std::size_t after = keys.size() - 1;
+  int best = 0;
+  int sum = 0;
+  for (std::size_t k = keys.size() - 1; k-- > 1;) {
+    View view;
+    view.Read(scans_[keys[k]], refined_[keys[k]].pose, options_);
+    for (const std::size_t p : over_[station]) {
+      const Pair& pair = pairs_[p];
+      if (pair.second == station) {
+        const Comparison before(views_[pair.first], view, pair.along, options_);
+        sum += before.FitWith(step).value() - before.FitWith(0.0).value();
+      }
+      if (pair.first == station - 1) {
+        const Comparison after(view, views_[pair.second], pair.along, options_);
+        sum += after.FitWith(0.0).value() - after.FitWith(step).value();
+      }
+    }
+    if (sum > best) {
+      best = sum;
+      after = k;
+    }
+  }
+  MissedStep missed;
+  missed.begin = static_cast<int>(keys[after - 1]);
+  missed.end = static_cast<int>(keys[after]);
+  missed.length = step;
+  missed.is_sure = IsSure(station, step);
+  const Vector2d along =
+      (PoseOf(station) - PoseOf(station - 1)).head<2>().normalized();
+  const double heading = refined_[keys[after - 1]].pose[2];
+  missed.correction.scan = missed.end;
+  missed.correction.change.head<2>() =
+      step *
+      Vector2d(std::cos(heading) * along.x() + std::sin(heading) * along.y(),
+               std::cos(heading) * along.y() - std::sin(heading) * along.x());
+  return missed;
+}
+
+std::vector<MissedStep> Search::RunOnce() {
+  FindStations();
+  FindPairs();
+  ReadViews();
+  ComparePairs();
+  std::vector<double> steps(stations_.size(), 0.0);
+  std::vector<Fit> fits(stations_.size());
+  std::vector<MissedStep> missed;
+  for (std::size_t begin = 0; begin < stations_.size(); begin += kAtOnce) {
+    if (Stops()) return missed;
+    ParallelFor(std::min(kAtOnce, stations_.size() - begin),
+                options_.num_threads, [&](std::size_t k) {
+                  steps[begin + k] = StepTo(begin + k, &fits[begin + k]);
+                });
+  }
+  // The clearest one of those that lie between the same scans.
+  const auto is_clearest = [&](std::size_t k) {
+    for (std::size_t i = 0; i < stations_.size(); ++i) {
+      if (i == k || steps[i] == 0.0 ||
+          std::abs(stations_[i].way - stations_[k].way) > options_.reach) {
+        continue;
+      }
+      if (fits[i].value() > fits[k].value() ||
+          (fits[i].value() == fits[k].value() && i < k)) {
+        return false;
+      }
+    }
+    return true;
+  };
+  for (std::size_t k = 0; k < stations_.size(); ++k) {
+    if (steps[k] != 0.0 && is_clearest(k))
+      missed.push_back(Locate(k, steps[k]));
+  }
+  return missed;
+}
+
+std::vector<MissedStep> Search::Run() {
+  std::vector<MissedStep> all;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const std::vector<MissedStep> found = RunOnce();
+    if (Stops()) return {};
+    if (found.empty()) break;
+    std::vector<MotionCorrection> corrections;
+    for (const MissedStep& step : found) {
+      if (step.is_sure) corrections.push_back(step.correction);
+      const bool is_known =
+          std::any_of(all.begin(), all.end(), [&](const MissedStep& known) {
+            return !known.is_sure && known.end == step.end;
+          });
+      if (!is_known) all.push_back(step);
+    }
+    if (corrections.empty()) break;
+    CorrectMotions(corrections, &refined_);
+  }
+  std::sort(all.begin(), all.end(),
+            [](const MissedStep& a, const MissedStep& b) {
+              return a.end != b.end ? a.end < b.end : a.length < b.length;
+            });
+  return all;
+}
+
+}  // namespace
+
+std::vector<MissedStep> FindMissedSteps(const std::vector<Scan>& scans,
+                                        const std::vector<RefinedScan>& refined,
+                                        const MissedStepOptions& options,
+                                        const std::function<bool()>& stop) {
+  if (refined.size() != scans.size()) {
+    throw PLUMBLINE_ERROR(
+        "a track of " + std::to_string(refined.size()) + " scans",
+        "one for each of " + std::to_string(scans.size()) + " scans");
+  }
+  return Search(scans, refined, options, stop).Run();
+}
+
+}  // namespace plumbline

@@ -55,6 +55,8 @@ class View {
     // What lies next to a point is that surface, unless another one is there.
     for (int radius = 0; radius <= 1; ++radius) {
       for (const ScanPoint& point : points_) {
+        // Ends of surfaces are alike on either side.
+        if (point.normal.isZero()) continue;
         for (int dx = -radius; dx <= radius; ++dx) {
           for (int dy = -radius; dy <= radius; ++dy) {
             Add(point, dx, dy);
@@ -70,8 +72,7 @@ class View {
   bool Has(const Vector2d& point, const Vector2d& normal) const {
     const int cell = cells_.Find(KeyOf(point, 0, 0));
     if (cell < 0) return false;
-    const Vector2d& there = normals_[static_cast<std::size_t>(cell)];
-    return there.isZero() || there.dot(normal) >= kSameSide;
+    return normals_[static_cast<std::size_t>(cell)].dot(normal) >= kSameSide;
   }
 
   // Whether this looked through where it lies.

@@ -21,6 +21,7 @@ struct StepDrive {
   // Before scan `at` the robot is pushed by so much, m.
   int at = 60;
   double push = 0.0;
+  testing::Laser laser;
 };
 
 struct StepLog {
@@ -31,7 +32,7 @@ struct StepLog {
 // A drive of 15 m along x, of which the track misses the push.
 StepLog LogOf(const StepDrive& drive) {
   testing::Noise noise(5);
-  testing::Laser laser;
+  testing::Laser laser = drive.laser;
   laser.sigma = 0.01;
   StepLog log;
   std::size_t key = 0;
@@ -95,6 +96,27 @@ TEST(MissedStepsTest, APushInACorridorIsFoundByItsEnd) {
 TEST(MissedStepsTest, WhatIsRightStays) {
   StepDrive drive;
   drive.walls = Ends();
+  EXPECT_TRUE(StepsOf(LogOf(drive)).empty());
+}
+
+// The two sides of a gap between racks are seen one after the other.
+TEST(MissedStepsTest, SidesOfAGapAreNotOne) {
+  StepDrive drive;
+  drive.laser = testing::FullCircle();
+  drive.laser.maximum_range = 12.0;
+  drive.walls.clear();
+  for (const double side : {-1.0, 1.0}) {
+    for (int i = -4; i <= 6; ++i) {
+      const double begin = 5.0 * i;
+      const double end = begin + 4.6;
+      const double near = 2.4 * side;
+      const double far = 3.6 * side;
+      drive.walls.push_back({{begin, near}, {end, near}});
+      drive.walls.push_back({{end, near}, {end, far}});
+      drive.walls.push_back({{end, far}, {begin, far}});
+      drive.walls.push_back({{begin, far}, {begin, near}});
+    }
+  }
   EXPECT_TRUE(StepsOf(LogOf(drive)).empty());
 }
 

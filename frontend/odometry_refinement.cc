@@ -1127,7 +1127,11 @@ void OdometryRefiner::Tie(bool last) {
       first.since_key.covariance = covariance;
     } else {
       first.tie = TrackTie::kLoose;
-      first.since_key.covariance = Diagonal(kLooseSigma, kLooseAngle);
+      first.since_key.covariance = LooseCovariance();
+      if (open_->odometry_holds) {
+        blind_ways_.push_back(
+            {open_->before.keys.back().scan, start.scan, BlindMotion()});
+      }
       part_ = num_parts_++;
     }
   }
@@ -1179,17 +1183,40 @@ double OdometryRefiner::OdometryVarianceScale() const {
       kLeastOdometryScale, 1.0);
 }
 
+Eigen::Matrix3d OdometryRefiner::BlindCovariance() const {
+  return OdometryVarianceScale() *
+         OdometryCovariance({open_->blind_way, 0.0, open_->blind_turn},
+                            options_.noise);
+}
+
+double OdometryRefiner::BlindVarianceAside() const {
+  return open_->blind_way * open_->blind_way * BlindCovariance()(2, 2) / 4.0;
+}
+
 UncertainPose2 OdometryRefiner::BlindMotion() const {
-  Eigen::Matrix3d covariance =
-      OdometryVarianceScale() *
-      OdometryCovariance({open_->blind_way, 0.0, open_->blind_turn},
-                         options_.noise);
-  // The heading is uncertain on the way, too.
-  const double aside =
-      open_->blind_way * open_->blind_way * covariance(2, 2) / 4.0;
-  covariance.topLeftCorner<2, 2>().diagonal().array() += aside;
+  Eigen::Matrix3d covariance = BlindCovariance();
+  covariance.topLeftCorner<2, 2>().diagonal().array() += BlindVarianceAside();
   return {Between(open_->before.keys.back().pose, open_->keys.front().pose),
           covariance};
+}
+
+Eigen::Matrix3d OdometryRefiner::LooseCovariance() const {
+  const Eigen::Matrix3d loose = Diagonal(kLooseSigma, kLooseAngle);
+  if (!open_->odometry_holds) return loose;
+  const Eigen::Matrix3d own = BlindCovariance();
+  // On a straight way the heading leads aside only.
+  const Eigen::Vector2d way = BlindMotion().mean.head<2>();
+  const double straight =
+      std::min(1.0, way.norm() / std::max(open_->blind_way, kStandsWay));
+  const double aside = BlindVarianceAside();
+  const Eigen::Vector3d variances(
+      own(0, 0) + (1.0 - straight * straight) * aside, own(1, 1) + aside,
+      own(2, 2));
+  const Eigen::Matrix3d across_and_along =
+      variances.cwiseMin(loose.diagonal()).asDiagonal();
+  const Eigen::Matrix3d rotation =
+      RotationInto(Pose2(0.0, 0.0, -std::atan2(way.y(), way.x())));
+  return rotation * across_and_along * rotation.transpose();
 }
 
 bool OdometryRefiner::IsInReach(const FoundTrack& found, std::size_t middle,
@@ -1318,8 +1345,8 @@ void OdometryRefiner::Finish(const std::function<bool()>& stop) {
   if (open_ != nullptr) Tie(true);
   if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
   guessed_ = -1;
-  late_ties_ = JoinParts(options_.tracking, options_.drift, loose_of_, &search_,
-                         &loose_);
+  late_ties_ = JoinParts(options_.tracking, options_.drift, loose_of_,
+                         blind_ways_, &search_, &loose_);
   JoinDoubtfulParts();
   search_.set_stop(nullptr);
   // No scan follows.
@@ -1335,8 +1362,9 @@ void OdometryRefiner::JoinDoubtfulParts() {
   if (cut.doubts.empty()) return;
   std::map<int, LateTie> by_scan;
   for (const LateTie& late : late_ties_) by_scan[late.scan] = late;
-  for (const LateTie& better : JoinParts(options_.tracking, options_.drift,
-                                         loose_of_, &search_, &loose_, cut)) {
+  for (const LateTie& better :
+       JoinParts(options_.tracking, options_.drift, loose_of_, blind_ways_,
+                 &search_, &loose_, cut)) {
     by_scan[better.scan] = better;
   }
   late_ties_.clear();
@@ -1347,11 +1375,11 @@ template <typename StateArchive>
 void OdometryRefiner::ExchangeState(StateArchive& archive) {
   ExchangeAll(archive, track_, points_, started_, count_, last_odometry_,
               last_time_, usual_step_, search_.seen(), part_, num_parts_,
-              loose_of_, found_ties_, wide_searches_, refusals_, losses_,
-              loose_, guessed_, noise_, noise_scale_, last_step_, key_odometry_,
-              squared_innovations_, compared_motions_, odometry_calibration_,
-              metre_uses_, steady_, still_, last_motion_, steady_wheels_,
-              scans_since_key_, still_pose_, is_dead_, ahead_);
+              loose_of_, blind_ways_, found_ties_, wide_searches_, refusals_,
+              losses_, loose_, guessed_, noise_, noise_scale_, last_step_,
+              key_odometry_, squared_innovations_, compared_motions_,
+              odometry_calibration_, metre_uses_, steady_, still_, last_motion_,
+              steady_wheels_, scans_since_key_, still_pose_, is_dead_, ahead_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

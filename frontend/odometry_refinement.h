@@ -409,8 +409,14 @@ class OdometryRefiner {
                        const Eigen::Matrix3d& information);
   // Odometry's variances on this log, of those in the options.
   double OdometryVarianceScale() const;
-  // From the last sure key scan to the first of the open track, by odometry.
+  // From the last sure key scan to the first of the open track, by odometry:
+  // its own covariance, by how much an uncertain heading adds to the side of
+  // the way, and all of it, in every direction.
+  Eigen::Matrix3d BlindCovariance() const;
+  double BlindVarianceAside() const;
   UncertainPose2 BlindMotion() const;
+  // Of a tie that is a guess.
+  Eigen::Matrix3d LooseCovariance() const;
   // Whether a pose of the open track's key scan `middle` lies within what
   // odometry and the tracks leave open since the archive's key scan `since`;
   // true where they say nothing of it.
@@ -450,6 +456,8 @@ class OdometryRefiner {
   int num_parts_ = 1;
   // By part but the first: its entry in loose_.
   std::vector<int> loose_of_;
+  // Those that ended in a guess.
+  std::vector<BlindWay> blind_ways_;
   // Ties by one match with all that was seen.
   std::vector<FoundTie> found_ties_;
   std::vector<LateTie> late_ties_;

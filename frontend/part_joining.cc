@@ -2,6 +2,7 @@
 #include <plumbline/frontend/part_joining.h>
 
 #include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -49,6 +50,10 @@ constexpr int kLeastWeight = 12;
 // place need not be among those that were seen.
 constexpr double kMostOfRival = 0.25;
 
+// On the covariance of a tie that is held against odometry: what neighbouring
+// matches have in common adds up faster than a random walk.
+constexpr double kGenerous = 4.0;
+
 double Square(double x) { return x * x; }
 
 // The largest of a tie's variances, as shares of those of a rough one.
@@ -63,11 +68,13 @@ double VarianceOf(const LateTie& tie) {
 class PartJoining {
  public:
   PartJoining(const TrackingOptions& tracking, const MatchDrift& drift,
-              const std::vector<int>& loose_of, TrackSearch* search,
+              const std::vector<int>& loose_of,
+              const std::vector<BlindWay>& blind, TrackSearch* search,
               std::vector<LooseTrack>* loose, const CutTies& cut)
       : tracking_(tracking),
         drift_(drift),
         loose_of_(loose_of),
+        blind_(blind),
         search_(search),
         loose_(loose),
         cut_(cut) {}
@@ -102,6 +109,11 @@ class PartJoining {
   LateTie LateTieOf(const std::vector<std::size_t>& rest,
                     const std::vector<std::size_t>& part,
                     const LateVote& vote) const;
+  // Whether a blind way between the two cannot lead to where a window says that
+  // the part lies.
+  bool IsAgainstOdometry(const std::vector<std::size_t>& rest,
+                         const std::vector<std::size_t>& part,
+                         const LateVote& vote, const LateTie& tie) const;
   // Takes a part in where a window says, unless that is too uncertain or
   // contradicted.
   bool Take(const std::vector<std::size_t>& rest,
@@ -136,6 +148,7 @@ class PartJoining {
   const TrackingOptions& tracking_;
   const MatchDrift& drift_;
   const std::vector<int>& loose_of_;
+  const std::vector<BlindWay>& blind_;
   TrackSearch* search_;
   std::vector<LooseTrack>* loose_;
   const CutTies& cut_;
@@ -265,6 +278,10 @@ bool PartJoining::Take(const std::vector<std::size_t>& rest,
   const bool is_held = held != cut_.doubts.end();
   // The match that it hangs on is more than where to look.
   if (is_rough && is_held) return false;
+  if (IsAgainstOdometry(rest, part, vote, tie)) {
+    search_->Trace("NOT JOINED: odometry is against it");
+    return false;
+  }
   if (EvidenceOf(vote, rest, part).Doubt() >
       (is_held ? kLessDoubt * held->second : kMostDoubt)) {
     search_->Trace("NOT JOINED: contradicted");
@@ -273,6 +290,34 @@ bool PartJoining::Take(const std::vector<std::size_t>& rest,
   Move(part, ShiftOf(vote, part));
   AddLateTie(rest, part, tie, is_rough);
   return true;
+}
+
+bool PartJoining::IsAgainstOdometry(const std::vector<std::size_t>& rest,
+                                    const std::vector<std::size_t>& part,
+                                    const LateVote& vote,
+                                    const LateTie& tie) const {
+  const std::vector<SeenKey>& seen = search_->seen();
+  const auto find = [&](int scan) {
+    return std::find_if(seen.begin(), seen.end(),
+                        [&](const SeenKey& key) { return key.scan == scan; });
+  };
+  const int into = seen[rest.front()].part;
+  const int own = seen[part.front()].part;
+  const Pose2 shift = ShiftOf(vote, part);
+  return std::any_of(blind_.begin(), blind_.end(), [&](const BlindWay& way) {
+    const auto from = find(way.from);
+    const auto to = find(way.to);
+    if (from == seen.end() || to == seen.end()) return false;
+    const bool leads_to = from->part == into && to->part == own;
+    if (!leads_to && !(from->part == own && to->part == into)) return false;
+    Pose2 left = (leads_to ? Between(from->pose, Compose(shift, to->pose))
+                           : Between(Compose(shift, from->pose), to->pose)) -
+                 way.motion.mean;
+    left[2] = NormalizeAngle(left[2]);
+    const Eigen::Matrix3d covariance =
+        way.motion.covariance + kGenerous * tie.since_key.covariance;
+    return left.dot(covariance.inverse() * left) > tracking_.max_innovation;
+  });
 }
 
 bool PartJoining::Agree(const std::vector<TrackKey>& keys, const LateVote& a,
@@ -454,13 +499,12 @@ void PartJoining::AddLateTie(const std::vector<std::size_t>& rest,
 
 }  // namespace
 
-std::vector<LateTie> JoinParts(const TrackingOptions& tracking,
-                               const MatchDrift& drift,
-                               const std::vector<int>& loose_of,
-                               TrackSearch* search,
-                               std::vector<LooseTrack>* loose,
-                               const CutTies& cut) {
-  return PartJoining(tracking, drift, loose_of, search, loose, cut).Run();
+std::vector<LateTie> JoinParts(
+    const TrackingOptions& tracking, const MatchDrift& drift,
+    const std::vector<int>& loose_of, const std::vector<BlindWay>& blind,
+    TrackSearch* search, std::vector<LooseTrack>* loose, const CutTies& cut) {
+  return PartJoining(tracking, drift, loose_of, blind, search, loose, cut)
+      .Run();
 }
 
 }  // namespace plumbline

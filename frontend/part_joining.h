@@ -24,6 +24,23 @@ struct LooseTrack {
   bool found = false;
 };
 
+/// A way that nothing in sight could be matched on, and nothing speaks against
+/// odometry: neither a gap in the log nor a contradiction or a jump.
+struct BlindWay {
+  /// The last key scan before it and the first one after it.
+  int from = 0;
+  int to = 0;
+  /// From one to the other by odometry.
+  UncertainPose2 motion;
+
+  /// Writes or reads all of it (state_archive.h).
+  template <typename Archive>
+  friend void Exchange(Archive& archive, BlindWay& way) {
+    auto& [from, to, motion] = way;
+    ExchangeAll(archive, from, to, motion);
+  }
+};
+
 /// A tie found once all scans were in, for a part of the track that was settled
 /// as loose or by a tie that proved doubtful.
 struct LateTie {
@@ -41,18 +58,20 @@ struct LateTie {
 /// largest first, until none is found. A part is taken where one of its windows
 /// of key scans was found and another one says the same, unless half of what
 /// both saw of the same places contradicts it; or where three windows may lie,
-/// each with rivals, and what both saw speaks for that place and no other.
+/// each with rivals, and what both saw speaks for that place and no other. It
+/// does not lie where odometry of a blind way between the two cannot have it.
 ///
 /// `search` has the key scans of all parts; they are moved and renumbered as
 /// parts are joined. `loose_of`: by part but the first, its entry in `loose`,
-/// which says in the end what was found. `cut`: of parts that hang on a
-/// doubtful tie and were looked for before it was cut. Another place of theirs
-/// must be clearly less doubtful, and the other parts are looked for once more
-/// only when there is one. Returns the ties in the order of scans; none, with
-/// `loose` as it was, when `search` was stopped.
+/// which says in the end what was found. `blind`: ways between parts. `cut`: of
+/// parts that hang on a doubtful tie and were looked for before it was cut.
+/// Another place of theirs must be clearly less doubtful, and the other parts
+/// are looked for once more only when there is one. Returns the ties in the
+/// order of scans; none, with `loose` as it was, when `search` was stopped.
 std::vector<LateTie> JoinParts(const TrackingOptions& tracking,
                                const MatchDrift& drift,
                                const std::vector<int>& loose_of,
+                               const std::vector<BlindWay>& blind,
                                TrackSearch* search,
                                std::vector<LooseTrack>* loose,
                                const CutTies& cut = {});

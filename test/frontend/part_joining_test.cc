@@ -29,7 +29,7 @@ TEST(PartJoiningTest, APartThatWasSeenLaterIsTied) {
   SeeHall(-15.0, 90, 1, lost, -0.2, &search);
   std::vector<LooseTrack> loose = Guessed(290, 1190);
   const std::vector<LateTie> ties =
-      JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose);
+      JoinParts(TrackingOptions(), MatchDrift(), {0}, {}, &search, &loose);
   ASSERT_EQ(ties.size(), 1u);
   // The later part begins with key scan 30 and hangs on one of the first part.
   EXPECT_EQ(ties[0].scan, 300);
@@ -44,13 +44,35 @@ TEST(PartJoiningTest, APartThatWasSeenLaterIsTied) {
   for (const SeenKey& key : search.seen()) EXPECT_EQ(key.part, 0);
 }
 
+// The right place need not be among those that were seen.
+TEST(PartJoiningTest, OdometryOfABlindWayBetweenThemHasToAgree) {
+  const Pose2 truth(-15.0 - (-5.0 + 0.3 * 29.0), -0.4, 0.0);
+  for (const bool agrees : {true, false}) {
+    TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
+    SeeHall(-5.0, 30, 0, Pose2::Zero(), 0.2, &search);
+    SeeHall(-15.0, 90, 1, Pose2(50.0, 20.0, 2.0), -0.2, &search);
+    std::vector<LooseTrack> loose = Guessed(290, 1190);
+    BlindWay way;
+    way.from = 290;
+    way.to = 300;
+    way.motion.mean = agrees ? truth : Pose2(truth + Pose2(9.0, 0.0, 0.0));
+    way.motion.covariance = Eigen::Vector3d(1.0, 1.0, 0.1).asDiagonal();
+    EXPECT_EQ(
+        JoinParts(TrackingOptions(), MatchDrift(), {0}, {way}, &search, &loose)
+            .size(),
+        agrees ? 1u : 0u);
+    EXPECT_EQ(search.seen().back().part, agrees ? 0 : 1);
+  }
+}
+
 TEST(PartJoiningTest, APartOfAnotherPlaceIsNot) {
   TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
   SeeHall(-17.0, 30, 0, Pose2::Zero(), 0.2, &search);
   SeeHall(8.0, 30, 1, Pose2(50.0, 20.0, 2.0), 0.2, &search);
   std::vector<LooseTrack> loose = Guessed(290, 590);
   EXPECT_TRUE(
-      JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose).empty());
+      JoinParts(TrackingOptions(), MatchDrift(), {0}, {}, &search, &loose)
+          .empty());
   EXPECT_FALSE(loose[0].found);
   EXPECT_EQ(loose[0].why, Guessed(0, 0)[0].why);
 }
@@ -72,7 +94,7 @@ TEST(PartJoiningTest, WhatUnclearWindowsAgreeOnIsTaken) {
       if (line == "LATE window found") ++clear;
     });
     const std::vector<LateTie> ties =
-        JoinParts(tracking, MatchDrift(), {0}, &search, &loose);
+        JoinParts(tracking, MatchDrift(), {0}, {}, &search, &loose);
     // Two clear ones would do by themselves.
     EXPECT_LT(clear, 2);
     ASSERT_EQ(ties.size(), is_there ? 1u : 0u);
@@ -93,7 +115,8 @@ TEST(PartJoiningTest, APlaceWithARivalIsNotTaken) {
   SeeHall(-15.0, 56, 0, Pose2(0.0, 40.0, 0.0), -0.2, &search);
   SeeHall(-14.0, 84, 1, Pose2(50.0, 20.0, 2.0), 0.2, &search);
   std::vector<LooseTrack> loose = Guessed(1450, 2290);
-  EXPECT_TRUE(JoinParts(tracking, MatchDrift(), {0}, &search, &loose).empty());
+  EXPECT_TRUE(
+      JoinParts(tracking, MatchDrift(), {0}, {}, &search, &loose).empty());
   EXPECT_EQ(search.seen().back().part, 1);
 }
 
@@ -115,8 +138,8 @@ TEST(PartJoiningTest, AnotherPlaceMustBeLessDoubtful) {
     CutTies cut;
     cut.doubts = {{0, doubt}};
     cut.before = {0, 0};
-    const std::vector<LateTie> ties =
-        JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose, cut);
+    const std::vector<LateTie> ties = JoinParts(TrackingOptions(), MatchDrift(),
+                                                {0}, {}, &search, &loose, cut);
     if (doubt < 0.5) {
       EXPECT_TRUE(ties.empty());
       EXPECT_EQ(search.seen().back().part, 1);
@@ -139,11 +162,11 @@ TEST(PartJoiningTest, OtherPartsAreLookedForWhenSomethingHasMoved) {
   CutTies cut;
   cut.before = {0, 1};
   EXPECT_TRUE(
-      JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose, cut)
+      JoinParts(TrackingOptions(), MatchDrift(), {0}, {}, &search, &loose, cut)
           .empty());
   cut.before = {0, 0};
   EXPECT_EQ(
-      JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose, cut)
+      JoinParts(TrackingOptions(), MatchDrift(), {0}, {}, &search, &loose, cut)
           .size(),
       1u);
 }
@@ -155,7 +178,8 @@ TEST(PartJoiningTest, StoppedItLeavesAllAsItWas) {
   std::vector<LooseTrack> loose = Guessed(290, 890);
   search.set_stop([] { return true; });
   EXPECT_TRUE(
-      JoinParts(TrackingOptions(), MatchDrift(), {0}, &search, &loose).empty());
+      JoinParts(TrackingOptions(), MatchDrift(), {0}, {}, &search, &loose)
+          .empty());
   EXPECT_FALSE(loose[0].found);
   EXPECT_EQ(search.seen().back().part, 1);
 }
@@ -165,7 +189,8 @@ TEST(PartJoiningTest, OnePartHasNothingToJoin) {
   SeeHall(-5.0, 30, 0, Pose2::Zero(), 0.2, &search);
   std::vector<LooseTrack> loose;
   EXPECT_TRUE(
-      JoinParts(TrackingOptions(), MatchDrift(), {}, &search, &loose).empty());
+      JoinParts(TrackingOptions(), MatchDrift(), {}, {}, &search, &loose)
+          .empty());
 }
 
 }  // namespace

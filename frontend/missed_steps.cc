@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -24,6 +25,9 @@ constexpr double kCell = 0.1;
 constexpr double kApart = 0.15;
 // Cosine of the largest angle between the normals of one surface.
 constexpr double kSameSide = 0.7;
+// A step that leads back by the way between two scans, to within this, m, has
+// all in the later one where it was in the robot's frame.
+constexpr double kAlong = 0.3;
 // Bearings by which it is told how far a scan looks.
 constexpr std::size_t kBearings = 360;
 // A longer motion between key scans is a jump, not a way, m.
@@ -131,12 +135,13 @@ struct Fit {
 // Two views of one way, which lie some way apart.
 class Comparison {
  public:
-  // The views must outlive it. `along`: from the earlier one to the later.
-  Comparison(const View& earlier, const View& later, const Vector2d& along,
+  // The views must outlive it. `between`: from the earlier one to the later.
+  Comparison(const View& earlier, const View& later, const Vector2d& between,
              const MissedStepOptions& options)
       : earlier_(earlier),
         later_(later),
-        along_(along),
+        length_(between.norm()),
+        along_(between.normalized()),
         options_(options),
         of_earlier_(Telling(earlier)),
         of_later_(Telling(later)) {}
@@ -197,6 +202,8 @@ class Comparison {
   // and its normal, and its place as the earlier view has it.
   template <typename Use>
   void Compare(double step, const Use& use) const {
+    // What goes along with the robot fits so.
+    if (std::abs(step + length_) <= kAlong) return;
     for (const ScanPoint* point : of_later_) {
       const Vector2d place = point->position + step * along_;
       use(earlier_, place, point->normal, place);
@@ -209,6 +216,7 @@ class Comparison {
 
   const View& earlier_;
   const View& later_;
+  const double length_;
   const Vector2d along_;
   const MissedStepOptions& options_;
   std::vector<const ScanPoint*> of_earlier_;
@@ -238,11 +246,11 @@ class Search {
     // The robot came here from the station before, all the way.
     bool follows = false;
   };
-  // Two stations, the first one earlier, and the direction between them.
+  // Two stations, the first one earlier, and the way from it to the second.
   struct Pair {
     std::size_t first = 0;
     std::size_t second = 0;
-    Vector2d along = Vector2d::Zero();
+    Vector2d between = Vector2d::Zero();
     // How they fit as they are, and of how many returns.
     Fit fit;
     int telling = 0;
@@ -258,13 +266,15 @@ class Search {
   void ReadViews();
   void ComparePairs();
   Comparison Compared(const Pair& pair) const {
-    return Comparison(views_[pair.first], views_[pair.second], pair.along,
+    return Comparison(views_[pair.first], views_[pair.second], pair.between,
                       options_);
   }
   // All pairs that the way to a station lies between.
   std::vector<Comparison> Over(std::size_t station) const;
   // The step that was missed on the way to a station; 0: none.
   double StepTo(std::size_t station, Fit* with) const;
+  // Whether more than one scan on either side says so.
+  bool IsShared(std::size_t station, double step) const;
   // Whether what fits with a step is more than one thing that may have moved.
   bool IsSure(std::size_t station, double step) const;
   // Where on this way it was.
@@ -317,7 +327,7 @@ void Search::FindPairs() {
       if (between.norm() < options_.min_straightness * way) continue;
       for (std::size_t k = i + 1; k <= j; ++k)
         over_[k].push_back(pairs_.size());
-      pairs_.push_back({i, j, between.normalized(), {}, 0});
+      pairs_.push_back({i, j, between, {}, 0});
     }
   }
 }
@@ -395,8 +405,26 @@ double Search::StepTo(std::size_t station, Fit* with) const {
   const double step =
       StepOf(best - half_) +
       (bend < 0.0 ? 0.5 * options_.resolution * (before - after) / bend : 0.0);
-  if (std::abs(step) < options_.min_step) return 0.0;
-  return step;
+  return std::abs(step) >= options_.min_step && IsShared(station, step) ? step
+                                                                        : 0.0;
+}
+
+bool Search::IsShared(std::size_t station, double step) const {
+  std::map<std::size_t, int> of_first;
+  std::map<std::size_t, int> of_second;
+  int all = 0;
+  for (const std::size_t p : over_[station]) {
+    const Pair& pair = pairs_[p];
+    const int on = Compared(pair).NumOn(step);
+    of_first[pair.first] += on;
+    of_second[pair.second] += on;
+    all += on;
+  }
+  const auto is_most = [&](const std::pair<const std::size_t, int>& one) {
+    return one.second > options_.of_one_scan * all;
+  };
+  return std::none_of(of_first.begin(), of_first.end(), is_most) &&
+         std::none_of(of_second.begin(), of_second.end(), is_most);
 }
 
 bool Search::IsSure(std::size_t station, double step) const {
@@ -446,11 +474,13 @@ MissedStep Search::Locate(std::size_t station, double step) const {
     for (const std::size_t p : over_[station]) {
       const Pair& pair = pairs_[p];
       if (pair.second == station) {
-        const Comparison before(views_[pair.first], view, pair.along, options_);
+        const Comparison before(views_[pair.first], view, pair.between,
+                                options_);
         sum += before.FitWith(step).value() - before.FitWith(0.0).value();
       }
       if (pair.first == station - 1) {
-        const Comparison after(view, views_[pair.second], pair.along, options_);
+        const Comparison after(view, views_[pair.second], pair.between,
+                               options_);
         sum += after.FitWith(0.0).value() - after.FitWith(step).value();
       }
     }

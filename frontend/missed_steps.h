@@ -36,9 +36,11 @@ struct MissedStepOptions {
   double free_share = 0.03;
   /// A step was missed where as many returns fit with it (less those that stand
   /// in the way), over all pairs of scans that it lies between, and without it
-  /// no more than this share of them do.
+  /// no more than this share of them do; no scan has more of them than this
+  /// share.
   int min_returns = 40;
   double max_without = 0.25;
+  double of_one_scan = 0.85;
   /// It is sure unless more than this share of what fits lies within a depth of
   /// this, m, and is narrower than this, m: a thing that was moved.
   double of_one_thing = 0.8;

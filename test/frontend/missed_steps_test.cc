@@ -120,6 +120,17 @@ TEST(MissedStepsTest, SidesOfAGapAreNotOne) {
   EXPECT_TRUE(StepsOf(LogOf(drive)).empty());
 }
 
+TEST(MissedStepsTest, WhatGoesAlongIsNone) {
+  StepLog log = LogOf(StepDrive());
+  // No return is said to be one at 8 m.
+  for (Scan& scan : log.scans) {
+    for (float& range : scan.ranges) {
+      if (range == 0.0f || range > 8.0f) range = 8.0f;
+    }
+  }
+  EXPECT_TRUE(StepsOf(log).empty());
+}
+
 TEST(MissedStepsTest, NothingIsSaidWhereNothingTells) {
   StepDrive drive;
   drive.push = 0.5;

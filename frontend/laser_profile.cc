@@ -111,6 +111,49 @@ double SaturatedRange(const std::vector<Scan>& scans, double limit) {
   return (lowest - 0.5) / 100.0;
 }
 
+double RepeatedRange(const std::vector<Scan>& scans) {
+  // Of readings that are the same, and of those just below, m.
+  constexpr float kSame = 0.0005f;
+  constexpr float kBelow = 0.05f;
+  constexpr std::int64_t kMinimum = 20;
+  float largest = 0.0f;
+  std::size_t beams = 0;
+  for (const Scan& scan : scans) {
+    for (const float range : scan.ranges) largest = std::max(largest, range);
+    beams = std::max(beams, scan.ranges.size());
+  }
+  std::int64_t total = 0;
+  std::int64_t same = 0;
+  std::int64_t below = 0;
+  std::vector<char> has_it(beams, 0);
+  std::vector<char> has_other(beams, 0);
+  for (const Scan& scan : scans) {
+    for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+      const float range = scan.ranges[i];
+      if (!(range > 0.0f)) continue;
+      ++total;
+      if (range > largest - kSame) {
+        ++same;
+        has_it[i] = 1;
+        continue;
+      }
+      has_other[i] = 1;
+      if (range > largest - kBelow) ++below;
+    }
+  }
+  // Of these the beams that do not always have it: the robot may stand.
+  std::size_t some = 0;
+  std::size_t both = 0;
+  for (std::size_t i = 0; i < beams; ++i) {
+    some += has_it[i];
+    both += has_it[i] & has_other[i];
+  }
+  const bool is_repeated = same >= std::max(kMinimum, total / 100) &&
+                           10 * same < 9 * total && 10 * below <= same &&
+                           10 * some >= beams && 2 * both >= some;
+  return is_repeated ? largest : 0.0;
+}
+
 LaserMount FindLaserMount(const std::vector<Scan>& scans,
                           const std::vector<Pose2>& lasers) {
   std::vector<Pose2> offsets(lasers.size());

@@ -26,6 +26,13 @@ BeamFan FanOfBeams(int beams, double resolution);
 /// flat wall 8 m away fills less than a tenth of the beams to within 1.5 cm.
 double SaturatedRange(const std::vector<Scan>& scans, double limit);
 
+/// The largest reading of a log, m, where it stands for no return, whatever the
+/// scans' maximum_range says: a hundredth of all readings and a tenth of the
+/// beams have exactly this one, half of these beams not always, and next to
+/// none lie just below it. The largest of what a laser measured is the rarest.
+/// 0 otherwise.
+double RepeatedRange(const std::vector<Scan>& scans);
+
 /// Where a laser is on a robot.
 struct LaserMount {
   /// In the robot's frame, m and rad, to the digits that logs have.

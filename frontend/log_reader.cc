@@ -1,15 +1,24 @@
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/carmen_reader.h>
+#include <plumbline/frontend/laser_profile.h>
 #include <plumbline/frontend/log_reader.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <filesystem>
+#include <string>
 #include <system_error>
+#include <utility>
 
 namespace plumbline {
 namespace {
 
 // So much of a log is shown to the readers.
 constexpr std::size_t kRecognizedBytes = std::size_t{1} << 16;
+// Lines of a report that are shown.
+constexpr std::size_t kShownLines = 5;
+// Readings that are the same, m.
+constexpr double kSameReading = 0.0005;
 
 }  // namespace
 
@@ -42,11 +51,42 @@ void RefuseFolder(const std::string& path) {
               "the parts of a ROS 1 bag");
 }
 
+void TakeOutRepeatedRange(const LaserOptions& options, Log* log) {
+  if (options.laser_max_range) return;
+  const double repeated = RepeatedRange(log->scans);
+  if (repeated == 0.0) return;
+  char reason[160];
+  std::snprintf(reason, sizeof reason,
+                "readings of %.3f m, the largest of all and always the same: "
+                "taken for no return, whatever the largest range is said to be",
+                repeated);
+  SkipReport skip;
+  skip.reason = reason;
+  for (Scan& scan : log->scans) {
+    bool has_it = false;
+    for (float& range : scan.ranges) {
+      if (range < static_cast<float>(repeated - kSameReading)) continue;
+      range = 0.0f;
+      has_it = true;
+      ++skip.count;
+    }
+    scan.maximum_range = std::min(scan.maximum_range, repeated);
+    if (has_it && skip.first_lines.size() < kShownLines) {
+      skip.first_lines.push_back(scan.line);
+    }
+  }
+  log->skipped.push_back(std::move(skip));
+}
+
 Log ReadLog(const std::string& path, const Registry& registry,
             const LaserOptions& options) {
   if (path != "-") {
     const LogReaderType* reader = RecognizeLogPath(registry, path);
-    if (reader != nullptr) return reader->read_path(path, options);
+    if (reader != nullptr) {
+      Log log = reader->read_path(path, options);
+      TakeOutRepeatedRange(options, &log);
+      return log;
+    }
     RefuseFolder(path);
   }
   InputStream input(path, options.stop);
@@ -67,7 +107,9 @@ Log ReadLog(const std::string& path, const Registry& registry,
                 names.empty() ? "log readers in the registry"
                               : "a log for one of the readers " + names);
   }
-  return reader->read(&input, options);
+  Log log = reader->read(&input, options);
+  TakeOutRepeatedRange(options, &log);
+  return log;
 }
 
 }  // namespace plumbline

@@ -77,6 +77,12 @@ const LogReaderType* RecognizeLogPath(const Registry& registry,
 /// at `path` is let pass.
 void RefuseFolder(const std::string& path);
 
+/// Takes readings of the largest range for no return where they stand for that
+/// (RepeatedRange), whatever the log says of its laser's range, and reports
+/// them in Log::skipped; leaves all as it is where the options say it. Readers
+/// of formats need not care.
+void TakeOutRepeatedRange(const LaserOptions& options, Log* log);
+
 /// Reads the log `path` ("-": standard input), whatever its format and
 /// compression, with the reader that recognizes it. Throws Error when the file
 /// cannot be read, no reader of the registry (RegisterBuiltinLogReaders)

@@ -25,13 +25,17 @@ Log ReadInput(const LogInput& input, RunClock* clock) {
   LaserOptions options = LaserOptionsFromFlags();
   if (input.stream != nullptr) {
     const ReadingProgress progress(input.stream, clock);
-    return input.reader->read(input.stream, options);
+    Log log = input.reader->read(input.stream, options);
+    TakeOutRepeatedRange(options, &log);
+    return log;
   }
   options.stop = [] { return InterruptRequested(); };
   options.progress = [clock](std::int64_t done, std::int64_t size) {
     clock->bar().Update(ShareOf(done, size));
   };
-  return input.reader->read_path(input.name, options);
+  Log log = input.reader->read_path(input.name, options);
+  TakeOutRepeatedRange(options, &log);
+  return log;
 }
 
 // What was passed over and taken for granted.

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <plumbline/frontend/laser_profile.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -50,6 +51,41 @@ TEST(LaserProfileTest, FewOrNearReadingsAreNot) {
   EXPECT_EQ(SaturatedRange(ScansWithPile(7.0, 30), 80.0), 0.0);
   // They are at the limit already.
   EXPECT_EQ(SaturatedRange(ScansWithPile(51.0, 30), 50.0), 0.0);
+}
+
+// The same, seen by a laser that turns by `turn` beams from scan to scan.
+std::vector<Scan> TurningScansWithPile(double pile, int share, int turn) {
+  std::vector<Scan> scans = ScansWithPile(pile, share);
+  std::ptrdiff_t turned = 0;
+  for (Scan& scan : scans) {
+    std::rotate(scan.ranges.begin(), scan.ranges.begin() + turned % 100,
+                scan.ranges.end());
+    turned += turn;
+  }
+  return scans;
+}
+
+TEST(LaserProfileTest, TheLargestReadingIsNoneWhereItRepeats) {
+  EXPECT_NEAR(RepeatedRange(TurningScansWithPile(4.3, 30, 7)), 4.3, 1e-6);
+  EXPECT_NEAR(RepeatedRange(TurningScansWithPile(5.6, 12, 1)), 5.6, 1e-6);
+  // Of few beams, of nearly all, or of the same ones it may be a wall.
+  EXPECT_EQ(RepeatedRange(TurningScansWithPile(5.6, 0, 7)), 0.0);
+  EXPECT_EQ(RepeatedRange(TurningScansWithPile(5.6, 95, 7)), 0.0);
+  EXPECT_EQ(RepeatedRange(ScansWithPile(5.6, 30)), 0.0);
+  EXPECT_EQ(RepeatedRange({}), 0.0);
+}
+
+TEST(LaserProfileTest, TheLargestReadingsOfAWallDoNotRepeat) {
+  // Rounded to a centimetre, before a wall across that fills all of the view.
+  std::vector<Scan> scans = ScansWithPile(0.0, 0);
+  int k = 0;
+  for (Scan& scan : scans) {
+    for (float& range : scan.ranges) {
+      range = 4.0f + 0.01f * static_cast<float>(std::min(k % 3, k % 4));
+      k += 7;
+    }
+  }
+  EXPECT_EQ(RepeatedRange(scans), 0.0);
 }
 
 TEST(LaserProfileTest, TheMountIsTheMedian) {

@@ -88,5 +88,34 @@ TEST(LogReaderTest, ReadsALogOfAnyKnownFormat) {
   EXPECT_THAT(refusal("no/such.log"), ::testing::HasSubstr("no/such.log"));
 }
 
+TEST(LogReaderTest, TheLargestReadingThatRepeatsIsNoReturn) {
+  Log log;
+  for (int k = 0; k < 20; ++k) {
+    Scan scan;
+    scan.maximum_range = 8.0;
+    scan.line = k + 1;
+    for (int i = 0; i < 50; ++i) {
+      scan.ranges.push_back(
+          (i + k) % 50 < 20 ? 4.0f : 1.0f + 0.05f * static_cast<float>(i));
+    }
+    log.scans.push_back(scan);
+  }
+  Log told = log;
+  LaserOptions options;
+  TakeOutRepeatedRange(options, &log);
+  ASSERT_EQ(log.skipped.size(), 1u);
+  EXPECT_EQ(log.skipped[0].count, 400);
+  EXPECT_EQ(log.skipped[0].first_lines.front(), 1);
+  EXPECT_THAT(log.skipped[0].reason, ::testing::HasSubstr("4.000 m"));
+  EXPECT_EQ(log.scans[7].ranges[5], 0.0f);
+  EXPECT_EQ(log.scans[7].ranges[30], told.scans[7].ranges[30]);
+  EXPECT_NEAR(log.scans[7].maximum_range, 4.0, 1e-6);
+
+  options.laser_max_range = 8.0;
+  TakeOutRepeatedRange(options, &told);
+  EXPECT_TRUE(told.skipped.empty());
+  EXPECT_EQ(told.scans[7].ranges[5], 4.0f);
+}
+
 }  // namespace
 }  // namespace plumbline

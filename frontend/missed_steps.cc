@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -32,12 +33,10 @@ constexpr double kAlong = 0.3;
 constexpr std::size_t kBearings = 360;
 // A longer motion between key scans is a jump, not a way, m.
 constexpr double kLongestStep = 1.5;
-// Key scans that one thread reads in a row, and rounds of the search, each with
-// the steps found before it made.
-constexpr std::size_t kInTurn = 32;
+// Rounds of the search, each with the steps found before it made.
 constexpr int kMostRounds = 4;
-// Between two times that `stop` is asked.
-constexpr std::size_t kAtOnce = 256;
+// Key scans that are looked at at once.
+constexpr std::size_t kAtOnce = 64;
 
 // What a key scan saw, in the frame of the track.
 class View {
@@ -263,10 +262,10 @@ class Search {
   double StepOf(int index) const { return index * options_.resolution; }
   void FindStations();
   void FindPairs();
-  void ReadViews();
-  void ComparePairs();
+  // What the way to these stations lies between, and nothing else.
+  void LoadViews(std::size_t begin, std::size_t end);
   Comparison Compared(const Pair& pair) const {
-    return Comparison(views_[pair.first], views_[pair.second], pair.between,
+    return Comparison(*views_[pair.first], *views_[pair.second], pair.between,
                       options_);
   }
   // All pairs that the way to a station lies between.
@@ -287,8 +286,11 @@ class Search {
   const std::function<bool()>& stop_;
   const int half_;
   std::vector<Station> stations_;
-  std::vector<View> views_;
+  // Of stations near those that are looked at; null for others.
+  std::vector<std::unique_ptr<View>> views_;
+  // By their second stations; so many were compared.
   std::vector<Pair> pairs_;
+  std::size_t compared_ = 0;
   // By station: pairs that the way to it lies between.
   std::vector<std::vector<std::size_t>> over_;
 };
@@ -332,30 +334,34 @@ void Search::FindPairs() {
   }
 }
 
-void Search::ReadViews() {
-  views_.assign(stations_.size(), View());
-  ParallelFor((stations_.size() + kInTurn - 1) / kInTurn, options_.num_threads,
-              [&](std::size_t turn) {
-                const std::size_t end =
-                    std::min(stations_.size(), (turn + 1) * kInTurn);
-                for (std::size_t k = turn * kInTurn; k < end; ++k) {
-                  views_[k].Read(scans_[stations_[k].scan], PoseOf(k),
-                                 options_);
-                }
-              });
-}
-
-void Search::ComparePairs() {
-  ParallelFor((pairs_.size() + kInTurn - 1) / kInTurn, options_.num_threads,
-              [&](std::size_t turn) {
-                const std::size_t end =
-                    std::min(pairs_.size(), (turn + 1) * kInTurn);
-                for (std::size_t p = turn * kInTurn; p < end; ++p) {
-                  const Comparison comparison = Compared(pairs_[p]);
-                  pairs_[p].fit = comparison.FitWith(0.0);
-                  pairs_[p].telling = comparison.telling();
-                }
-              });
+void Search::LoadViews(std::size_t begin, std::size_t end) {
+  const double first = stations_[begin].way;
+  while (begin > 0 && first - stations_[begin - 1].way <= options_.reach) {
+    --begin;
+  }
+  const double last = stations_[end - 1].way;
+  while (end < stations_.size() &&
+         stations_[end].way - last <= options_.reach) {
+    ++end;
+  }
+  for (std::size_t k = 0; k < views_.size(); ++k) {
+    if (k < begin || k >= end) views_[k].reset();
+  }
+  ParallelFor(end - begin, options_.num_threads, [&](std::size_t i) {
+    std::unique_ptr<View>& view = views_[begin + i];
+    if (view != nullptr) return;
+    view = std::make_unique<View>();
+    view->Read(scans_[stations_[begin + i].scan], PoseOf(begin + i), options_);
+  });
+  std::size_t next = compared_;
+  while (next < pairs_.size() && pairs_[next].second < end) ++next;
+  ParallelFor(next - compared_, options_.num_threads, [&](std::size_t i) {
+    Pair& pair = pairs_[compared_ + i];
+    const Comparison comparison = Compared(pair);
+    pair.fit = comparison.FitWith(0.0);
+    pair.telling = comparison.telling();
+  });
+  compared_ = next;
 }
 
 std::vector<Comparison> Search::Over(std::size_t station) const {
@@ -474,12 +480,12 @@ MissedStep Search::Locate(std::size_t station, double step) const {
     for (const std::size_t p : over_[station]) {
       const Pair& pair = pairs_[p];
       if (pair.second == station) {
-        const Comparison before(views_[pair.first], view, pair.between,
+        const Comparison before(*views_[pair.first], view, pair.between,
                                 options_);
         sum += before.FitWith(step).value() - before.FitWith(0.0).value();
       }
       if (pair.first == station - 1) {
-        const Comparison after(view, views_[pair.second], pair.between,
+        const Comparison after(view, *views_[pair.second], pair.between,
                                options_);
         sum += after.FitWith(0.0).value() - after.FitWith(step).value();
       }
@@ -508,17 +514,19 @@ MissedStep Search::Locate(std::size_t station, double step) const {
 std::vector<MissedStep> Search::RunOnce() {
   FindStations();
   FindPairs();
-  ReadViews();
-  ComparePairs();
+  views_.clear();
+  views_.resize(stations_.size());
+  compared_ = 0;
   std::vector<double> steps(stations_.size(), 0.0);
   std::vector<Fit> fits(stations_.size());
   std::vector<MissedStep> missed;
   for (std::size_t begin = 0; begin < stations_.size(); begin += kAtOnce) {
     if (Stops()) return missed;
-    ParallelFor(std::min(kAtOnce, stations_.size() - begin),
-                options_.num_threads, [&](std::size_t k) {
-                  steps[begin + k] = StepTo(begin + k, &fits[begin + k]);
-                });
+    const std::size_t end = std::min(begin + kAtOnce, stations_.size());
+    LoadViews(begin, end);
+    ParallelFor(end - begin, options_.num_threads, [&](std::size_t k) {
+      steps[begin + k] = StepTo(begin + k, &fits[begin + k]);
+    });
   }
   // The clearest one of those that lie between the same scans.
   const auto is_clearest = [&](std::size_t k) {
@@ -535,8 +543,9 @@ std::vector<MissedStep> Search::RunOnce() {
     return true;
   };
   for (std::size_t k = 0; k < stations_.size(); ++k) {
-    if (steps[k] != 0.0 && is_clearest(k))
-      missed.push_back(Locate(k, steps[k]));
+    if (steps[k] == 0.0 || !is_clearest(k)) continue;
+    LoadViews(k, k + 1);
+    missed.push_back(Locate(k, steps[k]));
   }
   return missed;
 }

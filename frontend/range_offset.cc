@@ -251,14 +251,19 @@ RangeOffset FindRangeOffset(const std::vector<Scan>& scans) {
     return result;
   }
   double offset = result.first;
-  for (int round = 1; round < kMostRounds; ++round) {
+  // What is there is taken out in the end. Where a laser sees little, each time
+  // may show more, however much was taken out.
+  bool is_settled = false;
+  for (int round = 1; round < kMostRounds && !is_settled; ++round) {
     equations = CompareAll(scans, offset, &pairs);
     const double more = Solved(Sum(equations, 0, equations.size()));
     offset += more;
-    if (std::abs(more) < kSettled) break;
+    is_settled = std::abs(more) < kSettled;
   }
   const double size = std::abs(offset);
-  if (size >= RangeOffset::kLeast && size <= kLargest) result.offset = offset;
+  if (is_settled && size >= RangeOffset::kLeast && size <= kLargest) {
+    result.offset = offset;
+  }
   return result;
 }
 

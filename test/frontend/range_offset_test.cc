@@ -120,6 +120,41 @@ TEST(RangeOffsetTest, ScansWithoutReturnsArePassedOver) {
   EXPECT_NEAR(FindRangeOffset(scans).offset, 0.05, 0.006);
 }
 
+// What a camera that sees 87 degrees and 4 m sees of a hall in which it winds
+// its way around racks, there and back.
+TEST(RangeOffsetTest, WhatDoesNotSettleIsNone) {
+  std::vector<WallEnds> walls =
+      testing::Moved(testing::Room(40.0, 4.0), Pose2(20.0, 0.0, 0.0));
+  for (int i = 0; i < 12; ++i) {
+    const std::vector<WallEnds> rack =
+        testing::Moved(testing::Room(0.3, 1.8),
+                       Pose2(4.0 + 3.0 * i, i % 2 == 0 ? -1.0 : 1.0, 0.0));
+    walls.insert(walls.end(), rack.begin(), rack.end());
+  }
+  testing::Laser laser;
+  laser.start_angle = DegToRad(-43.5);
+  laser.angle_step = DegToRad(0.5);
+  laser.beams = 175;
+  laser.maximum_range = 4.0;
+  laser.sigma = 0.015;
+  Noise random(3);
+  std::vector<Scan> scans;
+  for (int i = 0; i < 740; ++i) {
+    const bool is_back = i >= 370;
+    const double x = 1.5 + 0.1 * (is_back ? 739 - i : i);
+    const double phase = kPi * (x - 4.0) / 3.0;
+    const double slope = -kPi / 3.0 * std::sin(phase);
+    scans.push_back(testing::MakeScan(
+        walls,
+        Pose2(x, std::cos(phase), std::atan(slope) + (is_back ? kPi : 0.0)),
+        laser, &random));
+  }
+  const RangeOffset found = FindRangeOffset(scans);
+  EXPECT_GT(found.pairs, 40);
+  EXPECT_GT(std::abs(found.first), 0.02);
+  EXPECT_EQ(found.offset, 0.0);
+}
+
 TEST(RangeOffsetTest, TakenOutOfReturnsOnly) {
   Scan scan;
   scan.ranges = {1.0f, 0.0f, 0.02f, 7.5f};

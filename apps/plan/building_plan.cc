@@ -8,6 +8,7 @@
 #include <plumbline/plan/rooms_with_doors.h>
 #include <plumbline/plan/sides.h>
 #include <plumbline/plan/unseen_walls.h>
+#include <plumbline/plan/wall_fronts.h>
 
 #include <algorithm>
 #include <cmath>
@@ -333,6 +334,7 @@ Division Divide(std::vector<DrawnLine> drawn, const SpaceGrid& space,
                       &division.region);
   JoinAcrossFreeStanding(space, division.arrangement, division.drawn,
                          &division.region);
+  GiveFrontsToRooms(division.arrangement, division.drawn, &division.region);
   return division;
 }
 

@@ -374,6 +374,34 @@ TEST(BuildingPlanTest, CupboardsBeforeAWallDoNotMakeItThick) {
   }
 }
 
+// Four rooms at a corridor, two on either side, with walls between them in one
+// line. In one of the upper rooms cupboards stand before that wall, in a longer
+// row than what is seen of the wall: the rest of it is open.
+TEST(BuildingPlanTest, AWallGoesOnBeyondWhatStandsBeforeIt) {
+  Drawing drawing(15.0, 15.0);
+  drawing.Room(1.0, 6.0, 13.0, 8.0);
+  drawing.Room(1.0, 1.0, 6.0, 5.8).Room(6.2, 1.0, 13.0, 5.8);
+  drawing.Room(1.0, 8.2, 6.0, 13.0).Room(6.2, 8.2, 13.0, 13.0);
+  for (const double x : {3.0, 9.0}) {
+    drawing.Free(x, 5.7, x + 0.9, 6.1).Free(x, 7.9, x + 0.9, 8.3);
+  }
+  drawing.Free(5.9, 11.0, 6.3, 13.0);
+  drawing.Fill(6.05, 8.2, 6.65, 11.0, Space::kUnknown);
+  drawing.Fill(6.65, 8.2, 6.7, 11.2, Space::kOccupied);
+  drawing.Fill(6.05, 10.95, 6.7, 11.0, Space::kOccupied);
+  const BuildingPlan plan = PlanOf(drawing);
+  ASSERT_EQ(plan.rooms.size(), 5u);
+  for (const PlanRoom& room : plan.rooms) {
+    if (room.outline.Contains({3.0, 12.0})) {
+      EXPECT_NEAR(room.area, 5.0 * 4.8, 0.8);
+    }
+    if (room.outline.Contains({10.0, 12.0})) {
+      // The other face of the wall was not seen.
+      EXPECT_NEAR(room.area, 6.95 * 4.8, 1.2);
+    }
+  }
+}
+
 TEST(BuildingPlanTest, APassageThroughAVeryThickWallIsOneDoor) {
   Drawing drawing(18.0, 9.0);
   drawing.Room(1.0, 1.0, 7.0, 7.0).Room(8.3, 1.0, 14.0, 7.0);

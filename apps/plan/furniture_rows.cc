@@ -153,17 +153,30 @@ void JoinAcrossFurniture(const Arrangement& arrangement,
       faces[id].push_back(arrangement.faces[i]);
       areas[id] += arrangement.faces[i].Area();
     }
-    for (const auto& [part, others] :
-         WaysBetween(arrangement, drawn, driven, *region)) {
+    const std::map<int, std::map<int, Ways>> ways =
+        WaysBetween(arrangement, drawn, driven, *region);
+    const auto is_way_out = [&](int other, const Ways& way) {
+      return areas[other] >= kLeastRoom &&
+             (way.has_row || way.widest >= kLeastWayOut);
+    };
+    for (const auto& [part, others] : ways) {
       int into = -1;
-      int ways_out = 0;
+      bool has_others = false;
       for (const auto& [other, way] : others) {
-        if (areas[other] < kLeastRoom) continue;
-        if (way.has_row) into = other;
-        ways_out += way.has_row || way.widest >= kLeastWayOut;
+        if (is_way_out(other, way) && way.has_row) into = other;
       }
-      if (into < 0 || ways_out != 1 || areas[part] > areas[into] ||
-          IsLongAndNarrow(UnionOf(faces[into]).front())) {
+      if (into < 0 || areas[part] > areas[into]) continue;
+      // Two rooms along a corridor have a door each to it.
+      bool is_shared = false;
+      for (const auto& [third, way] : others) {
+        if (third == into || !is_way_out(third, way)) continue;
+        has_others = true;
+        const auto of_into = ways.at(into).find(third);
+        is_shared = is_shared || (of_into != ways.at(into).end() &&
+                                  is_way_out(third, of_into->second));
+      }
+      if (is_shared || IsLongAndNarrow(UnionOf(faces[into]).front()) ||
+          (has_others && IsLongAndNarrow(UnionOf(faces[part]).front()))) {
         continue;
       }
       std::replace(region->begin(), region->end(), part, into);

@@ -8,11 +8,12 @@
 
 namespace plumbline {
 
-/// Joins regions (FindRegions) that are parts of the room beside them: no way
-/// leads out of them but into that room, which is no corridor, through two gaps
-/// and more, near to each other, in what stands between. A row of cupboards and
-/// screens across a room looks like a partition with doors, but a room behind a
-/// partition has one door to its neighbor, or one elsewhere. `path`: poses of
+/// Joins regions (FindRegions) that are parts of the room beside them: a way
+/// leads from them into that room, which is no corridor, through two gaps and
+/// more, near to each other, in what stands between, and no other way to what
+/// that room leads to as well. A row of cupboards and screens across a room
+/// looks like a partition with doors, but a room behind a partition has one
+/// door to its neighbor, or one to the same corridor. `path`: poses of
 /// the robot in the order of time, map frame; what it drove through is a way
 /// out even where it looks like a crack.
 void JoinAcrossFurniture(const Arrangement& arrangement,

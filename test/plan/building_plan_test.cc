@@ -684,6 +684,19 @@ TEST(BuildingPlanTest, CupboardsAcrossARoomDoNotDivideIt) {
   EXPECT_EQ(rooms({4.2, 9.0}, false), 3u);
 }
 
+// The part that they hide leads to a space of its own.
+TEST(BuildingPlanTest, APartOfARoomMayHaveAWayOutElsewhere) {
+  Drawing drawing(18.0, 12.0);
+  drawing.Room(1.0, 1.0, 13.0, 3.0).Room(1.0, 3.2, 13.0, 10.0);
+  drawing.Room(13.2, 1.0, 16.0, 10.0);
+  drawing.Free(2.0, 2.9, 2.9, 3.3).Free(12.9, 6.0, 13.3, 6.9);
+  drawing.Fill(8.0, 3.2, 8.05, 10.0, Space::kOccupied);
+  for (const double gap : {4.2, 6.6, 9.0}) {
+    drawing.Free(8.0, gap, 8.05, gap + 0.7);
+  }
+  EXPECT_EQ(PlanOf(drawing).rooms.size(), 3u);
+}
+
 // One front of the middle piece is in line with the first piece, its other one
 // with the last: two lines with a gap each.
 TEST(BuildingPlanTest, CupboardsOnTwoLinesAreOneRow) {

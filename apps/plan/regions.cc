@@ -181,9 +181,10 @@ std::vector<int> HiddenSpaces(const Arrangement& arrangement,
     double area = 0.0;
     for (const Polygon& part : parts) area += part.Area();
     if (area > kMaxPocket) continue;
-    const double width = free[spaces.Find(i)] >= kGlimpse * area
-                             ? options.glimpsed_width
-                             : options.pocket_width;
+    // The more of it was seen, the deeper it may be.
+    const double seen = std::min(1.0, free[spaces.Find(i)] / (kGlimpse * area));
+    const double width = options.pocket_width +
+                         seen * (options.glimpsed_width - options.pocket_width);
     const std::vector<Polygon> outlines = UnionOf(parts);
     if (std::all_of(
             outlines.begin(), outlines.end(),

@@ -30,7 +30,8 @@ struct RegionOptions {
   double min_width = 0.8;
   /// The same goes for unseen spaces behind furniture narrower than this, m.
   double pocket_width = 0.9;
-  /// ... or than this, m, when a tenth of them was seen beside it.
+  /// ... or than up to this, m, where a part of them was seen beside it: a
+  /// tenth and more.
   double glimpsed_width = 1.5;
 };
 

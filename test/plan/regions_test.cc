@@ -55,6 +55,20 @@ TEST(RegionsTest, NarrowSpaceBehindFurnitureBelongsToItsRoom) {
   EXPECT_EQ(FindRegions(desk), (std::vector<int>{0, 0}));
 }
 
+// How deep it may be does not jump with what was seen of it.
+TEST(RegionsTest, TheMoreWasSeenBehindFurnitureTheDeeperItMayBe) {
+  const auto region = [](double depth, double seen) {
+    Arrangement desk = Stack({3.0, depth});
+    desk.free[1] = seen * desk.unknown[1];
+    desk.unknown[1] -= desk.free[1];
+    return FindRegions(desk)[1];
+  };
+  EXPECT_EQ(region(1.1, 0.02), -1);
+  EXPECT_EQ(region(1.1, 0.08), 0);
+  EXPECT_EQ(region(1.24, 0.02), -1);
+  EXPECT_EQ(region(1.24, 0.08), 0);
+}
+
 // Where outer walls bend outwards the next one goes on behind each of them:
 // nothing was seen there, and the lines alone close it.
 TEST(RegionsTest, UnseenSpaceBehindALongWallIsNoPocketWhereLinesAloneCloseIt) {

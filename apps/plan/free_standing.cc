@@ -22,7 +22,7 @@ constexpr double kLongest = 5.0;
 // border was not seen; and no more than this share of it is drawn as wall: the
 // front of a room between its door and a glazed stretch is more.
 constexpr double kLeastStanding = 1.5;
-constexpr double kStandingShare = 0.9;
+constexpr double kStandingShare = 0.93;
 constexpr double kMostWall = 0.6;
 constexpr double kLeastGap = 1.4;
 constexpr double kMostUnseen = 0.1;

@@ -471,6 +471,20 @@ TEST(BuildingPlanTest, WhatStandsFreeDividesNoRoom) {
   EXPECT_EQ(RoomsWithScreens(0.9), 2u);
 }
 
+// A piece of 3.7 m across a room with a gap of 1.6 m on both sides; on one of
+// them `stub` m of wall end.
+TEST(BuildingPlanTest, AWallThatEndsBesideWhatStandsFreeIsAWall) {
+  const auto rooms = [](double stub) {
+    Drawing drawing(16.0, 12.0);
+    drawing.Room(1.0, 1.0, 7.9 + stub, 10.0);
+    drawing.Fill(1.0, 5.5, 1.0 + stub, 5.55, Space::kOccupied);
+    drawing.Fill(2.6 + stub, 5.5, 6.3 + stub, 5.55, Space::kOccupied);
+    return PlanOf(drawing).rooms.size();
+  };
+  EXPECT_EQ(rooms(0.0), 1u);
+  EXPECT_EQ(rooms(0.35), 2u);
+}
+
 TEST(BuildingPlanTest, TheFrontBetweenADoorAndAGlazedStretchIsAWall) {
   const auto rooms = [](double wall) {
     Drawing drawing(16.0, 12.0);

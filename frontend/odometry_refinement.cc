@@ -1129,8 +1129,9 @@ void OdometryRefiner::Tie(bool last) {
       first.tie = TrackTie::kLoose;
       first.since_key.covariance = LooseCovariance();
       if (open_->odometry_holds) {
-        blind_ways_.push_back(
-            {open_->before.keys.back().scan, start.scan, BlindMotion()});
+        blind_ways_.push_back({open_->before.keys.back().scan, start.scan,
+                               BlindMotion(),
+                               MostWrongTurn(open_->blind_turn)});
       }
       part_ = num_parts_++;
     }
@@ -1235,24 +1236,34 @@ bool OdometryRefiner::IsInReach(const FoundTrack& found, std::size_t middle,
 bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
                                          std::size_t middle,
                                          std::size_t since) const {
-  std::vector<Pose2> before;
-  for (std::size_t k = since; k < search_.seen().size(); ++k) {
-    // A guess lies between.
-    if (search_.seen()[k].part != search_.seen().back().part) return true;
-    before.push_back(search_.seen()[k].pose);
-  }
-  std::vector<Pose2> after;
-  for (std::size_t k = 0; k <= middle; ++k) {
-    after.push_back(open_->keys[k].pose);
-  }
   // What neighbouring matches have in common adds up faster than a random walk.
   const auto generous = [this](const std::vector<Pose2>& poses) {
     UncertainPose2 way = DriftAlong(poses, options_.drift);
     way.covariance *= kGenerous;
     return way;
   };
-  const UncertainPose2 predicted =
-      Compose(Compose(generous(before), BlindMotion()), generous(after));
+  UncertainPose2 predicted;
+  std::vector<Pose2> piece;
+  for (std::size_t k = since; k < search_.seen().size(); ++k) {
+    const SeenKey& key = search_.seen()[k];
+    if (!piece.empty() && key.part != search_.seen()[k - 1].part) {
+      const auto way = std::find_if(
+          blind_ways_.rbegin(), blind_ways_.rend(),
+          [&key](const BlindWay& one) { return one.to == key.scan; });
+      // A guess lies between of which nothing tells.
+      if (way == blind_ways_.rend()) return true;
+      predicted = Compose(Compose(predicted, generous(piece)), way->motion);
+      piece.clear();
+    }
+    piece.push_back(key.pose);
+  }
+  std::vector<Pose2> after;
+  for (std::size_t k = 0; k <= middle; ++k) {
+    after.push_back(open_->keys[k].pose);
+  }
+  predicted =
+      Compose(Compose(Compose(predicted, generous(piece)), BlindMotion()),
+              generous(after));
   const Pose2 from = search_.seen()[since].pose;
   Pose2 left = Between(from, found.pose) - predicted.mean;
   left[2] = NormalizeAngle(left[2]);

@@ -113,7 +113,7 @@ class PartJoining {
   // the part lies.
   bool IsAgainstOdometry(const std::vector<std::size_t>& rest,
                          const std::vector<std::size_t>& part,
-                         const LateVote& vote, const LateTie& tie) const;
+                         const LateVote& vote) const;
   // Takes a part in where a window says, unless that is too uncertain or
   // contradicted.
   bool Take(const std::vector<std::size_t>& rest,
@@ -228,8 +228,16 @@ bool PartJoining::JoinPart(const std::vector<std::size_t>& rest,
     if (nodes <= 0) break;
     // A jump within a window is none of the track's: parts are whole.
     LateVote vote{begin + size / 2, {}};
-    const std::vector<FoundTrack> hypotheses =
+    std::vector<FoundTrack> hypotheses =
         search_->FindAll(keys, view, begin, begin + size, 0.0, &nodes);
+    // Where it cannot be is no rival of where it is.
+    hypotheses.erase(
+        std::remove_if(
+            hypotheses.begin(), hypotheses.end(),
+            [&](const FoundTrack& hypothesis) {
+              return IsAgainstOdometry(rest, part, {vote.middle, hypothesis});
+            }),
+        hypotheses.end());
     for (const FoundTrack& hypothesis : hypotheses) {
       if (hypothesis.quality >= kLeastQuality)
         candidates.push_back({vote.middle, hypothesis});
@@ -278,10 +286,6 @@ bool PartJoining::Take(const std::vector<std::size_t>& rest,
   const bool is_held = held != cut_.doubts.end();
   // The match that it hangs on is more than where to look.
   if (is_rough && is_held) return false;
-  if (IsAgainstOdometry(rest, part, vote, tie)) {
-    search_->Trace("NOT JOINED: odometry is against it");
-    return false;
-  }
   if (EvidenceOf(vote, rest, part).Doubt() >
       (is_held ? kLessDoubt * held->second : kMostDoubt)) {
     search_->Trace("NOT JOINED: contradicted");
@@ -294,8 +298,9 @@ bool PartJoining::Take(const std::vector<std::size_t>& rest,
 
 bool PartJoining::IsAgainstOdometry(const std::vector<std::size_t>& rest,
                                     const std::vector<std::size_t>& part,
-                                    const LateVote& vote,
-                                    const LateTie& tie) const {
+                                    const LateVote& vote) const {
+  if (blind_.empty()) return false;
+  const LateTie tie = LateTieOf(rest, part, vote);
   const std::vector<SeenKey>& seen = search_->seen();
   const auto find = [&](int scan) {
     return std::find_if(seen.begin(), seen.end(),
@@ -316,7 +321,8 @@ bool PartJoining::IsAgainstOdometry(const std::vector<std::size_t>& rest,
     left[2] = NormalizeAngle(left[2]);
     const Eigen::Matrix3d covariance =
         way.motion.covariance + kGenerous * tie.since_key.covariance;
-    return left.dot(covariance.inverse() * left) > tracking_.max_innovation;
+    return std::abs(left[2]) > way.most_wrong_turn ||
+           left.dot(covariance.inverse() * left) > tracking_.max_innovation;
   });
 }
 

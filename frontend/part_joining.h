@@ -1,6 +1,7 @@
 #ifndef PLUMBLINE_FRONTEND_PART_JOINING_H_
 #define PLUMBLINE_FRONTEND_PART_JOINING_H_
 
+#include <plumbline/factors/angle.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/match_drift.h>
 #include <plumbline/frontend/tie_doubts.h>
@@ -25,19 +26,22 @@ struct LooseTrack {
 };
 
 /// A way that nothing in sight could be matched on, and nothing speaks against
-/// odometry: neither a gap in the log nor a contradiction or a jump.
+/// odometry: neither a gap in the log of which it does not tell nor a
+/// contradiction or a jump.
 struct BlindWay {
   /// The last key scan before it and the first one after it.
   int from = 0;
   int to = 0;
   /// From one to the other by odometry.
   UncertainPose2 motion;
+  /// By so much it may have turned wrongly, rad.
+  double most_wrong_turn = DegToRad(180.0);
 
   /// Writes or reads all of it (state_archive.h).
   template <typename Archive>
   friend void Exchange(Archive& archive, BlindWay& way) {
-    auto& [from, to, motion] = way;
-    ExchangeAll(archive, from, to, motion);
+    auto& [from, to, motion, most_wrong_turn] = way;
+    ExchangeAll(archive, from, to, motion, most_wrong_turn);
   }
 };
 

@@ -65,6 +65,26 @@ TEST(PartJoiningTest, OdometryOfABlindWayBetweenThemHasToAgree) {
   }
 }
 
+// A turn may be less uncertain than its variance has it.
+TEST(PartJoiningTest, OdometryOfABlindWayTurnsNoMoreWronglyThanItCan) {
+  for (const double most : {1.0, 0.5}) {
+    TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
+    SeeHall(-5.0, 30, 0, Pose2::Zero(), 0.2, &search);
+    SeeHall(-15.0, 90, 1, Pose2(50.0, 20.0, 2.0), -0.2, &search);
+    std::vector<LooseTrack> loose = Guessed(290, 1190);
+    BlindWay way;
+    way.from = 290;
+    way.to = 300;
+    way.motion.mean = Pose2(-15.0 - (-5.0 + 0.3 * 29.0), -0.4, 0.75);
+    way.motion.covariance = Eigen::Vector3d(1.0, 1.0, 1.0).asDiagonal();
+    way.most_wrong_turn = most;
+    EXPECT_EQ(
+        JoinParts(TrackingOptions(), MatchDrift(), {0}, {way}, &search, &loose)
+            .size(),
+        most > 0.75 ? 1u : 0u);
+  }
+}
+
 TEST(PartJoiningTest, APartOfAnotherPlaceIsNot) {
   TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
   SeeHall(-17.0, 30, 0, Pose2::Zero(), 0.2, &search);

@@ -112,10 +112,12 @@ bool Stands(const Pose2& motion) {
          std::abs(NormalizeAngle(motion[2])) <= kStandsTurn;
 }
 
-// By so much odometry that turned by `turn` may be wrong, rad: by less than a
-// quarter of a circle, after which much of a building looks the same.
-double MostWrongTurn(double turn) {
-  return std::min(DegToRad(75.0), DegToRad(30.0) + 0.3 * std::abs(turn));
+// By so much odometry of a way (m) and a turn (rad) may have turned wrongly,
+// rad: by less than a quarter of a circle, after which much of a building looks
+// the same. Over a gap nothing but the sum of its turns is known.
+double MostWrongTurn(double way, double turn) {
+  return std::min(DegToRad(75.0),
+                  DegToRad(30.0) + DegToRad(2.0) * way + 0.3 * std::abs(turn));
 }
 
 // Farther than robots are shaken to while they are carried.
@@ -520,9 +522,10 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
   const bool is_far =
       track_.after_gap && IsFar(Between(track_.last_pose, prior.pose));
   const bool may_agree =
-      !is_far || (here.hits >= tracking.min_hits &&
-                  std::abs(NormalizeAngle(match->pose[2] - prior.pose[2])) <=
-                      MostWrongTurn(last_motion_[2]));
+      !is_far ||
+      (here.hits >= tracking.min_hits &&
+       std::abs(NormalizeAngle(match->pose[2] - prior.pose[2])) <=
+           MostWrongTurn(last_motion_.head<2>().norm(), last_motion_[2]));
   const bool agrees =
       may_agree &&
       (here.hits >= tracking.min_hits
@@ -1129,9 +1132,9 @@ void OdometryRefiner::Tie(bool last) {
       first.tie = TrackTie::kLoose;
       first.since_key.covariance = LooseCovariance();
       if (open_->odometry_holds) {
-        blind_ways_.push_back({open_->before.keys.back().scan, start.scan,
-                               BlindMotion(),
-                               MostWrongTurn(open_->blind_turn)});
+        blind_ways_.push_back(
+            {open_->before.keys.back().scan, start.scan, BlindMotion(),
+             MostWrongTurn(open_->blind_way, open_->blind_turn)});
       }
       part_ = num_parts_++;
     }
@@ -1272,7 +1275,8 @@ bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
   const double innovation = left.dot(covariance.inverse() * left);
   if (trace_) trace_("odometry against it " + std::to_string(innovation));
   return innovation <= options_.tracking.max_innovation &&
-         std::abs(left[2]) <= MostWrongTurn(open_->blind_turn);
+         std::abs(left[2]) <=
+             MostWrongTurn(open_->blind_way, open_->blind_turn);
 }
 
 void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {

@@ -37,6 +37,9 @@ constexpr double kFastest = 3.0;
 constexpr double kFastestTurn = DegToRad(200.0);
 constexpr double kJumpWay = 0.3;
 constexpr double kJumpTurn = DegToRad(15.0);
+// Wheels of a robot that is carried are rolled by no more, m and rad.
+constexpr double kRolledWay = 1.0;
+constexpr double kRolledTurn = DegToRad(90.0);
 // Nor changes its speed by more from scan to scan, m/s.
 constexpr double kFastestChange = 1.0;
 // A pose explains a scan clearly better than another from this difference on,
@@ -120,10 +123,10 @@ double MostWrongTurn(double way, double turn) {
                   DegToRad(30.0) + DegToRad(2.0) * way + 0.3 * std::abs(turn));
 }
 
-// Farther than robots are shaken to while they are carried.
+// Farther than wheels are rolled when a robot is taken up or set down.
 bool IsFar(const Pose2& motion) {
-  return motion.head<2>().norm() > kJumpWay ||
-         std::abs(NormalizeAngle(motion[2])) > kJumpTurn;
+  return motion.head<2>().norm() > kRolledWay ||
+         std::abs(NormalizeAngle(motion[2])) > kRolledTurn;
 }
 
 // Whether odometry tells of a way over a gap in the log, and has not begun anew

@@ -1265,14 +1265,14 @@ TEST(OdometryRefinerTest, CarriedToAPlaceThatLooksAlikeAtFirst) {
   EXPECT_EQ(refiner.loose()[0].begin, kCarried - 1);
 }
 
-// Scans are missing while it drives into another hall, which looks like the one
-// that it comes from. Where odometry goes on in the meantime, it tells that
-// this is another one.
-std::vector<RefinedScan> DriveIntoAHallOfTheSameKind(bool odometry_goes_on) {
+// A hall of the same kind in the frame of the first one.
+const Pose2 kSecondHall(3.0, 9.0, kPi / 2);
+
+// Scans are missing while it gets to where it began in the other hall, which
+// looks the same; `by_odometry`: what odometry tells of that way.
+std::vector<RefinedScan> DriveThroughTwoHalls(const Pose2& by_odometry) {
   std::vector<WallEnds> hall = Room(20.0, 6.0);
   for (const WallEnds& side : Pillars(-10.0)) hall.push_back(side);
-  // Of the second hall in the frame of the first.
-  const Pose2 second(3.0, 9.0, kPi / 2);
   Laser laser;
   laser.sigma = 0.01;
   Noise noise(8);
@@ -1280,17 +1280,12 @@ std::vector<RefinedScan> DriveIntoAHallOfTheSameKind(bool odometry_goes_on) {
   constexpr int kMissing = 45;
   std::vector<RefinedScan> refined;
   Pose2 odometry(-9.0, 0.0, 0.0);
-  Pose2 last = odometry;
   for (int i = 0; i < 2 * kMissing; ++i) {
-    const Pose2 seen(-9.0 + 0.1 * (i % kMissing), 0.0, 0.0);
-    const Pose2 truth = i < kMissing ? seen : Compose(second, seen);
-    if (i != kMissing || odometry_goes_on) {
-      Pose2 motion = Between(last, truth);
-      // It is none too good.
-      motion[2] *= 1.05;
-      odometry = Compose(odometry, motion);
+    if (i > 0) {
+      odometry =
+          Compose(odometry, i == kMissing ? by_odometry : Pose2(0.1, 0.0, 0.0));
     }
-    last = truth;
+    const Pose2 seen(-9.0 + 0.1 * (i % kMissing), 0.0, 0.0);
     Scan scan = MakeScan(hall, seen, laser, &noise);
     scan.timestamp = 100.0 + 0.2 * i + (i < kMissing ? 0.0 : 20.0);
     scan.odometry = odometry;
@@ -1302,15 +1297,28 @@ std::vector<RefinedScan> DriveIntoAHallOfTheSameKind(bool odometry_goes_on) {
 }
 
 TEST(OdometryRefinerTest, OdometryThatGoesOnOverAGapTellsLookalikesApart) {
-  const std::vector<RefinedScan> carried = DriveIntoAHallOfTheSameKind(false);
-  ASSERT_EQ(carried.size(), 90u);
-  EXPECT_EQ(carried[45].tie, TrackTie::kMatched);
-  const std::vector<RefinedScan> driven = DriveIntoAHallOfTheSameKind(true);
+  const Pose2 begin(-9.0, 0.0, 0.0);
+  Pose2 way = Between(Compose(begin, Pose2(4.4, 0.0, 0.0)),
+                      Compose(kSecondHall, begin));
+  // It is none too good.
+  way[2] *= 1.05;
+  const std::vector<RefinedScan> driven = DriveThroughTwoHalls(way);
   ASSERT_EQ(driven.size(), 90u);
   EXPECT_EQ(driven[45].tie, TrackTie::kLoose);
   // Where odometry has it.
   EXPECT_NEAR(driven[45].pose[0], 3.0, 1.0);
   EXPECT_NEAR(driven[45].pose[1], 0.0, 1.0);
+}
+
+// Its wheels are rolled a little, or not at all: odometry knows nothing of the
+// way.
+TEST(OdometryRefinerTest, OdometryOfARobotThatIsCarriedTellsNothing) {
+  for (const Pose2& rolled : {Pose2(0.0, 0.0, 0.0), Pose2(0.7, -0.3, 0.8)}) {
+    const std::vector<RefinedScan> carried = DriveThroughTwoHalls(rolled);
+    ASSERT_EQ(carried.size(), 90u);
+    EXPECT_EQ(carried[45].tie, TrackTie::kMatched);
+    EXPECT_NEAR(carried[45].pose[0], -9.0, 0.1);
+  }
 }
 
 // Carried to where it has not been, from where it drives back through what it

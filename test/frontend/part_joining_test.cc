@@ -44,45 +44,45 @@ TEST(PartJoiningTest, APartThatWasSeenLaterIsTied) {
   for (const SeenKey& key : search.seen()) EXPECT_EQ(key.part, 0);
 }
 
+// From the first of two pieces of a hall to the second.
+const Pose2 kBlindMotion(-15.0 - (-5.0 + 0.3 * 29.0), -0.4, 0.0);
+
+// Whether the two pieces are joined where odometry tells of the way from one to
+// the other.
+bool IsJoinedOver(BlindWay way) {
+  TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
+  SeeHall(-5.0, 30, 0, Pose2::Zero(), 0.2, &search);
+  SeeHall(-15.0, 90, 1, Pose2(50.0, 20.0, 2.0), -0.2, &search);
+  std::vector<LooseTrack> loose = Guessed(290, 1190);
+  way.from = 290;
+  way.to = 300;
+  const std::size_t ties =
+      JoinParts(TrackingOptions(), MatchDrift(), {0}, {way}, &search, &loose)
+          .size();
+  EXPECT_EQ(search.seen().back().part, ties == 1 ? 0 : 1);
+  return ties == 1;
+}
+
 // The right place need not be among those that were seen.
 TEST(PartJoiningTest, OdometryOfABlindWayBetweenThemHasToAgree) {
-  const Pose2 truth(-15.0 - (-5.0 + 0.3 * 29.0), -0.4, 0.0);
-  for (const bool agrees : {true, false}) {
-    TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
-    SeeHall(-5.0, 30, 0, Pose2::Zero(), 0.2, &search);
-    SeeHall(-15.0, 90, 1, Pose2(50.0, 20.0, 2.0), -0.2, &search);
-    std::vector<LooseTrack> loose = Guessed(290, 1190);
-    BlindWay way;
-    way.from = 290;
-    way.to = 300;
-    way.motion.mean = agrees ? truth : Pose2(truth + Pose2(9.0, 0.0, 0.0));
-    way.motion.covariance = Eigen::Vector3d(1.0, 1.0, 0.1).asDiagonal();
-    EXPECT_EQ(
-        JoinParts(TrackingOptions(), MatchDrift(), {0}, {way}, &search, &loose)
-            .size(),
-        agrees ? 1u : 0u);
-    EXPECT_EQ(search.seen().back().part, agrees ? 0 : 1);
-  }
+  BlindWay way;
+  way.motion.covariance = Eigen::Vector3d(1.0, 1.0, 0.1).asDiagonal();
+  way.motion.mean = kBlindMotion;
+  EXPECT_TRUE(IsJoinedOver(way));
+  way.motion.mean[0] += 9.0;
+  EXPECT_FALSE(IsJoinedOver(way));
 }
 
 // A turn may be less uncertain than its variance has it.
 TEST(PartJoiningTest, OdometryOfABlindWayTurnsNoMoreWronglyThanItCan) {
-  for (const double most : {1.0, 0.5}) {
-    TrackSearch search{TrackingOptions(), ScanMatcherOptions()};
-    SeeHall(-5.0, 30, 0, Pose2::Zero(), 0.2, &search);
-    SeeHall(-15.0, 90, 1, Pose2(50.0, 20.0, 2.0), -0.2, &search);
-    std::vector<LooseTrack> loose = Guessed(290, 1190);
-    BlindWay way;
-    way.from = 290;
-    way.to = 300;
-    way.motion.mean = Pose2(-15.0 - (-5.0 + 0.3 * 29.0), -0.4, 0.75);
-    way.motion.covariance = Eigen::Vector3d(1.0, 1.0, 1.0).asDiagonal();
-    way.most_wrong_turn = most;
-    EXPECT_EQ(
-        JoinParts(TrackingOptions(), MatchDrift(), {0}, {way}, &search, &loose)
-            .size(),
-        most > 0.75 ? 1u : 0u);
-  }
+  BlindWay way;
+  way.motion.covariance = Eigen::Vector3d(1.0, 1.0, 1.0).asDiagonal();
+  way.motion.mean = kBlindMotion;
+  way.motion.mean[2] += 0.75;
+  way.most_wrong_turn = 1.0;
+  EXPECT_TRUE(IsJoinedOver(way));
+  way.most_wrong_turn = 0.5;
+  EXPECT_FALSE(IsJoinedOver(way));
 }
 
 TEST(PartJoiningTest, APartOfAnotherPlaceIsNot) {

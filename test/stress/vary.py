@@ -25,6 +25,8 @@ Relations stay true; those whose scans are gone are left out. Kinds, with what V
   still       odometry says nothing at all
   late        odometry is VALUE scans (2) late
   gaps        four stretches of VALUE scans (100) are missing; odometry goes on
+  rolled      four stretches of 100 scans are missing, and odometry tells of up to VALUE m (0.8) and 60 degrees by chance:
+              the robot was carried, and its wheels were turned
 """
 
 import bz2
@@ -35,7 +37,7 @@ import sys
 
 DEFAULTS = {"mirror": 0, "reverse": 0, "every": 3, "noise": 0.03, "steps": 0.05, "spikes": 0.05, "holes": 0.2, "near": 6.0, "beams": 2, "view": 120.0,
             "long": 1.01, "offset": 0.05, "askew": 1.5, "drift": 1.0, "slip": 5.0, "wheels": 0.2, "still": 0, "late": 2,
-            "gaps": 100}
+            "gaps": 100, "rolled": 0.8}
 NO_RETURN = 81.83
 
 
@@ -158,12 +160,17 @@ def main():
         odometry = [scan.odometry for scan in scans]
         for k, scan in enumerate(scans):
             scan.odometry = odometry[max(0, k - int(value))]
-    elif kind == "gaps":
-        size, begins = int(value), []
+    elif kind in ("gaps", "rolled"):
+        size, begins = int(value) if kind == "gaps" else 100, []
         for _ in range(10000):
             begin = rnd.randrange(30, max(31, len(scans) - size - 30))
             if len(begins) < 4 and all(abs(begin - other) > 2 * size for other in begins):
                 begins.append(begin)
+        if kind == "rolled":
+            ends = {begin + size - 1 for begin in begins}
+            within = {k for begin in begins for k in range(begin - 1, begin + size - 1)}
+            on_steps(scans, lambda k, p: (rnd.uniform(0.0, value), 0.0, math.radians(rnd.uniform(-60.0, 60.0))) if k in ends
+                     else (0.0, 0.0, 0.0) if k in within else p)
         scans = [scan for k, scan in enumerate(scans) if not any(begin <= k < begin + size for begin in begins)]
         relations = between_scans(scans, relations)
 

@@ -54,8 +54,7 @@ plumbline_pkg_config(plumbline-core "Graph, plug-in registry, solver session, EM
 plumbline_pkg_config(plumbline-detectors "Structure detectors"
   "plumbline-core" "-L\${libdir} -lplumbline_detectors")
 plumbline_pkg_config(plumbline-frontend "Log readers and laser front-end"
-  "plumbline-core zlib sqlite3 liblz4 libzstd"
-  "-L\${libdir} -lplumbline_frontend -lbz2")
+  "plumbline-core" "-L\${libdir} -lplumbline_frontend")
 plumbline_pkg_config(plumbline-pipeline "From scans or a graph to a map"
   "plumbline-detectors plumbline-frontend" "-L\${libdir} -lplumbline_pipeline")
 set(all plumbline-pipeline)

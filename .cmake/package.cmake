@@ -22,8 +22,13 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME plumbline)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
 # Loaded late (core/late_library.h), which dpkg-shlibdeps cannot see.
-set(late_libraries "libarchive13, libcairo2, libgeos-c1v5")
+set(late_libraries
+  "libarchive13, libbz2-1.0, libcairo2, libgeos-c1v5, liblz4-1, libsqlite3-0, libzstd1, zlib1g")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${late_libraries}")
+if(PLUMBLINE_STATIC_ALGEBRA)
+  string(APPEND CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS
+    ", libblas3 | libblas.so.3, libgomp1, liblapack3 | liblapack.so.3, libmetis5")
+endif()
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
 "find the structure of buildings in laser maps of robots
 Batch solver that turns a robot's log or a pose graph into a map in which walls
@@ -33,7 +38,7 @@ that simulate buildings and measure how good a map is.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libplumbline-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libceres-dev (>= 2.1), libeigen3-dev (>= 3.3), libsuitesparse-dev, nettle-dev, zlib1g-dev, libbz2-dev, libsqlite3-dev, liblz4-dev, libzstd-dev, ${late_libraries}")
+  "libceres-dev (>= 2.1), libeigen3-dev (>= 3.3), libsuitesparse-dev, nettle-dev, ${late_libraries}")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
 "relations between walls, points and directions for Ceres Solver
 Cost functions, manifolds and losses for use in a ceres::Problem, and the

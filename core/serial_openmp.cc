@@ -38,6 +38,15 @@ SerialOpenMp::~SerialOpenMp() {
   FindSetLevels()(old_levels_);
 }
 
+bool SerialOpenMp::IsInForce() { return num_serial > 0; }
+
+void* FindOpenMp(const char* function) {
+  // Not the one of this name that a program may have of its own.
+  if (void* const linked = dlsym(RTLD_NEXT, function)) return linked;
+  static void* const library = dlopen("libgomp.so.1", RTLD_LAZY | RTLD_LOCAL);
+  return library == nullptr ? nullptr : dlsym(library, function);
+}
+
 }  // namespace plumbline
 
 // What GCC makes of `#pragma omp parallel`: run `region` with `data` on
@@ -46,9 +55,13 @@ SerialOpenMp::~SerialOpenMp() {
 extern "C" __attribute__((visibility("default"))) void GOMP_parallel(
     void (*region)(void*), void* data, unsigned num_threads, unsigned flags) {
   using Parallel = void (*)(void (*)(void*), void*, unsigned, unsigned);
+  if (plumbline::num_serial > 0) {
+    region(data);
+    return;
+  }
   static const auto next =
-      reinterpret_cast<Parallel>(dlsym(RTLD_NEXT, "GOMP_parallel"));
-  if (plumbline::num_serial > 0 || next == nullptr) {
+      reinterpret_cast<Parallel>(plumbline::FindOpenMp("GOMP_parallel"));
+  if (next == nullptr) {
     region(data);
   } else {
     next(region, data, num_threads, flags);

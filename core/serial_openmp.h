@@ -18,9 +18,16 @@ class SerialOpenMp {
   SerialOpenMp& operator=(const SerialOpenMp&) = delete;
   ~SerialOpenMp();
 
+  /// Whether one lives on this thread.
+  static bool IsInForce();
+
  private:
   int old_levels_ = 0;
 };
+
+/// Address of a function of GCC's OpenMP library, which is loaded when it is
+/// not there; null where that cannot be done.
+void* FindOpenMp(const char* function);
 
 }  // namespace plumbline
 

@@ -1,5 +1,6 @@
 #include <bzlib.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/late_library.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/bzip2_decoder.h>
 
@@ -13,6 +14,11 @@
 
 namespace plumbline {
 namespace {
+
+LateLibrary bzip2_library("libbz2.so.1.0");
+PLUMBLINE_LATE_FUNCTION(bzip2_library, BZ2_bzDecompress);
+PLUMBLINE_LATE_FUNCTION(bzip2_library, BZ2_bzDecompressEnd);
+PLUMBLINE_LATE_FUNCTION(bzip2_library, BZ2_bzDecompressInit);
 
 constexpr std::uint64_t kBlockMark = 0x314159265359;
 constexpr std::uint64_t kEndMark = 0x177245385090;

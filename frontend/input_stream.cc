@@ -37,6 +37,11 @@ PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_support_filter_zstd);
 PLUMBLINE_LATE_FUNCTION(archive_library, archive_read_support_format_raw);
 PLUMBLINE_LATE_FUNCTION(archive_library,
                         archive_read_support_format_zip_streamable);
+LateLibrary zlib_library("libz.so.1");
+PLUMBLINE_LATE_FUNCTION(zlib_library, inflate);
+PLUMBLINE_LATE_FUNCTION(zlib_library, inflateEnd);
+PLUMBLINE_LATE_FUNCTION(zlib_library, inflateInit2_);
+PLUMBLINE_LATE_FUNCTION(zlib_library, inflateReset);
 
 constexpr std::size_t kChunk = std::size_t{1} << 18;
 constexpr std::size_t kLeastChunk = std::size_t{1} << 12;

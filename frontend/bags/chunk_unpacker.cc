@@ -1,4 +1,5 @@
 #include <lz4frame.h>
+#include <plumbline/core/late_library.h>
 #include <plumbline/frontend/bags/chunk_unpacker.h>
 #include <plumbline/frontend/bzip2_decoder.h>
 #include <zstd.h>
@@ -9,6 +10,17 @@
 
 namespace plumbline {
 namespace {
+
+LateLibrary lz4_library("liblz4.so.1");
+PLUMBLINE_LATE_FUNCTION(lz4_library, LZ4F_createDecompressionContext);
+PLUMBLINE_LATE_FUNCTION(lz4_library, LZ4F_decompress);
+PLUMBLINE_LATE_FUNCTION(lz4_library, LZ4F_freeDecompressionContext);
+PLUMBLINE_LATE_FUNCTION(lz4_library, LZ4F_isError);
+LateLibrary zstd_library("libzstd.so.1");
+PLUMBLINE_LATE_FUNCTION(zstd_library, ZSTD_createDCtx);
+PLUMBLINE_LATE_FUNCTION(zstd_library, ZSTD_decompressStream);
+PLUMBLINE_LATE_FUNCTION(zstd_library, ZSTD_freeDCtx);
+PLUMBLINE_LATE_FUNCTION(zstd_library, ZSTD_isError);
 
 constexpr std::size_t kStep = std::size_t{1} << 18;
 // Few chunks unpack to more than so many times their size.
@@ -93,8 +105,9 @@ UnpackedChunk UnpackLz4(std::string_view stored, const Sizes& sizes) {
 
 UnpackedChunk UnpackZstd(std::string_view stored, const Sizes& sizes) {
   UnpackedChunk result;
-  const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(
-      ZSTD_createDCtx(), ZSTD_freeDCtx);
+  const auto free = [](ZSTD_DCtx* context) { ZSTD_freeDCtx(context); };
+  const std::unique_ptr<ZSTD_DCtx, decltype(free)> context(ZSTD_createDCtx(),
+                                                           free);
   if (context == nullptr) {
     result.damage = "libzstd cannot be initialized";
     return result;

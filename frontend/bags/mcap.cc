@@ -1,3 +1,4 @@
+#include <plumbline/core/late_library.h>
 #include <plumbline/frontend/bags/chunk_unpacker.h>
 #include <plumbline/frontend/bags/chunked_bag.h>
 #include <plumbline/frontend/bags/little_endian.h>
@@ -11,6 +12,9 @@
 
 namespace plumbline {
 namespace {
+
+LateLibrary zlib_library("libz.so.1");
+PLUMBLINE_LATE_FUNCTION(zlib_library, crc32);
 
 constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
 

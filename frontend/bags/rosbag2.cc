@@ -1,5 +1,6 @@
 #include <fcntl.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/late_library.h>
 #include <plumbline/core/text_file.h>
 #include <plumbline/frontend/bags/chunk_unpacker.h>
 #include <plumbline/frontend/bags/mcap.h>
@@ -22,6 +23,23 @@
 
 namespace plumbline {
 namespace {
+
+LateLibrary sqlite_library("libsqlite3.so.0");
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_close_v2);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_column_blob);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_column_bytes);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_column_int64);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_column_text);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_column_type);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_db_config);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_errcode);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_errmsg);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_exec);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_finalize);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_limit);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_open_v2);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_prepare_v2);
+PLUMBLINE_LATE_FUNCTION(sqlite_library, sqlite3_step);
 
 namespace fs = std::filesystem;
 

@@ -29,7 +29,8 @@ endfunction()
 read_package(plumbline)
 # Found by dpkg-shlibdeps: what the binaries link; given: what they load late.
 expect("${control}" "control of plumbline" "Package: plumbline\n" "Version: ${VERSION}-1\n"
-  "Section: science\n" "Depends: [^\n]*libcholmod" "Depends: [^\n]*libcairo2[, ]"
+  "Section: science\n" "Depends: [^\n]*libgoogle-glog0" "Depends: [^\n]*libcairo2[, ]"
+  "Depends: [^\n]*(libcholmod|libblas3)" "Depends: [^\n]*libsqlite3-0[, ]"
   "Depends: [^\n]*libgeos-c1v5[, ]" "Depends: [^\n]*libarchive13[, ]"
   "Depends: [^\n]*libc6 " "Description: [a-z]")
 expect("${contents}" "plumbline" "/usr/bin/plumbline_solve\n" "/usr/bin/plumbline_evaluate\n"

@@ -17,12 +17,12 @@ using RowMajor =
 }  // namespace
 
 std::unique_ptr<ceres::CostFunction> MakeCost(
-    const Constraint& constraint, const Eigen::MatrixXd& root,
-    const std::vector<const Feature*>& features) {
+    const Constraint& constraint, Eigen::MatrixXd root,
+    std::vector<const Feature*> features) {
   RelationArguments arguments;
   arguments.expected = constraint.expected;
-  arguments.sqrt_information = root;
-  arguments.features = features;
+  arguments.sqrt_information = std::move(root);
+  arguments.features = std::move(features);
   return constraint.type->make_cost(arguments);
 }
 

@@ -16,8 +16,8 @@ namespace plumbline {
 /// `features` are those that it is between, in its order: types and anchors
 /// are read, parameters are not. Throws Error when they do not fit.
 std::unique_ptr<ceres::CostFunction> MakeCost(
-    const Constraint& constraint, const Eigen::MatrixXd& root,
-    const std::vector<const Feature*>& features);
+    const Constraint& constraint, Eigen::MatrixXd root,
+    std::vector<const Feature*> features);
 
 /// The features of a constraint of the graph, in its order.
 std::vector<const Feature*> FeaturesOf(const Graph& graph,

@@ -32,8 +32,6 @@ void AppendSource(const std::string& source, std::string* text) {
 // Hash of numbers and texts, one after the other.
 class ByteHash {
  public:
-  ByteHash() { bytes_.reserve(kUsualSize); }
-
   template <typename Number>
   void Add(const Number& number) {
     Add(&number, 1);
@@ -53,17 +51,22 @@ class ByteHash {
   }
 
  private:
-  // Of a relative pose.
-  static constexpr std::size_t kUsualSize = 120;
-
   std::string bytes_;
 };
+
+// One for all elements, whose bytes come to lie where those of the last did.
+// Empty after Take.
+ByteHash* HashOfThread() {
+  thread_local ByteHash hash;
+  return &hash;
+}
 
 }  // namespace
 
 void SplitG2oLine(std::string_view line,
                   std::vector<std::string_view>* fields) {
   const auto is_blank = [](char c) {
+    if (static_cast<unsigned char>(c) > ' ') return false;
     return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
   };
   fields->clear();
@@ -115,7 +118,8 @@ void TurnInformation(double angle, Eigen::MatrixXd* information) {
   turn(0, 0) = turn(1, 1) = std::cos(angle);
   turn(1, 0) = std::sin(angle);
   turn(0, 1) = -turn(1, 0);
-  const Eigen::Matrix3d turned = turn * *information * turn.transpose();
+  const Eigen::Matrix3d given = *information;
+  const Eigen::Matrix3d turned = turn * given * turn.transpose();
   *information = 0.5 * (turned + turned.transpose());
 }
 
@@ -236,9 +240,10 @@ void AppendG2oAttributes(const Constraint& constraint, std::string* text) {
 
 G2oFile::Fingerprint G2oFingerprintOf(const Feature& feature) {
   G2oFile::Fingerprint fingerprint;
-  ByteHash hash;
+  ByteHash& hash = *HashOfThread();
   hash.Add(feature.parameters.data(), feature.type->size);
   fingerprint.element = hash.Take();
+  if (IsPlainG2o(feature)) return fingerprint;
   hash.Add(feature.level);
   hash.Add(feature.is_virtual);
   hash.Add(feature.anchor.data(), feature.type->written_anchor_size());
@@ -253,11 +258,12 @@ G2oFile::Fingerprint G2oFingerprintOf(const Feature& feature) {
 G2oFile::Fingerprint G2oFingerprintOf(
     const Constraint& constraint, const std::vector<std::int64_t>& file_ids) {
   G2oFile::Fingerprint fingerprint;
-  ByteHash hash;
+  ByteHash& hash = *HashOfThread();
   for (const FeatureId id : constraint.features) hash.Add(file_ids[id]);
   hash.Add(constraint.expected.data(), constraint.expected.size());
   hash.Add(constraint.information.data(), constraint.information.size());
   fingerprint.element = hash.Take();
+  if (IsPlainG2o(constraint)) return fingerprint;
   hash.Add(constraint.kind);
   hash.Add(constraint.state);
   hash.Add(constraint.delta);

@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <iosfwd>
 #include <map>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace plumbline {
@@ -37,8 +39,8 @@ struct G2oLine {
     kConstraintAttributes,
   };
   Kind kind = Kind::kText;
-  /// As it was read, without the line feed.
-  std::string text;
+  /// As it was read, without the line feed; a part of G2oFile::text.
+  std::string_view text;
   /// Feature or constraint that it belongs to; kNoId for text and FIX.
   std::int64_t id = kNoId;
 };
@@ -47,6 +49,8 @@ struct G2oLine {
 /// byte for byte.
 struct G2oFile {
   G2oOptions options;
+  /// All that was read.
+  std::shared_ptr<const std::string> text;
   /// Every line, in order.
   std::vector<G2oLine> lines;
   bool ends_with_line_feed = true;
@@ -66,6 +70,7 @@ struct G2oFile {
   /// changed since, and which features had been fixed.
   struct Fingerprint {
     std::size_t element = 0;
+    /// 0 where there is nothing to say.
     std::size_t attributes = 0;
   };
   std::vector<Fingerprint> feature_fingerprints;
@@ -109,6 +114,11 @@ struct G2oFile {
 /// is empty then. A file that breaks off within a line is mostly one of these;
 /// where it does so within a tag, G2oFile::cut_tag has it.
 G2oFile ReadG2o(std::istream& input, const std::string& name,
+                const Registry& registry, Graph* graph,
+                const G2oOptions& options = {});
+
+/// The same of text that was read already.
+G2oFile ReadG2o(std::string text, const std::string& name,
                 const Registry& registry, Graph* graph,
                 const G2oOptions& options = {});
 

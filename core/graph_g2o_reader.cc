@@ -7,6 +7,7 @@
 #include <plumbline/factors/angle.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <istream>
 #include <map>
@@ -62,7 +63,7 @@ struct Edge {
   int line;
   // Whether a PLUMBLINE_CONSTRAINT line follows.
   bool has_attributes = false;
-  std::vector<std::int64_t> file_ids;
+  // Its features are ids in the file.
   Constraint constraint;
 };
 
@@ -78,7 +79,7 @@ class LineFields {
   explicit LineFields(const std::string& name) : name_(name) {}
 
   // `text` must outlive the fields.
-  void Set(int line, const std::string& text) {
+  void Set(int line, std::string_view text) {
     line_ = line;
     SplitG2oLine(text, &fields_);
   }
@@ -196,9 +197,21 @@ class LineReader {
   }
 
   // The line `number`, the last of G2oFile::lines.
-  void Read(int number, const std::string& line) {
+  void Read(int number, std::string_view line) {
     fields_.Set(number, line);
     if (fields_.empty() || fields_[0][0] == '#') return;
+    // Mostly lines of one kind follow each other.
+    if (last_vertex_ != nullptr && fields_[0] == last_tag_) {
+      above_ = Above::kNothing;
+      ReadVertex(*last_vertex_);
+      return;
+    }
+    if (last_edge_ != nullptr && fields_[0] == last_tag_) {
+      above_ = Above::kNothing;
+      ReadEdge(*last_edge_);
+      above_ = Above::kEdge;
+      return;
+    }
     const std::string tag(fields_[0]);
     const Above above = above_;
     above_ = Above::kNothing;
@@ -230,11 +243,17 @@ class LineReader {
     }
     const auto vertex = vertex_tags_.find(tag);
     if (vertex != vertex_tags_.end()) {
+      last_tag_ = vertex->first;
+      last_vertex_ = &vertex->second;
+      last_edge_ = nullptr;
       ReadVertex(vertex->second);
       return;
     }
     const auto edge = edge_tags_.find(tag);
     if (edge != edge_tags_.end()) {
+      last_tag_ = edge->first;
+      last_vertex_ = nullptr;
+      last_edge_ = &edge->second;
       ReadEdge(edge->second);
       above_ = Above::kEdge;
       return;
@@ -381,13 +400,14 @@ class LineReader {
                  (size == 1 ? " expected value" : " expected values") +
                  ", the upper triangle of the information";
         });
-    Edge edge;
+    Edge& edge = records_->edges.emplace_back();
     edge.line = fields_.line();
-    for (int i = 0; i < arity; ++i) {
-      edge.file_ids.push_back(
-          fields_.Id(fields_[1 + FeaturePlace(tag.format, i)]));
-    }
     Constraint& constraint = edge.constraint;
+    constraint.features.resize(static_cast<std::size_t>(arity));
+    for (int i = 0; i < arity; ++i) {
+      constraint.features[static_cast<std::size_t>(i)] =
+          fields_.Id(fields_[1 + FeaturePlace(tag.format, i)]);
+    }
     constraint.type = &type;
     constraint.source = kG2oSource;
     constraint.expected.resize(size);
@@ -398,24 +418,25 @@ class LineReader {
     if (tag.format != nullptr && tag.format->read) {
       tag.format->read(constraint.expected.data());
     }
-    Eigen::MatrixXd entries(size, size);
+    constraint.information.resize(size, size);
     int field = 1 + arity + size;
     ForInformation(tag.format, size, [&](int row, int column) {
-      entries(row, column) = fields_.Number(fields_[field++]);
-      entries(column, row) = entries(row, column);
+      constraint.information(row, column) = fields_.Number(fields_[field++]);
+      constraint.information(column, row) = constraint.information(row, column);
     });
-    constraint.information.resize(size, size);
-    for (int i = 0; i < size; ++i) {
-      for (int j = 0; j < size; ++j) {
-        constraint.information(i, j) =
-            entries(RowPlace(tag.format, i), RowPlace(tag.format, j));
+    if (tag.format != nullptr && !tag.format->row_places.empty()) {
+      const Eigen::MatrixXd entries = constraint.information;
+      for (int i = 0; i < size; ++i) {
+        for (int j = 0; j < size; ++j) {
+          constraint.information(i, j) =
+              entries(RowPlace(tag.format, i), RowPlace(tag.format, j));
+        }
       }
     }
     if (IsTurned(file_->options, constraint)) {
       TurnInformation(constraint.expected[2], &constraint.information);
     }
     Line().kind = G2oLine::Kind::kEdge;
-    records_->edges.push_back(std::move(edge));
   }
 
   // `above_` was an edge.
@@ -456,6 +477,10 @@ class LineReader {
   LineFields fields_;
   std::unordered_map<std::string, VertexTag> vertex_tags_;
   std::unordered_map<std::string, EdgeTag> edge_tags_;
+  // Of the last line that was a vertex or an edge.
+  std::string_view last_tag_;
+  const VertexTag* last_vertex_ = nullptr;
+  const EdgeTag* last_edge_ = nullptr;
   Above above_ = Above::kNothing;
 };
 
@@ -509,9 +534,10 @@ class GraphAssembler {
     std::map<std::int64_t, std::vector<std::string>> types;
     for (const Edge& edge : records_->edges) {
       const RelationType& type = *edge.constraint.type;
-      for (std::size_t i = 0; i < edge.file_ids.size(); ++i) {
+      const std::vector<FeatureId>& file_ids = edge.constraint.features;
+      for (std::size_t i = 0; i < file_ids.size(); ++i) {
         const std::vector<std::string>& fitting = type.feature_types[i];
-        const auto [known, is_new] = types.emplace(edge.file_ids[i], fitting);
+        const auto [known, is_new] = types.emplace(file_ids[i], fitting);
         if (is_new) continue;
         std::vector<std::string> both;
         for (const std::string& name : known->second) {
@@ -521,8 +547,8 @@ class GraphAssembler {
         }
         if (both.empty()) {
           Fail(name_, edge.line,
-               "vertex " + std::to_string(edge.file_ids[i]) + " is a " +
-                   fitting[0] + " here and a " + known->second[0] + " above",
+               "vertex " + std::to_string(file_ids[i]) + " is a " + fitting[0] +
+                   " here and a " + known->second[0] + " above",
                "one type");
         }
         known->second = both;
@@ -540,8 +566,7 @@ class GraphAssembler {
     }
   }
 
-  // The index of the vertex with this id; records_->features.size() when its
-  // tag is unknown.
+  // The index of the vertex with this id; their number when its tag is unknown.
   std::size_t FindVertex(int line, std::int64_t file_id) const {
     const auto found = records_->index.find(file_id);
     if (found != records_->index.end()) return found->second;
@@ -549,14 +574,15 @@ class GraphAssembler {
       Fail(name_, line, "no vertex " + std::to_string(file_id),
            "the id of a vertex in the file");
     }
-    return records_->features.size();
+    return records_->index.size();
   }
 
   void AddFeatures(Transaction* transaction) {
     for (const FixLine& fix : records_->fix_lines) {
       const std::size_t index = FindVertex(fix.line, fix.file_id);
-      if (index < records_->features.size())
+      if (index < records_->features.size()) {
         records_->features[index].fixed = true;
+      }
     }
     for (const ExtraFields& fields : records_->extra_fields) {
       std::vector<const Feature*> named;
@@ -600,11 +626,11 @@ class GraphAssembler {
         feature.maker = registry_.FindDetector(feature.source);
       }
     }
-    for (const Feature& feature : records_->features)
-      transaction->AddFeature(feature);
+    num_features_ = records_->features.size();
+    transaction->added_features() = std::move(records_->features);
   }
 
-  // Returns the edge of each constraint that it added.
+  // After AddFeatures. Returns the edge of each constraint that it added.
   std::vector<const Edge*> AddConstraints(Transaction* transaction) {
     std::vector<const Edge*> added;
     added.reserve(records_->edges.size());
@@ -612,10 +638,10 @@ class GraphAssembler {
     for (Edge& edge : records_->edges) {
       const std::size_t index = static_cast<std::size_t>(edge.line - 1);
       bool known = true;
-      for (const std::int64_t file_id : edge.file_ids) {
-        const std::size_t vertex = FindVertex(edge.line, file_id);
-        known = known && vertex < records_->features.size();
-        edge.constraint.features.push_back(Transaction::ProvisionalId(vertex));
+      for (FeatureId& feature : edge.constraint.features) {
+        const std::size_t vertex = FindVertex(edge.line, feature);
+        known = known && vertex < num_features_;
+        feature = Transaction::ProvisionalId(vertex);
       }
       ConstraintId id = kNoId;
       if (known) {
@@ -662,6 +688,7 @@ class GraphAssembler {
   const Registry& registry_;
   const FeatureId first_feature_;
   const ConstraintId first_constraint_;
+  std::size_t num_features_ = 0;
   G2oFile* const file_;
   Records* const records_;
   Graph* const graph_;
@@ -672,27 +699,46 @@ class GraphAssembler {
 G2oFile ReadG2o(std::istream& input, const std::string& name,
                 const Registry& registry, Graph* graph,
                 const G2oOptions& options) {
+  std::string text;
+  std::array<char, 1 << 16> block;
+  while (input.read(block.data(), block.size()) || input.gcount() > 0) {
+    text.append(block.data(), static_cast<std::size_t>(input.gcount()));
+  }
+  if (input.bad()) {
+    const auto lines = std::count(text.begin(), text.end(), '\n');
+    throw Error(name, static_cast<int>(lines), "cannot read on", "");
+  }
+  return ReadG2o(std::move(text), name, registry, graph, options);
+}
+
+G2oFile ReadG2o(std::string text, const std::string& name,
+                const Registry& registry, Graph* graph,
+                const G2oOptions& options) {
   if (graph->num_features() > 0 || graph->num_constraints() > 0) {
     throw PLUMBLINE_ERROR("the graph holds features already", "an empty graph");
   }
   G2oFile file;
   file.options = options;
+  RemoveByteOrderMark(&text);
+  file.text = std::make_shared<const std::string>(std::move(text));
   const FeatureId first_feature = graph->feature_id_end();
   file.file_ids.assign(static_cast<std::size_t>(first_feature), kNoId);
   Records records;
   LineReader reader(name, registry, first_feature, &file, &records);
-  std::string line;
-  int number = 0;
-  while (std::getline(input, line)) {
-    // The last line counts as ended unless the input ended before.
-    file.ends_with_line_feed = !input.eof();
-    ++number;
-    if (number == 1) RemoveByteOrderMark(&line);
+  const std::string_view all = *file.text;
+  // Few are shorter.
+  constexpr std::size_t kUsualLine = 64;
+  file.lines.reserve(all.size() / kUsualLine + 1);
+  std::size_t begin = 0;
+  for (int number = 1; begin < all.size(); ++number) {
+    const std::size_t end = std::min(all.find('\n', begin), all.size());
+    const std::string_view line = all.substr(begin, end - begin);
+    begin = end + 1;
+    file.ends_with_line_feed = end < all.size();
     file.lines.push_back({G2oLine::Kind::kText, line, kNoId});
     reader.Read(number, line);
     if (!file.ends_with_line_feed) file.cut_tag = reader.CutTag();
   }
-  if (input.bad()) throw Error(name, number, "cannot read on", "");
   GraphAssembler(name, registry, &file, &records, graph).Assemble();
   return file;
 }

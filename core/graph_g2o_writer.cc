@@ -47,6 +47,13 @@ const Format* FormatOf(const std::vector<Format>& formats,
   return format == formats.end() ? nullptr : &*format;
 }
 
+// The first field of a line that has one.
+std::string_view TagOf(std::string_view line) {
+  constexpr char kBlanks[] = " \t\r\v\f";
+  const std::size_t begin = line.find_first_not_of(kBlanks);
+  return line.substr(begin, line.find_first_of(kBlanks, begin) - begin);
+}
+
 class Writer {
  public:
   Writer(const Graph& graph, const G2oFile* file)
@@ -54,6 +61,8 @@ class Writer {
 
   std::string Write() {
     if (file_ != nullptr) {
+      // Numbers that have changed have more digits than before.
+      text_.reserve(file_->text == nullptr ? 0 : file_->text->size() * 3 / 2);
       MarkAttributes();
       AppendNamedVertices();
       for (const G2oLine& line : file_->lines) AppendLine(line);
@@ -205,14 +214,14 @@ class Writer {
     if (fingerprint.element == FingerprintInFile(*feature).element) {
       AppendText(line);
     } else {
-      SplitG2oLine(line.text, &fields_);
       const G2oVertexFormat* format =
-          FormatOf(feature->type->other_g2o_formats, fields_[0]);
+          FormatOf(feature->type->other_g2o_formats, TagOf(line.text));
       // The extra fields as they stand there.
       const std::size_t extra =
           format == nullptr ? 0 : format->extra_fields.size();
       std::string_view extra_text;
       if (extra > 0) {
+        SplitG2oLine(line.text, &fields_);
         const char* begin = fields_[fields_.size() - extra].begin();
         extra_text = std::string_view(
             begin, static_cast<std::size_t>(fields_.back().end() - begin));
@@ -275,9 +284,8 @@ class Writer {
     if (fingerprint.element == FingerprintInFile(*constraint).element) {
       AppendText(line);
     } else {
-      SplitG2oLine(line.text, &fields_);
       const G2oEdgeFormat* format =
-          FormatOf(constraint->type->other_g2o_formats, fields_[0]);
+          FormatOf(constraint->type->other_g2o_formats, TagOf(line.text));
       AppendG2oEdge(*constraint, format, Options(), file_ids_, &text_);
       EndLine();
     }

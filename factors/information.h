@@ -142,8 +142,10 @@ bool UsualSqrtInformation(const Matrix& information, Matrix* root) {
 template <typename Derived>
 bool IsValidInformation(const Eigen::MatrixBase<Derived>& expression) {
   const auto& matrix = expression.eval();
-  if (!internal::IsSymmetricInformation(matrix)) return false;
   // Most are positive definite, which costs least to show.
+  internal::SquareMatrix<Derived> root;
+  if (internal::UsualSqrtInformation(matrix, &root)) return true;
+  if (!internal::IsSymmetricInformation(matrix)) return false;
   const Eigen::LLT<internal::SquareMatrix<Derived>> llt(matrix);
   if (llt.info() == Eigen::Success) return true;
   const auto solver =

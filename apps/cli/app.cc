@@ -156,33 +156,81 @@ std::string Directory(const std::string& path) {
   return slash == std::string::npos ? "" : path.substr(0, slash);
 }
 
-std::vector<gflags::CommandLineFlagInfo> OwnFlagInfos() {
-  // glog's, gflags' and Ceres' flags come from other folders than apps, which
-  // holds this file's and those of the binaries.
-  static const std::string folder = Directory(Directory(__FILE__)) + "/";
-  std::vector<gflags::CommandLineFlagInfo> all;
-  gflags::GetAllFlags(&all);
-  std::vector<gflags::CommandLineFlagInfo> own;
-  for (gflags::CommandLineFlagInfo& info : all) {
-    if (info.filename.compare(0, folder.size(), folder) == 0) {
-      own.push_back(std::move(info));
-    }
-  }
-  std::sort(own.begin(), own.end(),
-            [](const auto& a, const auto& b) { return a.name < b.name; });
-  return own;
+// What does not change of a flag, and where its value is.
+struct Flag {
+  std::string name;
+  std::string type;
+  std::string description;
+  /// As gflags writes it: 0.3 as 0.29999999999999999.
+  std::string default_text;
+  std::string default_value;
+  const void* value = nullptr;
+  /// Not of glog, gflags or Ceres.
+  bool is_own = false;
+};
+
+std::string ShortestText(double value) {
+  std::string text;
+  AppendNumber(value, &text);
+  return text;
 }
 
-FlagValue ToFlagValue(const gflags::CommandLineFlagInfo& info) {
-  // gflags writes 0.3 as 0.29999999999999999.
-  const auto text = [&info](const std::string& value) {
-    if (info.type != "double") return value;
-    std::string shortest;
-    AppendNumber(std::strtod(value.c_str(), nullptr), &shortest);
-    return shortest;
-  };
-  return {info.name, text(info.current_value), text(info.default_value),
-          info.type};
+// gflags lists all flags as text, in a time that a small graph is solved in:
+// it is asked once. Sorted by name.
+const std::vector<Flag>& AllFlags() {
+  static const auto* const table = [] {
+    // The folder apps holds this file and those of the binaries.
+    const std::string folder = Directory(Directory(__FILE__)) + "/";
+    std::vector<gflags::CommandLineFlagInfo> all;
+    gflags::GetAllFlags(&all);
+    auto* flags = new std::vector<Flag>;
+    flags->reserve(all.size());
+    for (gflags::CommandLineFlagInfo& info : all) {
+      Flag flag;
+      flag.name = std::move(info.name);
+      flag.type = std::move(info.type);
+      flag.description = std::move(info.description);
+      flag.default_text = std::move(info.default_value);
+      flag.default_value =
+          flag.type == "double"
+              ? ShortestText(std::strtod(flag.default_text.c_str(), nullptr))
+              : flag.default_text;
+      flag.value = info.flag_ptr;
+      flag.is_own = info.filename.compare(0, folder.size(), folder) == 0;
+      flags->push_back(std::move(flag));
+    }
+    std::sort(flags->begin(), flags->end(),
+              [](const Flag& a, const Flag& b) { return a.name < b.name; });
+    return flags;
+  }();
+  return *table;
+}
+
+// The value that a flag has now.
+std::string ValueOf(const Flag& flag) {
+  if (flag.type == "bool") {
+    return *static_cast<const bool*>(flag.value) ? "true" : "false";
+  }
+  if (flag.type == "double") {
+    return ShortestText(*static_cast<const double*>(flag.value));
+  }
+  if (flag.type == "string") {
+    return *static_cast<const std::string*>(flag.value);
+  }
+  if (flag.type == "int32") {
+    return std::to_string(*static_cast<const gflags::int32*>(flag.value));
+  }
+  if (flag.type == "uint32") {
+    return std::to_string(*static_cast<const gflags::uint32*>(flag.value));
+  }
+  if (flag.type == "int64") {
+    return std::to_string(*static_cast<const gflags::int64*>(flag.value));
+  }
+  return std::to_string(*static_cast<const gflags::uint64*>(flag.value));
+}
+
+FlagValue ToFlagValue(const Flag& flag) {
+  return {flag.name, ValueOf(flag), flag.default_value, flag.type};
 }
 
 [[noreturn]] void ExitWithUsageError(const AppInfo& info,
@@ -214,15 +262,19 @@ FlagCondition::FlagCondition(const char* name,
 
 std::vector<std::string> CheckFlagValues() {
   std::vector<std::string> problems;
-  for (const auto& entry : Conditions()) {
-    gflags::CommandLineFlagInfo flag;
-    if (!gflags::GetCommandLineFlagInfo(entry.first.c_str(), &flag)) continue;
-    if (Holds(entry.second, flag.current_value)) continue;
-    problems.push_back(
-        "--" + flag.name + "=" + ToFlagValue(flag).value + ": " +
-        (entry.second.choices.empty() ? "out of range: expected "
-                                      : "unknown value: expected one of ") +
-        Describe(entry.second) + Guess(flag.current_value, entry.second));
+  const std::vector<Flag>& flags = AllFlags();
+  for (const auto& [name, condition] : Conditions()) {
+    const auto flag = std::lower_bound(
+        flags.begin(), flags.end(), name,
+        [](const Flag& a, const std::string& b) { return a.name < b; });
+    if (flag == flags.end() || flag->name != name) continue;
+    const std::string value = ValueOf(*flag);
+    if (Holds(condition, value)) continue;
+    problems.push_back("--" + name + "=" + value + ": " +
+                       (condition.choices.empty()
+                            ? "out of range: expected "
+                            : "unknown value: expected one of ") +
+                       Describe(condition) + Guess(value, condition));
   }
   return problems;
 }
@@ -362,24 +414,25 @@ std::string ReadTextInput(const std::string& path, std::size_t limit) {
 
 std::vector<FlagValue> OwnFlags() {
   std::vector<FlagValue> flags;
-  for (const gflags::CommandLineFlagInfo& info : OwnFlagInfos()) {
-    flags.push_back(ToFlagValue(info));
+  for (const Flag& flag : AllFlags()) {
+    if (flag.is_own) flags.push_back(ToFlagValue(flag));
   }
   return flags;
 }
 
 std::vector<FlagDescription> DescribeFlags() {
   std::vector<FlagDescription> flags;
-  for (const gflags::CommandLineFlagInfo& info : OwnFlagInfos()) {
+  for (const Flag& own : AllFlags()) {
+    if (!own.is_own) continue;
     FlagDescription flag;
-    flag.name = info.name;
-    flag.type = info.type;
-    flag.description = info.description;
+    flag.name = own.name;
+    flag.type = own.type;
+    flag.description = own.description;
     flag.default_value =
-        info.type == "double"
-            ? FormatNumber(std::strtod(info.default_value.c_str(), nullptr))
-            : info.default_value;
-    const auto condition = Conditions().find(info.name);
+        own.type == "double"
+            ? FormatNumber(std::strtod(own.default_text.c_str(), nullptr))
+            : own.default_text;
+    const auto condition = Conditions().find(own.name);
     if (condition != Conditions().end()) {
       flag.choices = condition->second.choices;
       if (flag.choices.empty()) flag.range = Describe(condition->second);
@@ -391,8 +444,10 @@ std::vector<FlagDescription> DescribeFlags() {
 
 std::vector<FlagValue> ChangedFlags() {
   std::vector<FlagValue> flags;
-  for (FlagValue& flag : OwnFlags()) {
-    if (flag.value != flag.default_value) flags.push_back(std::move(flag));
+  for (const Flag& flag : AllFlags()) {
+    if (flag.is_own && ValueOf(flag) != flag.default_value) {
+      flags.push_back(ToFlagValue(flag));
+    }
   }
   return flags;
 }

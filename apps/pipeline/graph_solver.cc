@@ -54,16 +54,17 @@ LeftOutStructure LeaveOutStructure(Graph* graph) {
   const Graph& from = *graph;
   Transaction transaction;
   LeftOutStructure left_out;
+  const std::vector<int> virtual_levels = from.VirtualLevels();
   std::set<FeatureId> measured;
   for (const Constraint* constraint : from.Constraints()) {
     if (constraint->kind == ConstraintClass::kStructure) {
       transaction.RemoveConstraint(constraint->id);
       ++left_out.constraints;
-    } else {
+    } else if (!virtual_levels.empty()) {
       measured.insert(constraint->features.begin(), constraint->features.end());
     }
   }
-  for (const int level : from.VirtualLevels()) {
+  for (const int level : virtual_levels) {
     for (const FeatureId id : from.VirtualFeatures(level)) {
       if (measured.count(id) > 0) continue;
       transaction.RemoveFeature(id);

@@ -74,11 +74,17 @@ void TellOutputsLeftOut(const SolveOutcome& outcome) {
 // Removes the maps of logs that an earlier run kept apart, from this one on:
 // they are none of the present run's.
 void RemoveMapsFrom(std::size_t map, const Registry& registry) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  std::set<std::string> there;
+  for (fs::directory_iterator entry(FLAGS_output_dir, error);
+       !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    there.insert(entry->path().filename().string());
+  }
   for (; map < kMostLogs; ++map) {
-    const std::filesystem::path path =
-        std::filesystem::path(FLAGS_output_dir) / FolderOfMap(map);
-    std::error_code error;
-    if (!std::filesystem::is_directory(path, error)) continue;
+    if (there.count(FolderOfMap(map)) == 0) continue;
+    const fs::path path = fs::path(FLAGS_output_dir) / FolderOfMap(map);
+    if (!fs::is_directory(path, error)) continue;
     OutputFolder::Changes changes;
     try {
       changes =

@@ -23,7 +23,6 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,7 +34,7 @@ namespace {
 std::optional<G2oFile> ReadGraph(InputStream* input, const Registry& registry,
                                  RunClock* clock, Graph* graph) {
   const ReadingProgress progress(input, clock);
-  std::istringstream text(input->ReadRest());
+  std::string text = input->ReadRest();
   if (InterruptRequested()) {
     clock->bar().Finish();
     std::fprintf(stderr, "interrupted: the graph is not read whole\n");
@@ -44,7 +43,8 @@ std::optional<G2oFile> ReadGraph(InputStream* input, const Registry& registry,
   if (!input->damage().empty()) {
     throw Error(input->name(), 0, input->damage(), "a whole graph");
   }
-  return ReadG2o(text, input->name(), registry, graph, G2oOptionsFromFlags());
+  return ReadG2o(std::move(text), input->name(), registry, graph,
+                 G2oOptionsFromFlags());
 }
 
 // Without --structure, what the file has of it is no part of the graph either:
@@ -115,12 +115,24 @@ void SummarizeSolves(const GraphSolverResult& result,
   figures->setup_seconds = result.solves.setup_seconds;
 }
 
+// What a run builds.
+struct SolvedGraph {
+  Graph graph;
+  std::optional<G2oFile> g2o;
+  std::optional<GraphSolver> solver;
+  GraphSolverResult result;
+  SolveOutcome outcome;
+};
+
 }  // namespace
 
 int SolveGraph(InputStream* input, const RunContext& run) {
   const Registry& registry = run.registry;
   RunClock* const clock = run.clock;
-  SolveOutcome outcome;
+  // Goes with the process, which ends soon: to take it down would take as long
+  // as to read a small graph.
+  static auto* const solved = new SolvedGraph;
+  SolveOutcome& outcome = solved->outcome;
   Summary& summary = outcome.summary;
   summary = BeginSummary();
   const GraphSolverOptions options = GraphSolverOptionsFromFlags(registry);
@@ -132,8 +144,9 @@ int SolveGraph(InputStream* input, const RunContext& run) {
                      {"writing", 0.3}});
   clock->Begin("reading");
   const ReadingMeter reading;
-  Graph graph;
-  const std::optional<G2oFile> g2o = ReadGraph(input, registry, clock, &graph);
+  Graph& graph = solved->graph;
+  std::optional<G2oFile>& g2o = solved->g2o;
+  g2o = ReadGraph(input, registry, clock, &graph);
   if (!g2o) return kExitInterrupted;
   summary.reading = reading.Read();
   for (const auto& tag : g2o->unknown_tags) {
@@ -157,13 +170,13 @@ int SolveGraph(InputStream* input, const RunContext& run) {
   PlaceStart(*input, *g2o, &graph, &figures);
 
   ForFlag("hierarchy", [&] { MakeGraphHierarchy(options, graph, registry); });
-  GraphSolver solver(registry, options, &graph);
+  GraphSolver& solver = solved->solver.emplace(registry, options, &graph);
   if (!std::isfinite(solver.initial_cost().total())) {
     throw Error(input->name(), 0,
                 "the sum of squared residuals at the start is no finite number",
                 "smaller values, or less information");
   }
-  GraphSolverResult result;
+  GraphSolverResult& result = solved->result;
   {
     clock->Begin("solving");
     std::vector<EmPhase> trace;

@@ -110,6 +110,22 @@ TEST_F(GraphG2oTest, WritesWhatItReads) {
   EXPECT_EQ(RoundTrip(text), text);
 }
 
+TEST_F(GraphG2oTest, LinesLiveAsLongAsACopyOfTheFile) {
+  const std::string text =
+      "VERTEX_SE2 10 1 2 0.5\n"
+      "VERTEX_XY 7 -3.25 0.4\n"
+      "# a comment that is too long to lie within a string\n"
+      "VERTEX_SE2 11 2 2 -0.5";
+  Graph graph;
+  G2oFile copy;
+  {
+    const G2oFile file = ReadG2o(text, "map.g2o", registry_, &graph);
+    copy = file;
+  }
+  EXPECT_EQ(Write(graph, &copy), text);
+  EXPECT_EQ(RoundTrip(text), text);
+}
+
 TEST_F(GraphG2oTest, EdgesMayComeFirst) {
   Graph graph;
   Read(

@@ -25,7 +25,7 @@ constexpr double kLeastPivot = 1e-12;
 constexpr double kLargestRise = 2.0;
 // Steps that promise less than this many times what ends a solve may be the
 // last one.
-constexpr double kMayBeLast = 10.0;
+constexpr double kMayBeLast = 2.0;
 // What the last factorization promises of another step, over the change that
 // ends a solve, below which none is made; how much of the cost the last step
 // may have changed then, and how far from its promise.

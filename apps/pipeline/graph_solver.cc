@@ -95,7 +95,8 @@ GraphSolver::GraphSolver(const Registry& registry,
 GraphSolver::GraphSolver(const Registry& registry,
                          const GraphSolverOptions& options, Hierarchy hierarchy,
                          Graph* graph)
-    : session_(WithoutUnwanted(options, graph), registry, SessionOf(options)),
+    : has_structure_(options.structure),
+      session_(WithoutUnwanted(options, graph), registry, SessionOf(options)),
       initial_cost_(session_.Cost()),
       em_(graph, &session_, registry, std::move(hierarchy),
           EmOf(options, *graph)) {}
@@ -111,7 +112,10 @@ GraphSolverResult GraphSolver::Run(
   result.em = em_.Run(stop);
   em_.SetTrace(nullptr);
   result.initial_cost = initial_cost_;
-  result.final_cost = session_.Cost();
+  // Without structure each phase is of all there is.
+  result.final_cost = has_structure_ || result.trace.empty()
+                          ? session_.Cost()
+                          : result.trace.back().cost;
   result.solves = session_.totals();
   result.num_solves = session_.num_solves();
   return result;

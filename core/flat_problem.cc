@@ -105,8 +105,9 @@ void FlatProblem::ReadResiduals(bool may_keep, const ProblemChanges* changes) {
     if (is_known) {
       term = old_terms_[old];
       term.begin = static_cast<int>(users_.size());
-      users_.insert(users_.end(), old_users_.begin() + old_terms_[old].begin,
-                    old_users_.begin() + old_terms_[old].end);
+      for (int i = old_terms_[old].begin; i < old_terms_[old].end; ++i) {
+        users_.push_back(old_users_[i]);
+      }
       term.end = static_cast<int>(users_.size());
     } else {
       term.id = ids_[k];

@@ -167,11 +167,27 @@ struct ResidentMinimizer::Impl {
   }
 
   double GradientMaxNorm() {
-    moved = state;
-    if (!Plus(state, -gradient, &moved)) {
-      return gradient.lpNorm<Eigen::Infinity>();
+    double norm = 0.0;
+    for (std::size_t v = 0; v < flat.variables().size(); ++v) {
+      const Variable& variable = flat.variables()[v];
+      const double* const from = state.data() + variable.state;
+      const double* const slope =
+          gradient.data() + matrix.ColumnOf(static_cast<int>(v));
+      moved.resize(static_cast<std::size_t>(variable.size));
+      if (variable.manifold != nullptr) {
+        step.assign(slope, slope + variable.manifold->TangentSize());
+        for (double& component : step) component = -component;
+        if (!variable.manifold->Plus(from, step.data(), moved.data())) {
+          return gradient.lpNorm<Eigen::Infinity>();
+        }
+      } else {
+        for (int i = 0; i < variable.size; ++i) moved[i] = from[i] - slope[i];
+      }
+      for (int i = 0; i < variable.size; ++i) {
+        norm = std::max(norm, std::abs(moved[i] - from[i]));
+      }
     }
-    return (moved - state).lpNorm<Eigen::Infinity>();
+    return norm;
   }
 
   void TakeState() {
@@ -198,7 +214,9 @@ struct ResidentMinimizer::Impl {
   bool is_undetermined = false;
 
   Eigen::VectorXd state;
-  Eigen::VectorXd moved;
+  // Of one variable, to measure the gradient by.
+  std::vector<double> step;
+  std::vector<double> moved;
   Eigen::VectorXd gradient;
   Eigen::VectorXd other_gradient;
 };

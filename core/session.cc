@@ -813,10 +813,16 @@ void SolverSession::OnConstraintChanged(const Constraint& constraint) {
   }
   auto replaceable = std::make_unique<ReplaceableCost>(std::move(cost));
   const bool is_live = residual.id != nullptr;
+  const bool had_gauge = impl_->has_gauge;
+  const bool had_changed_blocks =
+      std::exchange(impl_->changes.parameter_blocks, false);
   if (is_live) impl_->RemoveResidual(constraint);
   residual.replaceable = replaceable.get();
   residual.cost = std::move(replaceable);
   if (is_live) impl_->AddResidual(constraint);
+  // It ties what it tied before.
+  if (!impl_->changes.parameter_blocks) impl_->has_gauge = had_gauge;
+  impl_->changes.parameter_blocks |= had_changed_blocks;
 }
 
 void SolverSession::OnConstraintRetired(const Constraint& constraint) {

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace plumbline {
@@ -98,7 +99,8 @@ struct EmOrchestrator::Impl final : public GraphListener {
     const EmReport before = totals;
     // With no structure there and none looked for, nothing moves after the
     // first solve, and its cost need not be known.
-    const bool is_still = census.num_structure() == 0 && hierarchy.empty();
+    is_still = census.num_structure() == 0 && hierarchy.empty();
+    cost_of_solve.reset();
     const auto cost_now = [&] { return is_still ? 0.0 : schedule.Cost(); };
 
     schedule.BeginRun(/*may_be_coarse=*/!is_still);
@@ -131,6 +133,7 @@ struct EmOrchestrator::Impl final : public GraphListener {
     }
     if (!is_stopped && schedule.BeginFinal()) OptimizeWhole("final");
     schedule.EndRun();
+    is_still = false;
 
     totals.termination = Termination(has_converged);
     EmReport report = totals;
@@ -329,7 +332,11 @@ struct EmOrchestrator::Impl final : public GraphListener {
       phase.iteration = totals.iterations;
       phase.phase = name;
       phase.seconds = watch.Seconds();
-      phase.cost = session->Cost(scope.session_scope());
+      if (!is_still || cost_of_solve != session->num_solves()) {
+        last_cost = session->Cost(scope.session_scope());
+        cost_of_solve = session->num_solves();
+      }
+      phase.cost = last_cost;
       phase.features = census.features();
       phase.structure_constraints = census.num_structure();
       phase.broken_constraints = census.num_broken();
@@ -390,6 +397,11 @@ struct EmOrchestrator::Impl final : public GraphListener {
 
   // By detector, since the last phase.
   std::map<std::string, DetectionCounts> detections;
+  // Whether nothing but a solve moves anything; the cost after a solve, and
+  // after which.
+  bool is_still = false;
+  CostReport last_cost;
+  std::optional<int> cost_of_solve;
   bool is_stopped = false;
   std::function<bool()> stop;
   std::function<void(const EmPhase&)> trace;

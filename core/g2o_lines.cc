@@ -5,9 +5,11 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <functional>
+#include <cstdint>
+#include <cstring>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 namespace plumbline {
 namespace {
@@ -29,37 +31,42 @@ void AppendSource(const std::string& source, std::string* text) {
   }
 }
 
-// Hash of numbers and texts, one after the other.
-class ByteHash {
+// Hash of numbers and texts, one after the other. Whichever one of them
+// changes, the hash does.
+class Hash {
  public:
   template <typename Number>
-  void Add(const Number& number) {
-    Add(&number, 1);
-  }
-  template <typename Number, typename Count>
-  void Add(const Number* numbers, Count count) {
+  void Add(Number number) {
     static_assert(std::is_arithmetic_v<Number> || std::is_enum_v<Number>);
-    bytes_.append(reinterpret_cast<const char*>(numbers),
-                  sizeof(Number) * static_cast<std::size_t>(count));
+    static_assert(sizeof(Number) <= sizeof(std::uint64_t));
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &number, sizeof number);
+    Mix(bits);
+  }
+  template <typename Count>
+  void Add(const double* numbers, Count count) {
+    for (Count i = 0; i < count; ++i) Add(numbers[i]);
+  }
+  void Add(const std::string& text) {
+    Add(text.size());
+    for (const char c : text) Add(c);
   }
 
   // Of what was added since it was last asked for.
-  std::size_t Take() {
-    const std::size_t hash = std::hash<std::string>()(bytes_);
-    bytes_.clear();
-    return hash;
-  }
+  std::size_t Take() { return std::exchange(hash_, kStart); }
 
  private:
-  std::string bytes_;
-};
+  // Each step can be undone, for any bits.
+  void Mix(std::uint64_t bits) {
+    constexpr std::uint64_t kOdd = 0x9e3779b97f4a7c15;
+    hash_ = (hash_ ^ bits) * kOdd;
+    hash_ ^= hash_ >> 32;
+  }
 
-// One for all elements, whose bytes come to lie where those of the last did.
-// Empty after Take.
-ByteHash* HashOfThread() {
-  thread_local ByteHash hash;
-  return &hash;
-}
+  static constexpr std::uint64_t kStart = 0x2545f4914f6cdd1d;
+
+  std::uint64_t hash_ = kStart;
+};
 
 }  // namespace
 
@@ -240,7 +247,7 @@ void AppendG2oAttributes(const Constraint& constraint, std::string* text) {
 
 G2oFile::Fingerprint G2oFingerprintOf(const Feature& feature) {
   G2oFile::Fingerprint fingerprint;
-  ByteHash& hash = *HashOfThread();
+  Hash hash;
   hash.Add(feature.parameters.data(), feature.type->size);
   fingerprint.element = hash.Take();
   if (IsPlainG2o(feature)) return fingerprint;
@@ -250,7 +257,7 @@ G2oFile::Fingerprint G2oFingerprintOf(const Feature& feature) {
   hash.Add(feature.extent_begin);
   hash.Add(feature.extent_end);
   hash.Add(feature.observations);
-  hash.Add(feature.source.data(), feature.source.size());
+  hash.Add(feature.source);
   fingerprint.attributes = hash.Take();
   return fingerprint;
 }
@@ -258,7 +265,7 @@ G2oFile::Fingerprint G2oFingerprintOf(const Feature& feature) {
 G2oFile::Fingerprint G2oFingerprintOf(
     const Constraint& constraint, const std::vector<std::int64_t>& file_ids) {
   G2oFile::Fingerprint fingerprint;
-  ByteHash& hash = *HashOfThread();
+  Hash hash;
   for (const FeatureId id : constraint.features) hash.Add(file_ids[id]);
   hash.Add(constraint.expected.data(), constraint.expected.size());
   hash.Add(constraint.information.data(), constraint.information.size());
@@ -267,7 +274,7 @@ G2oFile::Fingerprint G2oFingerprintOf(
   hash.Add(constraint.kind);
   hash.Add(constraint.state);
   hash.Add(constraint.delta);
-  hash.Add(constraint.source.data(), constraint.source.size());
+  hash.Add(constraint.source);
   fingerprint.attributes = hash.Take();
   return fingerprint;
 }

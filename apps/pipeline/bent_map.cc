@@ -70,6 +70,11 @@ bool IsBent(const std::vector<Pose2>& map, const std::vector<Pose2>& odometry) {
   return TurnAgainst(map, odometry, kBentWay, 1.0 - kBentShare) > kBent;
 }
 
+bool HasKink(const std::vector<Pose2>& map,
+             const std::vector<Pose2>& odometry) {
+  return TurnAgainst(map, odometry, kBentWay, 1.0) > kBent;
+}
+
 bool AreBentByWalls(const std::vector<Pose2>& with_walls,
                     const std::vector<Pose2>& by_scans) {
   return std::any_of(std::begin(kStraightened), std::end(kStraightened),

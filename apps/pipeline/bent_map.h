@@ -21,6 +21,13 @@ std::vector<Pose2> PosesByMotions(const std::vector<KeyScanRecord>& records,
 /// differ. A way shorter than 10 m bends nothing.
 bool IsBent(const std::vector<Pose2>& map, const std::vector<Pose2>& odometry);
 
+/// Whether they turn otherwise than refined odometry by more than 3 degrees
+/// over any way of 10 m: matches of scans with a place beside the right one, as
+/// all places of a round corridor look alike, put one such kink into a map that
+/// is right everywhere else. Poses adjusted by scans alone are up to 2.9
+/// degrees off refined odometry on real logs. Arguments as above.
+bool HasKink(const std::vector<Pose2>& map, const std::vector<Pose2>& odometry);
+
 /// Whether poses that were adjusted together with walls turn otherwise than the
 /// same poses adjusted by scans alone, at the median by more than 0.45 degrees
 /// over ways of 30 m, or by more than 0.6 over 60 m: a corridor that bends by a

@@ -65,7 +65,8 @@ void SecondMap::AdjustPoses() {
       PosesByMotions(run_.result.records, run_.keys);
   const bool is_bent = IsBent(run_.keys, by_odometry);
   AdjustFrom(is_bent ? by_odometry : run_.keys, options_.adjustment);
-  TryFrom(is_bent ? run_.keys : by_odometry);
+  TryFrom(is_bent ? run_.keys : by_odometry,
+          options_.check_map && HasKink(adjustment_->KeyPoses(), by_odometry));
   if (run_.IsStopped()) ReturnToFirst();
 }
 
@@ -103,10 +104,10 @@ void SecondMap::AdjustFrom(const std::vector<Pose2>& start,
   run_.TakeTrajectory(map_.graph(), options_.adjustment.place_stride);
 }
 
-void SecondMap::TryFrom(const std::vector<Pose2>& start) {
+void SecondMap::TryFrom(const std::vector<Pose2>& start, bool has_kink) {
   const bool has_contradictions = HasContradictions();
   const double open_sigma = has_contradictions ? 0.0 : LargestOpenSigma();
-  if (!has_contradictions && open_sigma == 0.0) return;
+  if (!has_contradictions && open_sigma == 0.0 && !has_kink) return;
   const MapAgreement agreement = Review().Agreement();
   const double misfit = adjustment_->Misfit();
   const std::int64_t relations = adjustment_->num_relations();

@@ -84,8 +84,9 @@ class SecondMap {
   // Poses and walls.
   void AdjustBoth();
   // A start that is far off ends in a wrong place: where scans contradict each
-  // other, or lengths hang on odometry, the better of two starts stands.
-  void TryFrom(const std::vector<Pose2>& start);
+  // other, lengths hang on odometry, or the map has a kink that odometry does
+  // not have, the better of two starts stands.
+  void TryFrom(const std::vector<Pose2>& start, bool has_kink);
   MapReview Review() const;
   // Not when the map is not to be checked.
   bool HasContradictions() const;

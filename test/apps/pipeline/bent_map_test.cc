@@ -69,6 +69,24 @@ TEST(IsBentTest, OnAQuarterOfTheWays) {
   EXPECT_TRUE(IsBent(corner, straight));
 }
 
+TEST(HasKinkTest, AtOnePlace) {
+  const std::vector<Pose2> round = Arc(Pose2(1.0, 2.0, 3.0), 800, 0.01);
+  // Both go on alike behind a turn of so much that only one has.
+  const auto kinked = [](double turn) {
+    std::vector<Pose2> poses = Arc(Pose2::Zero(), 400, 0.01);
+    const std::vector<Pose2> after =
+        Arc(Compose(poses.back(), Pose2(0.5, 0.0, turn)), 400, 0.01);
+    poses.insert(poses.end(), after.begin(), after.end());
+    return poses;
+  };
+  EXPECT_TRUE(HasKink(kinked(DegToRad(5.0)), round));
+  EXPECT_TRUE(HasKink(round, kinked(DegToRad(5.0))));
+  EXPECT_FALSE(IsBent(kinked(DegToRad(5.0)), round));
+  EXPECT_FALSE(HasKink(kinked(DegToRad(2.0)), round));
+  EXPECT_FALSE(HasKink(round, round));
+  EXPECT_FALSE(HasKink({}, {}));
+}
+
 TEST(IsBentTest, NothingWithoutAWayOfTenMetres) {
   EXPECT_FALSE(IsBent({}, {}));
   EXPECT_FALSE(IsBent(Arc(Pose2::Zero(), 20, 0.0),

@@ -781,4 +781,35 @@ Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
   return Completion(graph, registry, options, poses, stop).Run(scans, poses);
 }
 
+double ExplainedShare(const Graph& graph, const std::vector<Scan>& scans,
+                      const std::vector<Pose2>& poses,
+                      const WallCompletionOptions& options) {
+  const WallIndex walls(graph, options.explained_gap);
+  std::int64_t explained = 0;
+  std::int64_t all = 0;
+  for (std::size_t i = 0; i < std::min(scans.size(), poses.size()); ++i) {
+    const Scan& scan = scans[i];
+    const Pose2 laser = Compose(poses[i], scan.laser_offset);
+    WallIndex::LastCell last;
+    for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
+      const double range = scan.ranges[beam];
+      if (!(range >= options.points.minimum_range) ||
+          range > options.points.usable_range) {
+        continue;
+      }
+      const double angle = laser[2] + scan.Bearing(beam);
+      const Eigen::Vector2d point =
+          laser.head<2>() +
+          range * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+      ++all;
+      if (walls.Explains(point, options.explained_offset, options.explained_gap,
+                         &last)) {
+        ++explained;
+      }
+    }
+  }
+  return all > 0 ? static_cast<double>(explained) / static_cast<double>(all)
+                 : 1.0;
+}
+
 }  // namespace plumbline

@@ -90,6 +90,13 @@ Transaction FindGlimpsedWalls(const Graph& graph, const Registry& registry,
                               const WallCompletionOptions& options,
                               const std::function<bool()>& stop = nullptr);
 
+/// Share of all returns within usable range that lie on a wall of the map, as
+/// near as FindGlimpsedWalls takes them for explained; 1 without returns. One
+/// pose per scan (map frame). Cost: linear in the returns.
+double ExplainedShare(const Graph& graph, const std::vector<Scan>& scans,
+                      const std::vector<Pose2>& poses,
+                      const WallCompletionOptions& options);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_FRONTEND_WALL_COMPLETION_H_

@@ -17,8 +17,10 @@ namespace plumbline {
 namespace {
 
 // A second map with less than this share of the first one's length of walls has
-// lost what the scans show, and is no better.
+// lost what the scans show, and is no better; unless they lie on its walls: a
+// noisy laser had the first one put walls beside its walls, or visits apart.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
+constexpr double kEnoughExplained = 0.5;
 
 // Of walls that must not straighten a building: what their votes weigh, and the
 // least turn at which one is two, rad. Structure would straighten it, too, were
@@ -193,7 +195,9 @@ void SecondMap::AdjustWalls() {
   vote_excess_ = adjustment_->vote_variance_excess();
   result.second_map_refused =
       LengthOfWalls(map_.graph()) < kLeastSecondShare * first_length_ &&
-      !IsBent(first_trajectory_, result.trajectory);
+      !IsBent(first_trajectory_, result.trajectory) &&
+      ExplainedShare(map_.graph(), run_.scans, result.trajectory,
+                     options_.completion) < kEnoughExplained;
   if (result.second_map_refused) return ReturnToFirst();
   adjustment_.reset();
   first_map_.clear();

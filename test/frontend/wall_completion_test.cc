@@ -92,6 +92,17 @@ TEST_F(WallCompletionTest, NoWallStandsWhereTheRobotWentThrough) {
   EXPECT_GT(length, 1.5);
 }
 
+// What is seen through the door lies on no wall of the map.
+TEST_F(WallCompletionTest, ExplainedShareIsThatOfReturnsOnWalls) {
+  const double share = ExplainedShare(graph_, scans_, poses_, options_);
+  EXPECT_GT(share, 0.8);
+  EXPECT_LT(share, 0.95);
+  AddSegment({0.0, 4.0, kPi}, 3.0);
+  EXPECT_GT(ExplainedShare(graph_, scans_, poses_, options_), 0.99);
+  EXPECT_EQ(ExplainedShare(Graph(), scans_, poses_, options_), 0.0);
+  EXPECT_EQ(ExplainedShare(graph_, {}, {}, options_), 1.0);
+}
+
 // Two walls that meet at 2 degrees, 4 and 6 m long, lie within the scatter of
 // one line: they are two all the same. A straight one stays one.
 TEST(WallCompletionKinkTest, AWallIsCutAtAKink) {

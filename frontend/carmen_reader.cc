@@ -4,6 +4,7 @@
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/foreign_format.h>
 #include <plumbline/frontend/laser_profile.h>
+#include <plumbline/frontend/slow_odometry.h>
 
 #include <algorithm>
 #include <array>
@@ -79,6 +80,7 @@ class CarmenReader {
     ChooseScans();
     PlaceRawScans();
     PlaceLaser();
+    if (kind_ != CarmenMessages::kRawLaser) SpreadSlowOdometry(&log_);
     FindReturns();
     ThinScans();
     Examine();

@@ -57,7 +57,8 @@ namespace plumbline {
 ///
 /// RAWLASER1 scans get the odometry interpolated by time between the ODOM
 /// lines before and after, or the last one when the times do not embrace the
-/// scan's.
+/// scan's. Where those of the other messages come more seldom than scans they
+/// are interpolated as well (SpreadSlowOdometry).
 ///
 /// Lines that cannot be used and readings that are no distances (not a number,
 /// negative, above 1000 m) are passed over and counted in Log::skipped, as is

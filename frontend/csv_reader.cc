@@ -1,5 +1,6 @@
 #include <plumbline/core/error.h>
 #include <plumbline/frontend/csv_reader.h>
+#include <plumbline/frontend/slow_odometry.h>
 
 #include <algorithm>
 #include <array>
@@ -147,6 +148,7 @@ class CsvReader {
                              : "no line names columns",
                   "a line that names the columns, then a line per scan");
     }
+    if (has_poses_) SpreadSlowOdometry(&log_);
     Examine();
     return std::move(log_);
   }

@@ -187,6 +187,22 @@ TEST(CarmenReaderTest, RawLaserOutOfTimeTakesTheLastOdometry) {
   EXPECT_EQ(log.scans[0].odometry, Pose2(1, 0, 0));
 }
 
+// Odometry comes with every fourth scan: what is between lies on the way.
+TEST(CarmenReaderTest, SlowOdometryIsInterpolated) {
+  std::string text;
+  for (int i = 0; i < 120; ++i) {
+    const std::string x = std::to_string(0.1 * (i - i % 4));
+    text += Flaser(3, "1.5", x + " 0 0 " + x + " 0 0", std::to_string(0.1 * i));
+  }
+  const Log log = ReadCarmen(text);
+  ASSERT_EQ(log.scans.size(), 120u);
+  for (int i = 0; i < 116; ++i) {
+    EXPECT_NEAR(log.scans[i].odometry[0], 0.1 * i, 1e-6);
+    EXPECT_NEAR(log.scans[i].laser_offset[0], 0.0, kRounding);
+  }
+  EXPECT_EQ(log.notes.size(), 1u);
+}
+
 TEST(CarmenReaderTest, OneLaserGivesTheScans) {
   const std::string front = Flaser(2, "1", "0 0 0 0 0 0", "1");
   const std::string rear = "RLASER 2 3 3 0 0 3.14159 0 0 0 1 h 1\n";

@@ -95,8 +95,7 @@ GraphSolver::GraphSolver(const Registry& registry,
 GraphSolver::GraphSolver(const Registry& registry,
                          const GraphSolverOptions& options, Hierarchy hierarchy,
                          Graph* graph)
-    : has_structure_(options.structure),
-      session_(WithoutUnwanted(options, graph), registry, SessionOf(options)),
+    : session_(WithoutUnwanted(options, graph), registry, SessionOf(options)),
       initial_cost_(session_.Cost()),
       em_(graph, &session_, registry, std::move(hierarchy),
           EmOf(options, *graph)) {}
@@ -112,10 +111,7 @@ GraphSolverResult GraphSolver::Run(
   result.em = em_.Run(stop);
   em_.SetTrace(nullptr);
   result.initial_cost = initial_cost_;
-  // Without structure each phase is of all there is.
-  result.final_cost = has_structure_ || result.trace.empty()
-                          ? session_.Cost()
-                          : result.trace.back().cost;
+  result.final_cost = session_.Cost();
   result.solves = session_.totals();
   result.num_solves = session_.num_solves();
   return result;

@@ -91,7 +91,6 @@ class GraphSolver {
   GraphSolver(const Registry& registry, const GraphSolverOptions& options,
               Hierarchy hierarchy, Graph* graph);
 
-  const bool has_structure_;
   SolverSession session_;
   CostReport initial_cost_;
   EmOrchestrator em_;

@@ -403,6 +403,24 @@ Eigen::MatrixXd Marginals::JointCovariance(const std::vector<FeatureId>& ids) {
   return impl_->Propagate(terms);
 }
 
+Eigen::MatrixXd Marginals::PropagatedCovariance(
+    const std::vector<FeatureId>& ids,
+    const std::vector<Eigen::MatrixXd>& jacobians) {
+  bool fits = !ids.empty() && ids.size() == jacobians.size();
+  std::vector<std::pair<const Impl::Entry*, Eigen::MatrixXd>> terms;
+  for (std::size_t i = 0; fits && i < ids.size(); ++i) {
+    const Impl::Entry& entry = impl_->Get(ids[i]);
+    fits = jacobians[i].rows() == jacobians[0].rows() &&
+           jacobians[i].cols() == entry.size;
+    terms.emplace_back(&entry, jacobians[i]);
+  }
+  if (!fits) {
+    throw PLUMBLINE_ERROR("features and Jacobians do not fit",
+                          "one of rows x size for each, of at least one");
+  }
+  return impl_->Propagate(terms);
+}
+
 Eigen::Matrix3d Marginals::RelativeCovariance(FeatureId from, FeatureId to) {
   impl_->CheckRelative(from, to);
   if (from == to) return Eigen::Matrix3d::Zero();

@@ -64,6 +64,17 @@ class Marginals {
   /// Error as Covariance does.
   Eigen::MatrixXd JointCovariance(const std::vector<FeatureId>& ids);
 
+  /// Covariance (rows x rows) of the sum of jacobians[i] * x_i over features
+  /// with the parameters x_i; jacobians[i] is rows x size of the feature, in
+  /// its units. A combination that does not depend on where the plane lies,
+  /// such as the difference of two directions, needs no gauge; what the graph
+  /// says nothing about has about kUndeterminedVariance. Throws Error when a
+  /// feature is unknown or has no live constraint, when there are no features,
+  /// and when sizes do not fit.
+  Eigen::MatrixXd PropagatedCovariance(
+      const std::vector<FeatureId>& ids,
+      const std::vector<Eigen::MatrixXd>& jacobians);
+
   /// Covariance (3x3; m, m, rad) of the feature `to` seen from `from`
   /// (factors/pose2.h, Between), both poses or segments. It depends neither on
   /// where the gauge is fixed nor on whether it is fixed. Throws Error when the

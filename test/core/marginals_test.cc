@@ -337,6 +337,35 @@ TEST_F(MarginalsTest, Scope) {
                         "the scope"));
 }
 
+TEST_F(MarginalsTest, CombinationsOfFeatures) {
+  const std::vector<FeatureId> ids = MakeWay(/*fixed=*/false);
+  Marginals marginals(graph_, *session_);
+  Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(1, 3);
+  turn(0, 2) = 1.0;
+  // Without a gauge: the difference of two headings does not need one.
+  const Eigen::MatrixXd variance =
+      marginals.PropagatedCovariance({ids[0], ids[2]}, {-turn, turn});
+  ASSERT_EQ(variance.size(), 1);
+  EXPECT_NEAR(variance(0, 0),
+              marginals.RelativeCovariance(ids[0], ids[2])(2, 2),
+              1e-9 * variance(0, 0));
+  EXPECT_NEAR(
+      marginals.PropagatedCovariance({ids[2], ids[2]}, {turn, -turn})(0, 0),
+      0.0, 1e-15);
+  const auto refusal = [&](const std::vector<FeatureId>& of,
+                           const std::vector<Eigen::MatrixXd>& jacobians) {
+    return Refusal([&] { marginals.PropagatedCovariance(of, jacobians); });
+  };
+  const Eigen::MatrixXd wide = Eigen::MatrixXd::Zero(1, 4);
+  const Eigen::MatrixXd tall = Eigen::MatrixXd::Zero(2, 3);
+  const char expected[] = "expected one of rows x size for each";
+  EXPECT_THAT(refusal({}, {}), HasSubstr(expected));
+  EXPECT_THAT(refusal({ids[0]}, {}), HasSubstr(expected));
+  EXPECT_THAT(refusal({ids[0]}, {wide}), HasSubstr(expected));
+  EXPECT_THAT(refusal({ids[0], ids[1]}, {turn, tall}), HasSubstr(expected));
+  EXPECT_THAT(refusal({99}, {turn}), HasSubstr("no feature 99"));
+}
+
 TEST_F(MarginalsTest, WhatIsRefused) {
   const std::vector<FeatureId> ids = MakeWay(/*fixed=*/true);
   const FeatureId lonely = Add("point", {0.0, 0.0});

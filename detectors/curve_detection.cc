@@ -57,6 +57,7 @@ class CurveDetection {
     }
     const bool is_line = kind_ == CurveKind::kLine;
     for (const SupportedCurve& curve : curves_.all()) {
+      for (const int i : curve.leaving) LetGo(graph, curve.id, i, &transaction);
       if (curve.joining.empty()) continue;
       FeatureId id = curve.id;
       if (id == kNoId) {
@@ -92,6 +93,20 @@ class CurveDetection {
       if (curve.id != kNoId) removed_.push_back(curve.id);
     }
     return !gone.empty();
+  }
+
+  // Removes what ties a point to a curve of the graph.
+  void LetGo(const Graph& graph, FeatureId curve, int point,
+             Transaction* transaction) const {
+    for (const ConstraintId id : graph.ConstraintsOf(points_.id(point))) {
+      const Constraint& constraint = *graph.FindConstraint(id);
+      if (constraint.state == ConstraintState::kLive &&
+          constraint.kind == ConstraintClass::kStructure &&
+          constraint.features.size() == 2 && constraint.features[1] == curve &&
+          constraint.type->Is(RelationRole::kOnCurve)) {
+        transaction->RemoveConstraint(id);
+      }
+    }
   }
 
   // Adds new curves of the kind; false when there are none.

@@ -18,8 +18,10 @@ namespace plumbline {
 /// further curve, but may join one. A point that is connected with the support
 /// of a curve of the detector's kind joins it when it is within the gate; when
 /// it supports another curve already, within half the gate where they run
-/// alongside (less than min_corner apart), within sigma where they cross (the
-/// corner of two walls). A curve of the detector's kind whose points all lie on
+/// alongside (less than min_corner apart); where they cross a virtual point is
+/// on both, within sigma (the corner of two rows of columns), and another one
+/// on that alone which it has neighbors on to both sides, at the ends of both
+/// on neither. A curve of the detector's kind whose points all lie on
 /// another one goes (pieces that the solver has brought together). Only virtual
 /// curves without measurements do. This is repeated until nothing is found, so
 /// applying the result and detecting again gives an empty transaction.

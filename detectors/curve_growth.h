@@ -19,8 +19,11 @@ class CurveGrowth {
   /// Adds to the support of a curve the points that are connected with it, past
   /// no more than max_gap_points and no farther than its gap limit, and near
   /// it: within the gate; a point that supports another curve already within
-  /// half the gate where they run alongside, within sigma where they cross.
-  /// False when there are none. Costs the points near the curve only.
+  /// half the gate where they run alongside. Where they cross a virtual point
+  /// is on both, within sigma; another one on that alone which it has neighbors
+  /// on to both sides, and at the ends of both on neither: it leaves the other,
+  /// when that is of the same kind. False when nothing changed. Costs the
+  /// points near the curve only.
   bool Extend(std::size_t curve, SupportedCurves* curves);
 
  private:

@@ -57,13 +57,14 @@ void ForEachMeasured(const Graph& graph, FeatureId id, const Visit& visit) {
 }  // namespace
 
 PointGraph::PointGraph(const Graph& graph, const DetectionScope& scope,
-                       int reach) {
+                       int reach)
+    : are_virtual_(scope.level > 0) {
   const auto add = [&](const Feature& feature, bool is_listed) {
     ids_.push_back(feature.id);
     positions_.emplace_back(feature.parameters[0], feature.parameters[1]);
     is_listed_.push_back(is_listed);
   };
-  if (scope.level > 0) {
+  if (are_virtual_) {
     const std::set<FeatureId> listed =
         scope.features == nullptr ? std::set<FeatureId>()
                                   : std::set<FeatureId>(scope.features->begin(),

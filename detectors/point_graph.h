@@ -37,6 +37,8 @@ class PointGraph {
   /// however far they are: the spacing of columns is not known beforehand.
   PointGraph(const Graph& graph, const DetectionScope& scope, int reach);
 
+  /// Whether they are virtual points.
+  bool are_virtual() const { return are_virtual_; }
   /// Number of points; ids and positions (m, map frame) by index.
   int size() const { return static_cast<int>(ids_.size()); }
   FeatureId id(int i) const { return ids_[static_cast<std::size_t>(i)]; }
@@ -60,6 +62,7 @@ class PointGraph {
   void Connect(const Graph& graph);
   void ConnectNearest();
 
+  bool are_virtual_ = false;
   std::vector<FeatureId> ids_;
   std::vector<Eigen::Vector2d> positions_;
   // Those of the i-th point are from neighbors_begin_[i] to before

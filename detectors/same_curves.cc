@@ -30,20 +30,16 @@ bool IsApart(const PointGraph& points, const SupportedCurves& curves,
   return gap > curves.GapLimit(other, max_gap);
 }
 
-// Whether the support of a curve lies on the other as well as it should on
-// its own.
+// Whether the points of a curve would all join the other.
 bool IsSame(const PointGraph& points, const SupportedCurves& curves,
             const FoundCurve& curve, const FoundCurve& other,
             const CurveSearchOptions& options) {
   const CurveRuler ruler(other.curve);
-  double sum = 0.0;
-  for (const int i : curve.support) {
-    const double distance = std::abs(ruler.SignedDistance(points.position(i)));
-    if (distance > options.gate) return false;
-    sum += distance * distance;
-  }
-  const auto count = static_cast<double>(curve.support.size());
-  return sum <= count * 0.5 * options.gate * 0.5 * options.gate &&
+  return std::all_of(curve.support.begin(), curve.support.end(),
+                     [&](int i) {
+                       return std::abs(ruler.SignedDistance(
+                                  points.position(i))) <= options.gate;
+                     }) &&
          (curve.curve.kind == CurveKind::kCircle ||
           !IsApart(points, curves, curve, other, options.max_gap));
 }

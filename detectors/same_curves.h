@@ -12,8 +12,8 @@ namespace plumbline {
 
 /// Takes out curves of a kind that have become the same as another one with
 /// more support and may go, and returns them: pieces that the solver has
-/// brought together. The support of such a curve lies on the other as well as
-/// it should on its own, and lines do not end before the other begins. Compares
+/// brought together. The points of such a curve would all join the other, and
+/// lines do not end before the other begins. Compares
 /// what is marked as changed (SupportedCurve::is_dirty) with what touches it,
 /// and marks what touches those that went: their points are free to join.
 std::vector<SupportedCurve> TakeOutSameCurves(const PointGraph& points,

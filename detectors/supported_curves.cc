@@ -139,6 +139,20 @@ void SupportedCurves::AddPoint(std::size_t curve, int point) {
   curves_[curve].joining.push_back(point);
 }
 
+void SupportedCurves::TakeOut(std::size_t curve, int point) {
+  const auto take_out = [](auto value, auto* values) {
+    const auto found = std::find(values->begin(), values->end(), value);
+    if (found == values->end()) return false;
+    values->erase(found);
+    return true;
+  };
+  SupportedCurve& entry = curves_[curve];
+  entry.is_dirty = true;
+  take_out(point, &entry.found.support);
+  if (!take_out(point, &entry.joining)) entry.leaving.push_back(point);
+  take_out(curve, &on_[static_cast<std::size_t>(point)]);
+}
+
 void SupportedCurves::Remove(const std::vector<bool>& is_removed) {
   std::size_t kept = 0;
   for (std::size_t c = 0; c < curves_.size(); ++c) {

@@ -17,6 +17,8 @@ struct SupportedCurve {
   FoundCurve found;
   /// Points of found.support that are not tied to it yet.
   std::vector<int> joining;
+  /// Points that are tied to it and are to be let go.
+  std::vector<int> leaving;
   /// It may be taken out when it turns out to be the same as another.
   bool may_go = true;
   /// It, or what lies near it, changed since it was last compared with others
@@ -56,6 +58,8 @@ class SupportedCurves {
   void Add(FoundCurve found);
   /// Adds a point to the support of a curve, which is no longer ascending.
   void AddPoint(std::size_t curve, int point);
+  /// Takes a point out of the support of a curve.
+  void TakeOut(std::size_t curve, int point);
   /// Takes out those that are marked; what is left moves up.
   void Remove(const std::vector<bool>& is_removed);
 

@@ -24,14 +24,22 @@ class CurveGrowthTest : public PointChainTest {
     const CurveSearchOptions options;
     SupportedCurves curves(graph_, points);
     CurveGrowth growth(points, options);
-    const bool has_grown = growth.Extend(line, &curves);
-    EXPECT_EQ(has_grown, !curves[line].joining.empty());
+    const bool has_changed = growth.Extend(line, &curves);
+    leaving_.clear();
+    for (const SupportedCurve& curve : curves.all()) {
+      leaving_.insert(leaving_.end(), curve.leaving.begin(),
+                      curve.leaving.end());
+    }
+    EXPECT_EQ(has_changed, !curves[line].joining.empty() || !leaving_.empty());
     EXPECT_TRUE(std::is_sorted(curves[line].found.support.begin(),
                                curves[line].found.support.end()));
     // There is nothing more to join.
     EXPECT_FALSE(growth.Extend(line, &curves));
     return curves[line].joining;
   }
+
+  // Points that were to leave lines then.
+  std::vector<int> leaving_;
 };
 
 TEST_F(CurveGrowthTest, ConnectedPointsWithinTheGateJoin) {
@@ -60,15 +68,56 @@ TEST_F(CurveGrowthTest, StopsAtWideGapsAndManyPointsOffTheLine) {
   EXPECT_THAT(Joining(0), IsEmpty());
 }
 
-TEST_F(CurveGrowthTest, PointOfALineAcrossJoinsAtTheCornerOnly) {
+// The next point of a wall across is within the gate of the row.
+TEST_F(CurveGrowthTest, PointWithinALineAcrossStaysThere) {
   for (int i = 0; i < 5; ++i) AddPoint(0.5 * i, 0.0);
-  // The corner, and the next point of the wall across: within the gate of the
-  // first, but not within its tolerance.
-  AddPoint(2.5, 0.01);
-  for (int i = 1; i < 5; ++i) AddPoint(2.5, 0.08 * i);
+  for (int i = -2; i < 3; ++i) AddPoint(2.5, 0.08 * i, /*is_linked=*/i > -2);
+  Link(4, 7);
   AddLine(0.0, 0.0, 0.0, {0, 1, 2, 3, 4});
   AddLine(2.5, 0.0, 0.5 * kPi, {5, 6, 7, 8, 9});
-  EXPECT_THAT(Joining(0), ElementsAre(5));
+  EXPECT_THAT(Joining(0), IsEmpty());
+}
+
+// A point of the row that a wall across took while the map was far off.
+TEST_F(CurveGrowthTest, PointWithinALineLeavesTheEndOfAnother) {
+  for (int i = 0; i < 7; ++i) AddPoint(0.5 * i, i == 3 ? 0.05 : 0.0);
+  for (int i = 1; i < 5; ++i) AddPoint(1.5, 0.5 * i, /*is_linked=*/i > 1);
+  Link(3, 7);
+  AddLine(0.0, 0.0, 0.0, {0, 1, 2, 4, 5, 6});
+  AddLine(1.5, 0.0, 0.5 * kPi, {3, 7, 8, 9, 10});
+  EXPECT_THAT(Joining(0), ElementsAre(3));
+  EXPECT_THAT(leaving_, ElementsAre(3));
+}
+
+// Where two walls end, a point is on the one or on the other.
+TEST_F(CurveGrowthTest, PointAtTheEndsOfTwoLinesIsOnNeither) {
+  for (int i = 0; i < 5; ++i) AddPoint(0.5 * i, 0.0);
+  AddPoint(2.5, 0.15);
+  for (int i = 1; i < 5; ++i) AddPoint(2.5, 0.5 * i);
+  AddLine(0.0, 0.0, 0.0, {0, 1, 2, 3, 4});
+  const FeatureId across = AddLine(2.5, 0.0, 0.5 * kPi, {5, 6, 7, 8, 9});
+  EXPECT_THAT(Joining(0), IsEmpty());
+  EXPECT_THAT(leaving_, ElementsAre(5));
+  // Nor does it come back, to either.
+  for (const ConstraintId id : graph_.ConstraintsOf(across)) {
+    if (graph_.GetConstraint(id).features[0] != points_[5]) continue;
+    Transaction transaction;
+    transaction.RemoveConstraint(id);
+    graph_.Apply(std::move(transaction));
+    break;
+  }
+  EXPECT_THAT(Joining(0), IsEmpty());
+  EXPECT_THAT(Joining(1), IsEmpty());
+}
+
+TEST_F(CurveGrowthTest, EndOfALineStaysWhereAnotherIsFarAway) {
+  for (int i = 0; i < 5; ++i) AddPoint(0.5 * i, 0.0);
+  AddPoint(2.5, 0.25);
+  for (int i = 1; i < 5; ++i) AddPoint(2.5, 0.5 * i);
+  AddLine(0.0, 0.0, 0.0, {0, 1, 2, 3, 4});
+  AddLine(2.5, 0.0, 0.5 * kPi, {5, 6, 7, 8, 9});
+  EXPECT_THAT(Joining(0), IsEmpty());
+  EXPECT_THAT(leaving_, IsEmpty());
 }
 
 }  // namespace

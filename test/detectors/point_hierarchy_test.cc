@@ -2,6 +2,7 @@
 #include <plumbline/core/em.h>
 #include <plumbline/core/session.h>
 #include <plumbline/detectors/builtins.h>
+#include <plumbline/detectors/default_hierarchy.h>
 
 #include <map>
 #include <set>
@@ -18,11 +19,19 @@ class PointHierarchyTest : public ::testing::Test {
  protected:
   PointHierarchyTest() { RegisterBuiltins(&registry_); }
 
+  // With the options that graphs of points have by default.
   EmReport Run(const std::string& hierarchy, Graph* graph) const {
-    SolverSession session(graph, registry_, {});
+    SessionOptions session_options;
+    // Distances alone take many steps to the end.
+    session_options.max_iterations = 200;
+    SolverSession session(graph, registry_, session_options);
+    EmOptions options;
+    options.loop_tolerance = kPointsLoopTolerance;
+    options.full_weight_test = true;
     EmOrchestrator em(
         graph, &session, registry_,
-        MakeHierarchy(ParseHierarchy(hierarchy), registry_, {"point"}, {}), {});
+        MakeHierarchy(ParseHierarchy(hierarchy), registry_, {"point"}, {}),
+        options);
     return em.Run();
   }
 

@@ -40,6 +40,24 @@ TEST_F(SameCurvesTest, PieceOfALongerLineGoes) {
   EXPECT_TRUE(left_[0].is_dirty);
 }
 
+// Each holds its points on itself, so that all of a piece are as far off.
+TEST_F(SameCurvesTest, PieceThatIsOffByLessThanTheGateGoes) {
+  for (const double off : {0.08, 0.12}) {
+    SCOPED_TRACE(off);
+    const int first = AddPoint(0.0, off * 50.0, /*is_linked=*/false);
+    std::vector<int> line = {first};
+    std::vector<int> piece;
+    for (int i = 1; i < 10; ++i) {
+      (i < 6 ? line : piece)
+          .push_back(AddPoint(0.5 * i, off * 50.0 + (i < 6 ? 0.0 : off)));
+    }
+    AddLine(0.0, off * 50.0, 0.0, line);
+    AddLine(0.0, off * 51.0, 0.0, piece);
+  }
+  EXPECT_EQ(TakeOut().size(), 1u);
+  EXPECT_EQ(left_.size(), 3u);
+}
+
 TEST_F(SameCurvesTest, OfEqualOnesTheFirstStays) {
   for (int i = 0; i < 8; ++i) AddPoint(0.5 * i, 0.0);
   const FeatureId first = AddLine(0.0, 0.0, 0.0, {0, 1, 2, 3});

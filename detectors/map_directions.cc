@@ -30,12 +30,6 @@ constexpr int kRelative = 0;
 constexpr int kSighted = 1;
 constexpr int kPasses = 3;
 
-bool HasDirection(const Feature& feature) {
-  return feature.type->traits.leading == Leading::kFrame &&
-         (feature.type->Is(FeatureRole::kPose) ||
-          feature.type->Is(FeatureRole::kWall));
-}
-
 // Information of the direction (third row) when the first two are open.
 double WithoutPosition(const Eigen::Matrix3d& information) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> position(
@@ -144,6 +138,12 @@ void CorrectDrift(const Graph& graph, std::vector<DirectionLink>* links) {
 }
 
 }  // namespace
+
+bool HasDirection(const Feature& feature) {
+  return feature.type->traits.leading == Leading::kFrame &&
+         (feature.type->Is(FeatureRole::kPose) ||
+          feature.type->Is(FeatureRole::kWall));
+}
 
 MapDirections CollectDirections(const Graph& graph,
                                 const std::vector<FeatureId>* scope,

@@ -32,6 +32,10 @@ struct MapDirections {
   bool has_sightings = false;
 };
 
+/// Whether a feature has a direction that measurements may tell: a pose or a
+/// wall with a frame of its own.
+bool HasDirection(const Feature& feature);
+
 /// What the live measurements between pairs of poses and segments say about the
 /// difference of their directions, all positions left open: the constraint is
 /// linearized at the present state, and the relative position is marginalized

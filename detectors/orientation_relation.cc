@@ -1,12 +1,15 @@
 #include <plumbline/core/error.h>
+#include <plumbline/core/marginals.h>
 #include <plumbline/detectors/axial.h>
 #include <plumbline/detectors/map_directions.h>
 #include <plumbline/detectors/orientation_relation.h>
 #include <plumbline/detectors/parameters.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -23,6 +26,9 @@ void Bind(ParameterBinder* parameters, OrientationRelationOptions* options) {
   ParameterBinder& p = *parameters;
   p.Angle("gate_deg", &options->gate, 0.0, 45.0,
           "how near to an expected angle two orientations are related");
+  p.Angle("uncertain_gate_deg", &options->uncertain_gate, 0.0, 45.0,
+          "the same where the map is not known better, in a graph whose "
+          "measurements give no directions");
   p.Angle("sigma_deg", &options->sigma, 1e-6, 90.0,
           "tolerance of the relation");
   p.Count("max_relations", &options->max_relations, 1,
@@ -99,9 +105,23 @@ std::set<FeatureId> RelatedTo(const Graph& graph, FeatureId orientation) {
   return related;
 }
 
-// Judges relations by their innovation, where the poses that saw the walls are
-// in the graph: a small difference that is known well is one all the same.
-// Mostly all orientations are related already, and none is judged.
+bool IsTied(const Graph& graph, FeatureId id) {
+  const std::vector<ConstraintId>& on = graph.ConstraintsOf(id);
+  return std::any_of(on.begin(), on.end(), [&](ConstraintId constraint) {
+    return graph.GetConstraint(constraint).state == ConstraintState::kLive;
+  });
+}
+
+// Whether a measurement of the graph may tell the direction of something.
+bool MeasuresDirections(const Graph& graph) {
+  for (const Feature* feature : graph.Features()) {
+    if (!feature->is_virtual && HasDirection(*feature)) return true;
+  }
+  return false;
+}
+
+// Judges relations by their innovation. Mostly all orientations are related
+// already, and none is judged.
 class RelationJudge {
  public:
   RelationJudge(const Graph& graph, const DetectionScope& scope,
@@ -109,7 +129,8 @@ class RelationJudge {
       : graph_(graph), options_(options), knows_(scope.features != nullptr) {}
 
   // Whether the measurements are against two orientations being at this angle
-  // to this tolerance (rad).
+  // to this tolerance (rad), where the poses that saw the walls are in the
+  // graph: a small difference that is known well is one all the same.
   bool Contradicts(const Feature& first, const Feature& second, double angle,
                    double sigma) {
     Learn();
@@ -125,6 +146,25 @@ class RelationJudge {
         map_.network.Variance(a->second) + map_.network.Variance(b->second) -
         2.0 * column[static_cast<Eigen::Index>(a->second)] + sigma * sigma;
     return difference * difference > options_.innovation_gate * variance;
+  }
+
+  // Whether a large difference (rad) is one that the map may have where it is
+  // known no better, in a graph that measures no directions.
+  bool MayBeOff(const Feature& first, const Feature& second,
+                double difference) {
+    if (!measures_directions_)
+      measures_directions_ = MeasuresDirections(graph_);
+    if (*measures_directions_ ||
+        std::abs(difference) > options_.uncertain_gate ||
+        !IsTied(graph_, first.id) || !IsTied(graph_, second.id)) {
+      return false;
+    }
+    if (!marginals_) marginals_.emplace(graph_);
+    const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
+    const double variance = marginals_->PropagatedCovariance(
+        {first.id, second.id}, {-one, one})(0, 0);
+    return variance <= options_.uncertain_gate * options_.uncertain_gate &&
+           difference * difference <= options_.innovation_gate * variance;
   }
 
  private:
@@ -144,6 +184,8 @@ class RelationJudge {
   MapDirections map_;
   // Of the covariance, as far as they were asked for.
   std::map<std::size_t, Eigen::VectorXd> columns_;
+  std::optional<bool> measures_directions_;
+  std::optional<Marginals> marginals_;
 };
 
 }  // namespace
@@ -188,11 +230,19 @@ Transaction OrientationRelation::Detect(const Graph& graph,
     for (std::size_t i = 0; i < j && relations < options_.max_relations; ++i) {
       ++pairs;
       const Feature& first = *orientations[i];
-      const int nearest = NearestAxial(
-          options_.angles,
-          NormalizeAxial(second.parameters[0] - first.parameters[0]),
-          options_.gate);
-      if (nearest < 0) {
+      const double present =
+          NormalizeAxial(second.parameters[0] - first.parameters[0]);
+      const int nearest =
+          NearestAxial(options_.angles, present,
+                       std::max(options_.gate, options_.uncertain_gate));
+      const double difference =
+          nearest < 0 ? 0.0
+                      : NormalizeAxial(
+                            present -
+                            options_.angles[static_cast<std::size_t>(nearest)]);
+      if (nearest < 0 || (std::abs(difference) > options_.gate &&
+                          related.count(first.id) == 0 &&
+                          !judge.MayBeOff(first, second, difference))) {
         ++no_angle;
         continue;
       }

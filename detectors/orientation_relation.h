@@ -25,6 +25,12 @@ struct OrientationRelationOptions {
   /// pulls the orientation off its walls rather than show a residual, so a wing
   /// that is oblique by a degree must not get one.
   double gate = DegToRad(0.7);
+  /// In a graph whose measurements give no directions (points and their
+  /// distances) a map may be out of square by more than that, and the graph
+  /// says by how much: there two orientations are related up to this difference
+  /// (rad) when its chi-square is at most innovation_gate, by a standard
+  /// deviation of at most this.
+  double uncertain_gate = DegToRad(3.0);
   /// Tolerance of the relation, rad.
   double sigma = DegToRad(0.02);
   /// An orientation is related to at most this many that stood before it. All
@@ -41,8 +47,8 @@ struct OrientationRelationOptions {
 
 /// Relations between the "orientation" features of a level (core/method.md,
 /// section 6): orientation_orientation constraints with the expected angle
-/// nearest to the present one, in (-pi/2, pi/2]. Pairs that a live constraint
-/// relates are left alone.
+/// nearest to the present one, in (-pi/2, pi/2], if it is within the gate.
+/// Pairs that a live constraint relates are left alone.
 ///
 /// Virtual orientations are few, so all of a level are looked at even when the
 /// scope lists features: an orientation belongs to the whole building.
@@ -59,7 +65,8 @@ class OrientationRelation : public StructureDetector {
   OrientationRelationOptions options_;
 };
 
-/// "orientation_relation". Parameters in degrees: gate_deg, sigma_deg,
+/// "orientation_relation". Parameters in degrees: gate_deg, uncertain_gate_deg,
+/// sigma_deg,
 /// resolution_deg (its multiples are expected; 0: unset) and the list angle_0,
 /// angle_1, ... (with angle_sigma_deg_0, ... where one has a tolerance of its
 /// own) which is 0, 45, 90, 135 when neither it nor a resolution is

@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 #include <plumbline/core/error.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/detectors/builtins.h>
 #include <plumbline/detectors/orientation_relation.h>
 
+#include <cmath>
 #include <set>
 #include <utility>
 #include <vector>
@@ -92,6 +94,56 @@ TEST_F(OrientationRelationTest, AnObliqueWingNearAnExpectedAngleStaysOblique) {
   ASSERT_EQ(transaction.added_constraints().size(), 1u);
   EXPECT_EQ(transaction.added_constraints()[0].features,
             (std::vector<FeatureId>{0, 1}));
+}
+
+// A map of points and distances says itself how far it may be out of square.
+TEST_F(OrientationRelationTest, WiderGateWhereTheMapIsUncertain) {
+  const FeatureId north = AddOrientation(0.0, /*level=*/0);
+  const FeatureId first = AddOrientation(0.0);
+  const FeatureId second = AddOrientation(91.2);
+  // Nothing is known of them.
+  EXPECT_TRUE(Detect().empty());
+  const auto measure = [&](FeatureId orientation, double sigma_deg) {
+    Constraint constraint;
+    constraint.type = &registry_.GetRelation("orientation_orientation");
+    constraint.features = {north, orientation};
+    constraint.expected = Eigen::VectorXd::Constant(
+        1, orientation == first ? 0.0 : DegToRad(91.2));
+    constraint.information = InformationFromSigmas(
+        Eigen::VectorXd::Constant(1, DegToRad(sigma_deg)));
+    Transaction transaction;
+    transaction.AddConstraint(constraint);
+    return graph_.Apply(std::move(transaction)).constraints[0];
+  };
+  const auto forget = [&](ConstraintId id) {
+    Transaction transaction;
+    transaction.RemoveConstraint(id);
+    graph_.Apply(std::move(transaction));
+  };
+  measure(first, 0.15);
+  // Three standard deviations of the difference are 1.17 and 1.23 degrees.
+  ConstraintId id = measure(second, 0.36);
+  EXPECT_TRUE(Detect().empty());
+  forget(id);
+  id = measure(second, std::sqrt(0.41 * 0.41 - 0.15 * 0.15));
+  EXPECT_EQ(Detect({{"uncertain_gate_deg", 1.1}}).added_constraints().size(),
+            0u);
+  const Transaction transaction = Detect();
+  ASSERT_EQ(transaction.added_constraints().size(), 1u);
+  EXPECT_DOUBLE_EQ(transaction.added_constraints()[0].expected[0], kPi / 2);
+  // What is hardly known at all is not square.
+  forget(id);
+  id = measure(second, 3.1);
+  EXPECT_TRUE(Detect().empty());
+  // Nor is a wing where poses tell directions.
+  forget(id);
+  measure(second, 0.39);
+  Transaction pose;
+  Feature feature;
+  feature.type = &registry_.GetFeature("pose");
+  pose.AddFeature(feature);
+  graph_.Apply(std::move(pose));
+  EXPECT_TRUE(Detect().empty());
 }
 
 TEST_F(OrientationRelationTest, BrokenOnesAreLeftToTheOrchestrator) {

@@ -157,6 +157,27 @@ TEST_F(ExperimentsTest, WallsALittleOutOfLineAreTwo) {
   EXPECT_GE(exact, 9);
 }
 
+// Worlds whose maps were 1.4 to 2.4 times as far off as with the true
+// structure: out of square by more than 0.7 degrees (414), the end of a wall
+// tied to the wall across (1014, 2410), both (2816).
+TEST_F(ExperimentsTest, FoundStructureIsAsGoodAsTheTrueOne) {
+  for (const std::uint64_t seed : {414u, 1014u, 2410u, 2816u}) {
+    SCOPED_TRACE(seed);
+    const auto make = [&] {
+      return MakeSyntheticWorld("S1", DefaultSyntheticOptions("S1"), seed,
+                                registry_);
+    };
+    SyntheticRunOptions options;
+    options.seed = seed;
+    SyntheticWorld world = make();
+    const SyntheticRun run = RunOnWorld(registry_, options, &world);
+    SyntheticWorld other = make();
+    EXPECT_LT(run.final_error,
+              1.2 * RunOracle(registry_, options, &other).full);
+    EXPECT_TRUE(run.match.is_exact());
+  }
+}
+
 TEST_F(ExperimentsTest, WithoutDetectorsNothingIsFound) {
   SyntheticRunOptions options;
   options.hierarchy = "";

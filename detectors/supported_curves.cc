@@ -11,6 +11,15 @@
 namespace plumbline {
 namespace {
 
+// False when it is not there.
+template <typename Value>
+bool TakeOutOf(std::vector<Value>* values, const Value& value) {
+  const auto found = std::find(values->begin(), values->end(), value);
+  if (found == values->end()) return false;
+  values->erase(found);
+  return true;
+}
+
 // Whether nothing but structure holds a curve and its points are all known.
 bool MayGo(const Graph& graph, const SupportedCurve& curve) {
   const Feature& feature = graph.GetFeature(curve.id);
@@ -134,23 +143,19 @@ void SupportedCurves::Add(FoundCurve found) {
 }
 
 void SupportedCurves::AddPoint(std::size_t curve, int point) {
+  SupportedCurve& entry = curves_[curve];
   on_[static_cast<std::size_t>(point)].push_back(curve);
-  curves_[curve].found.support.push_back(point);
-  curves_[curve].joining.push_back(point);
+  entry.found.support.push_back(point);
+  // One that was to leave is still tied to it.
+  if (!TakeOutOf(&entry.leaving, point)) entry.joining.push_back(point);
 }
 
 void SupportedCurves::TakeOut(std::size_t curve, int point) {
-  const auto take_out = [](auto value, auto* values) {
-    const auto found = std::find(values->begin(), values->end(), value);
-    if (found == values->end()) return false;
-    values->erase(found);
-    return true;
-  };
   SupportedCurve& entry = curves_[curve];
   entry.is_dirty = true;
-  take_out(point, &entry.found.support);
-  if (!take_out(point, &entry.joining)) entry.leaving.push_back(point);
-  take_out(curve, &on_[static_cast<std::size_t>(point)]);
+  TakeOutOf(&entry.found.support, point);
+  if (!TakeOutOf(&entry.joining, point)) entry.leaving.push_back(point);
+  TakeOutOf(&on_[static_cast<std::size_t>(point)], curve);
 }
 
 void SupportedCurves::Remove(const std::vector<bool>& is_removed) {

@@ -58,7 +58,8 @@ class SupportedCurves {
   void Add(FoundCurve found);
   /// Adds a point to the support of a curve, which is no longer ascending.
   void AddPoint(std::size_t curve, int point);
-  /// Takes a point out of the support of a curve.
+  /// Takes a point out of the support of a curve; until it is added again it is
+  /// to be let go.
   void TakeOut(std::size_t curve, int point);
   /// Takes out those that are marked; what is left moves up.
   void Remove(const std::vector<bool>& is_removed);

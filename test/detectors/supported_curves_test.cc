@@ -68,6 +68,29 @@ TEST_F(SupportedCurvesTest, TouchingHaveAPointOrALinkInCommon) {
   EXPECT_THAT(curves.Touching(3), IsEmpty());
 }
 
+TEST_F(SupportedCurvesTest, PointThatIsTakenOutLeavesUntilItComesBack) {
+  for (int i = 0; i < 5; ++i) AddPoint(0.5 * i, 0.0);
+  AddLine(0.0, 0.0, 0.0, {0, 1, 2, 3});
+  const PointGraph points = Points();
+  SupportedCurves curves(graph_, points);
+  curves[0].is_dirty = false;
+  curves.TakeOut(0, 2);
+  EXPECT_THAT(curves[0].found.support, ElementsAre(0, 1, 3));
+  EXPECT_THAT(curves[0].leaving, ElementsAre(2));
+  EXPECT_THAT(curves.On(2), IsEmpty());
+  EXPECT_TRUE(curves[0].is_dirty);
+  // It is tied still: nothing is to be done.
+  curves.AddPoint(0, 2);
+  EXPECT_THAT(curves[0].leaving, IsEmpty());
+  EXPECT_THAT(curves[0].joining, IsEmpty());
+  EXPECT_THAT(curves.On(2), ElementsAre(0u));
+  // One that was not tied yet is forgotten.
+  curves.AddPoint(0, 4);
+  curves.TakeOut(0, 4);
+  EXPECT_THAT(curves[0].joining, IsEmpty());
+  EXPECT_THAT(curves[0].leaving, IsEmpty());
+}
+
 TEST_F(SupportedCurvesTest, GapLimitIsThreeTimesTheUsualSpacing) {
   for (const double x : {0.0, 0.5, 1.0, 1.6, 4.0}) AddPoint(x, 0.0);
   AddLine(0.0, 0.0, 0.0, {0, 1, 2, 3, 4});

@@ -50,6 +50,13 @@ constexpr double kLeastStanding = 1.5;
 constexpr double kSeenFromBoth = 0.5;
 constexpr double kBeforeFace = 0.2;
 constexpr double kBeforeCupboard = 0.6;
+// A wall beyond all rooms is so long at least, m, where it meets another one,
+// which is so near to its end, m, and where it stands alone, with cracks up to
+// this, m, between its pieces.
+constexpr double kLeastBeyond = 2.0;
+constexpr double kMeetsBeyond = 0.2;
+constexpr double kLeastAlone = 4.0;
+constexpr double kCrack = 0.3;
 // Walls without a trace are looked for again in the parts of a region, up to so
 // many times.
 constexpr int kUnseenRounds = 3;
@@ -595,6 +602,82 @@ void AddStandingWalls(const DrawnLine& on, const Sides& sides,
   }
 }
 
+// Whether an end of `wall` lies on one of the first `count` of `walls`.
+bool MeetsOne(const PlanWall& wall, std::size_t count,
+              const std::vector<PlanWall>& walls) {
+  const auto lies_on = [](const Vector2d& end, const PlanWall& other) {
+    const Vector2d way = other.end - other.begin;
+    const double length = way.norm();
+    if (length <= 0.0) return false;
+    const Vector2d along = way / length;
+    const Vector2d from = end - other.begin;
+    const double t = from.dot(along);
+    const double aside = along.x() * from.y() - along.y() * from.x();
+    return t >= -kMeetsBeyond && t <= length + kMeetsBeyond &&
+           aside <= other.left + kMeetsBeyond &&
+           aside >= -other.right - kMeetsBeyond;
+  };
+  return std::any_of(
+      walls.begin(), walls.begin() + static_cast<std::ptrdiff_t>(count),
+      [&](const PlanWall& other) {
+        return lies_on(wall.begin, other) || lies_on(wall.end, other);
+      });
+}
+
+// Walls that bound no room: those of a yard, of the open side of a hall, or of
+// what was seen through a door but is no room. They were seen from a side with
+// free floor deeper than a cupboard that belongs to no room. The first `count`
+// walls of the plan are those of its rooms.
+void AddWallsBeyondRooms(const DrawnLine& on, const Sides& sides,
+                         const SpaceGrid& space, std::size_t count,
+                         BuildingPlan* plan) {
+  const WallProfile& profile = on.profile;
+  const auto is_free_beyond = [&](const Vector2d& point) {
+    return space.At(point) == Space::kFree &&
+           std::none_of(plan->rooms.begin(), plan->rooms.end(),
+                        [&](const PlanRoom& room) {
+                          return room.outline.Contains(point);
+                        });
+  };
+  const auto is_seen_from = [&](int i, int side) {
+    const double face = side > 0 ? on.line.high : -on.line.low;
+    const auto before = [&](double depth) {
+      return Vector2d(on.line.At(profile.MiddleOf(i)) +
+                      side * (face + depth) * on.line.normal());
+    };
+    return is_free_beyond(before(kBeforeFace)) &&
+           is_free_beyond(before(kBeforeCupboard));
+  };
+  const auto is_beyond = [&](int i) {
+    return sides.left[static_cast<std::size_t>(i)] == Sides::kNone;
+  };
+  const auto stands_at = [&](int i) {
+    return is_beyond(i) && profile.At(i) == Mark::kWall &&
+           profile.in_row[static_cast<std::size_t>(i)] &&
+           (is_seen_from(i, 1) || is_seen_from(i, -1));
+  };
+  const int crack = static_cast<int>(kCrack / WallProfile::kStep);
+  for (int i = 0; i < profile.size();) {
+    if (!stands_at(i)) {
+      ++i;
+      continue;
+    }
+    int end = i + 1;
+    for (int k = end; k < profile.size() && k - end < crack && is_beyond(k);
+         ++k) {
+      if (stands_at(k)) end = k + 1;
+    }
+    const double length = (end - i) * WallProfile::kStep;
+    if (length >= kLeastBeyond) {
+      const PlanWall wall = WallBetween(on, sides, i, end, space);
+      if (length >= kLeastAlone || MeetsOne(wall, count, plan->walls)) {
+        plan->walls.push_back(wall);
+      }
+    }
+    i = end;
+  }
+}
+
 // Doors that two lines close together found twice.
 void DropDoubleDoors(std::vector<PlanDoor>* doors) {
   std::vector<PlanDoor> kept;
@@ -844,6 +927,12 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
     ReadLine(drawn[i], sides[i], space, options, &plan);
     if (drawn[i].line.is_wall) {
       AddStandingWalls(drawn[i], sides[i], space, &plan);
+    }
+  }
+  const std::size_t of_rooms = plan.walls.size();
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    if (drawn[i].line.is_wall) {
+      AddWallsBeyondRooms(drawn[i], sides[i], space, of_rooms, &plan);
     }
   }
   plan.walls = WithoutDoubles(plan.walls);

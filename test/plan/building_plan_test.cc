@@ -890,6 +890,29 @@ TEST(BuildingPlanTest, WallsThatEndWithinARoomAreDrawn) {
   EXPECT_FALSE(IsWallAt(plan, {12.42, 5.5}));
 }
 
+// A wall that bounds no room is drawn, alone from 4 m on and where it meets
+// another one from 2 m on, but not on a wall of a room, nor what has no floor
+// before it.
+TEST(BuildingPlanTest, WallsBeyondTheRoomsAreDrawn) {
+  Drawing drawing(30.0, 20.0);
+  drawing.Free(14, 1, 29, 19);
+  drawing.Room(1.0, 1.0, 13.0, 9.0);
+  // A wing wall of the building, one across it, one alone, a short one, and one
+  // behind which and before which nothing was seen.
+  drawing.Fill(13.05, 8.95, 15.55, 9.05, Space::kOccupied);
+  drawing.Free(13.3, 9.05, 15.55, 12.0);
+  drawing.Fill(20, 4, 25, 4.05, Space::kOccupied);
+  drawing.Fill(20, 8, 22.7, 8.05, Space::kOccupied);
+  drawing.Fill(1, 15, 7, 15.05, Space::kOccupied);
+  const BuildingPlan plan = PlanOf(drawing);
+  ASSERT_EQ(plan.rooms.size(), 1u);
+  EXPECT_TRUE(IsWallAt(plan, {14.5, 9.0}));
+  EXPECT_TRUE(IsWallAt(plan, {22.5, 4.03}));
+  EXPECT_FALSE(IsWallAt(plan, {21.3, 8.03}));
+  EXPECT_FALSE(IsWallAt(plan, {4.0, 15.03}));
+  EXPECT_EQ(plan.walls.size(), 6u);
+}
+
 // Two houses with an alley between them, open to the street: no room when a
 // robot drove along the street, while what a robot in a building sees through a
 // door is one.
@@ -902,8 +925,12 @@ TEST(BuildingPlanTest, AlleysBetweenHousesAreNoRooms) {
   street.Fill(15.95, 11, 16, 19, Space::kOccupied);
   street.Fill(20, 11, 20.05, 19, Space::kOccupied);
   EXPECT_EQ(PlanOf(street).rooms.size(), 1u);
-  EXPECT_TRUE(PlanOf(street, {Pose2(4.0, 6.0, 0.0), Pose2(36.0, 6.0, 0.0)})
-                  .rooms.empty());
+  const BuildingPlan outside =
+      PlanOf(street, {Pose2(4.0, 6.0, 0.0), Pose2(36.0, 6.0, 0.0)});
+  EXPECT_TRUE(outside.rooms.empty());
+  // Their fronts are walls all the same.
+  EXPECT_TRUE(IsWallAt(outside, {8.0, 11.02}));
+  EXPECT_TRUE(IsWallAt(outside, {30.0, 11.02}));
   EXPECT_EQ(PlanOf(TwoRooms(), {Pose2(2.0, 2.0, 0.0), Pose2(12.0, 2.0, 0.0)})
                 .rooms.size(),
             3u);

@@ -1,3 +1,4 @@
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/peak_search.h>
 
 #include <algorithm>
@@ -9,6 +10,18 @@
 #include <limits>
 #include <tuple>
 #include <utility>
+
+// Compiled once more for processors that add 16 numbers at a time, the same
+// sums: which of the two runs is decided when the program starts, earlier than
+// a sanitizer is ready.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define PLUMBLINE_FOR_WIDE_LANES \
+  __attribute__((target_clones("avx2", "default")))
+#else
+#define PLUMBLINE_FOR_WIDE_LANES
+#endif
+#define PLUMBLINE_INLINE __attribute__((always_inline)) inline
 
 namespace plumbline {
 namespace {
@@ -29,6 +42,9 @@ constexpr std::int64_t kTogether = 16;
 constexpr int kNodesAtOnce = 20000;
 // One in so many rotations is looked at first.
 constexpr int kFewTurns = 8;
+// Rotations looked at beside each other, between which none learns from another
+// what is good enough.
+constexpr int kTurnsAtOnce = 8;
 
 // Cells whose scores a lane of 16 bits can hold the sum of.
 constexpr std::size_t kMostInLane = 32767 / static_cast<int>(kMostScore);
@@ -89,9 +105,11 @@ class StridedScores {
   // For each node of the runs, kLanes at a time, the sum of the scores that it
   // gives to the points at the places; `sums` is as long as LanesOf says.
   // False, and not all are added up, when none of them can be `least`.
-  bool Sum(const std::vector<Place>& places, const NodeRun* runs,
-           std::size_t num_runs, double least, std::vector<std::int16_t>* lanes,
-           std::vector<std::int32_t>* sums) const {
+  PLUMBLINE_FOR_WIDE_LANES bool Sum(const std::vector<Place>& places,
+                                    const NodeRun* runs, std::size_t num_runs,
+                                    double least,
+                                    std::vector<std::int16_t>* lanes,
+                                    std::vector<std::int32_t>* sums) const {
     std::size_t size = 0;
     for (std::size_t r = 0; r < num_runs; ++r) size += LanesOf(runs[r]);
     sums->assign(size, 0);
@@ -119,9 +137,9 @@ class StridedScores {
   }
 
  private:
-  // Eight numbers of 16 bits, which compilers add in one instruction.
-  using Lanes = std::int16_t __attribute__((vector_size(16)));
-  static_assert(2 * sizeof(Lanes) == kLanes * sizeof(std::int16_t));
+  // Numbers of 16 bits, which compilers add in one instruction or two.
+  using Lanes = std::int16_t __attribute__((vector_size(32)));
+  static_assert(sizeof(Lanes) == kLanes * sizeof(std::int16_t));
 
   static int FloorDivided(int x) {
     return x >= 0 ? x / kStride : -((kStride - 1 - x) / kStride);
@@ -135,8 +153,8 @@ class StridedScores {
            kLanes;
   }
 
-  void Add(const Place& place, const NodeRun* runs, std::size_t num_runs,
-           std::int16_t* lanes) const {
+  PLUMBLINE_INLINE void Add(const Place& place, const NodeRun* runs,
+                            std::size_t num_runs, std::int16_t* lanes) const {
     for (const NodeRun* run = runs; run != runs + num_runs; ++run) {
       const int row = place.row + run->row;
       const int column = place.column + run->column;
@@ -149,12 +167,12 @@ class StridedScores {
         const int at = column + k;
         if (at <= -kLanes || at >= columns_) continue;
         AddLanes(scores + at, first + k);
-        AddLanes(scores + at + kLanes / 2, first + k + kLanes / 2);
       }
     }
   }
 
-  static void AddLanes(const std::int16_t* scores, std::int16_t* to) {
+  PLUMBLINE_INLINE static void AddLanes(const std::int16_t* scores,
+                                        std::int16_t* to) {
     Lanes part, sum;
     std::memcpy(&part, scores, sizeof(part));
     std::memcpy(&sum, to, sizeof(sum));
@@ -169,6 +187,67 @@ class StridedScores {
   std::vector<std::int16_t> scores_;
 };
 
+// For blocks of the coarsest nodes, kStride each way, how good the best of them
+// can be. Scores are those of squares of kStride cells, so that they are few.
+class BlockScores {
+ public:
+  static constexpr int kStride = StridedScores::kStride;
+
+  // `scores`: of the coarsest level, by rows.
+  BlockScores(const std::vector<std::int16_t>& scores, int columns, int rows)
+      : columns_((columns + kStride - 1) / kStride + kBefore),
+        rows_((rows + kStride - 1) / kStride + kBefore),
+        scores_(BestAround(scores, columns), columns_, rows_) {}
+
+  // Of a cell that the first node of the first block brings a point to.
+  StridedScores::Place PlaceOf(int x, int y) const {
+    return scores_.PlaceOf(FloorDivided(x) + kBefore,
+                           FloorDivided(y) + kBefore);
+  }
+  const StridedScores& scores() const { return scores_; }
+
+ private:
+  // A square, and those that a block beginning somewhere in it reaches into.
+  static constexpr int kReach = kStride + 1;
+  // Blocks that begin before the grid may reach into it.
+  static constexpr int kBefore = kReach - 1;
+
+  static int FloorDivided(int x) {
+    return x >= 0 ? x / kStride : -((kStride - 1 - x) / kStride);
+  }
+
+  // The best of kReach squares each way from each square on.
+  std::vector<std::int16_t> BestAround(const std::vector<std::int16_t>& scores,
+                                       int columns) const {
+    std::vector<std::int16_t> best(static_cast<std::size_t>(columns_) * rows_);
+    for (int y = kBefore; y < rows_; ++y) {
+      const std::int16_t* const from =
+          &scores[static_cast<std::size_t>(kStride * (y - kBefore)) * columns];
+      std::int16_t* const to = &best[static_cast<std::size_t>(y) * columns_];
+      for (int x = kBefore; x < columns_; ++x) {
+        to[x] = from[kStride * (x - kBefore)];
+      }
+      for (int x = 0; x < columns_; ++x) {
+        const int last = std::min(columns_, x + kReach);
+        to[x] = *std::max_element(to + x, to + last);
+      }
+    }
+    for (int y = 0; y < rows_; ++y) {
+      std::int16_t* const to = &best[static_cast<std::size_t>(y) * columns_];
+      for (int k = 1; k < kReach && y + k < rows_; ++k) {
+        const std::int16_t* const above =
+            to + static_cast<std::ptrdiff_t>(k) * columns_;
+        for (int x = 0; x < columns_; ++x) to[x] = std::max(to[x], above[x]);
+      }
+    }
+    return best;
+  }
+
+  int columns_;
+  int rows_;
+  StridedScores scores_;
+};
+
 // Branch and bound over translations and rotations of points on a grid.
 class PeakSearch {
  public:
@@ -181,6 +260,7 @@ class PeakSearch {
       : max_parts_(max_parts),
         grid_(grid),
         coarsest_(grid.levels.back(), grid.columns, grid.rows),
+        blocks_(grid.levels.back(), grid.columns, grid.rows),
         center_(center),
         window_(
             static_cast<int>(std::ceil(translation_window / grid.resolution))),
@@ -205,21 +285,38 @@ class PeakSearch {
   // viewpoint. Once `stop` has returned true there are none.
   void OpenAll(double reach, const std::function<bool()>& stop) {
     const std::vector<NodeRun> runs = NearNodes(reach);
+    const std::vector<NodeRun> blocks = BlocksOf(runs);
     std::int64_t count = 0;
     for (const NodeRun& run : runs) count += run.count;
     count *= static_cast<std::int64_t>(cells_.size());
     nodes_ = std::min<std::int64_t>(count / kTogether, kMaxNodes);
     opened_ = nodes_;
     if (nodes_ >= kMaxNodes) return;
+    ThreadTeam team(ThreadsHere());
+    std::vector<Turn> turns(kTurnsAtOnce);
     // What some rotations lead to leaves little to open at the others.
     for (const int step : {kFewTurns, 1}) {
       open_.clear();
-      for (int k = 0; k < static_cast<int>(cells_.size()); k += step) {
+      const int size = static_cast<int>(cells_.size());
+      for (int first = 0; first < size; first += step * kTurnsAtOnce) {
         if (stop && stop()) {
           open_.clear();
           return;
         }
-        OpenRotation(k, runs);
+        const int at_once =
+            std::min(kTurnsAtOnce, (size - first + step - 1) / step);
+        team.For(static_cast<std::size_t>(at_once), [&](std::size_t i) {
+          Turn& turn = turns[i];
+          turn.rotation = first + static_cast<int>(i) * step;
+          FindLeft(runs, blocks, &turn);
+          OpenRotation(&turn);
+        });
+        for (int i = 0; i < at_once; ++i) {
+          const Turn& turn = turns[static_cast<std::size_t>(i)];
+          open_.insert(open_.end(), turn.open.begin(), turn.open.end());
+          Raise(turn.best.bound);
+          clearest_ = std::max(clearest_, turn.best.bound);
+        }
       }
     }
     const auto is_left = [this](const Node& node) {
@@ -283,6 +380,19 @@ class PeakSearch {
     }
   };
 
+  // What is opened at a rotation; all but that is kept for its memory.
+  struct Turn {
+    int rotation = 0;
+    std::vector<Node> open;
+    // Where the best of them leads to.
+    Node best;
+    std::vector<NodeRun> left;
+    std::vector<StridedScores::Place> places;
+    std::vector<std::pair<int, int>> spans;
+    std::vector<std::int16_t> lanes;
+    std::vector<std::int32_t> sums;
+  };
+
   double Angle(int rotation) const {
     return center_[2] + (rotations_ > 0 ? (rotation - rotations_) *
                                               (rotation_window_ / rotations_)
@@ -319,20 +429,107 @@ class PeakSearch {
   // First cell of a coarsest node along an axis.
   int FirstOf(int node) const { return node * kStride - window_; }
 
-  // Opens those of the nodes at a rotation that may hold a peak, and goes from
-  // the best of them down to a pose.
-  void OpenRotation(int rotation, const std::vector<NodeRun>& runs) {
-    Node best{0, kLevels - 1, rotation, 0, 0};
-    places_.clear();
-    for (const Cell& cell : cells_[rotation]) {
-      places_.push_back(
-          coarsest_.PlaceOf(cell.x + FirstOf(0), cell.y + FirstOf(0)));
+  // The blocks that nodes of the runs, which are in the order of rows, lie in.
+  static std::vector<NodeRun> BlocksOf(const std::vector<NodeRun>& runs) {
+    std::vector<NodeRun> blocks;
+    std::vector<std::pair<int, int>> spans;
+    for (std::size_t begin = 0; begin < runs.size();) {
+      const int row = BlockOf(runs[begin].row);
+      spans.clear();
+      std::size_t end = begin;
+      for (; end < runs.size() && BlockOf(runs[end].row) == row; ++end) {
+        const NodeRun& run = runs[end];
+        spans.emplace_back(BlockOf(run.column),
+                           BlockOf(run.column + run.count - 1) + 1);
+      }
+      std::sort(spans.begin(), spans.end());
+      int last = std::numeric_limits<int>::lowest();
+      for (const auto& [from, to] : spans) {
+        if (from > last) blocks.push_back({from, row, 0});
+        last = std::max(last, to);
+        blocks.back().count = last - blocks.back().column;
+      }
+      begin = end;
     }
-    // Neighbours look at the same scores.
-    std::sort(places_.begin(), places_.end(), [](const auto& a, const auto& b) {
+    return blocks;
+  }
+
+  // Nodes have numbers from 0 on.
+  static int BlockOf(int node) { return node / BlockScores::kStride; }
+
+  // Those of the nodes at a rotation that lie in a block which may hold a peak.
+  void FindLeft(const std::vector<NodeRun>& runs,
+                const std::vector<NodeRun>& blocks, Turn* turn) const {
+    turn->places.clear();
+    for (const Cell& cell : cells_[turn->rotation]) {
+      turn->places.push_back(
+          blocks_.PlaceOf(cell.x + FirstOf(0), cell.y + FirstOf(0)));
+    }
+    SortPlaces(&turn->places);
+    turn->left.clear();
+    std::size_t run = 0;
+    for (std::size_t begin = 0; begin < blocks.size();) {
+      // Of one row of blocks.
+      const int row = blocks[begin].row;
+      std::size_t end = begin;
+      while (end < blocks.size() && blocks[end].row == row) ++end;
+      const bool is_any = blocks_.scores().Sum(
+          turn->places, &blocks[begin], end - begin, std::max(least_, 1.0),
+          &turn->lanes, &turn->sums);
+      turn->spans.clear();
+      const std::int32_t* bounds = turn->sums.data();
+      for (; begin < end; ++begin) {
+        if (!is_any) continue;
+        AddSpans(blocks[begin], bounds, &turn->spans);
+        bounds += StridedScores::LanesOf(blocks[begin]);
+      }
+      for (; run < runs.size() && BlockOf(runs[run].row) == row; ++run) {
+        const int last = runs[run].column + runs[run].count;
+        for (const auto& [from, to] : turn->spans) {
+          const int first = std::max(from, runs[run].column);
+          const int count = std::min(to, last) - first;
+          if (count > 0) turn->left.push_back({first, runs[run].row, count});
+        }
+      }
+    }
+  }
+
+  // Appends the columns of nodes, [from, to), of those blocks of a run that may
+  // hold a peak.
+  void AddSpans(const NodeRun& blocks, const std::int32_t* bounds,
+                std::vector<std::pair<int, int>>* spans) const {
+    for (int k = 0; k < blocks.count; ++k) {
+      if (bounds[k] < least_ || bounds[k] <= 0) continue;
+      const int from = BlockScores::kStride * (blocks.column + k);
+      // Nodes are added up by lanes: shorter gaps cost nothing.
+      if (spans->empty() ||
+          spans->back().second + StridedScores::kLanes < from) {
+        spans->emplace_back(from, from);
+      }
+      spans->back().second = from + BlockScores::kStride;
+    }
+  }
+
+  // Neighbours look at the same scores.
+  static void SortPlaces(std::vector<StridedScores::Place>* places) {
+    std::sort(places->begin(), places->end(), [](const auto& a, const auto& b) {
       return std::tie(a.begin, a.row, a.column) <
              std::tie(b.begin, b.row, b.column);
     });
+  }
+
+  // Opens those of the nodes left at a rotation that may hold a peak, and goes
+  // from the best of them down to a pose.
+  void OpenRotation(Turn* turn) const {
+    const std::vector<NodeRun>& runs = turn->left;
+    turn->open.clear();
+    Node best{0, kLevels - 1, turn->rotation, 0, 0};
+    turn->places.clear();
+    for (const Cell& cell : cells_[turn->rotation]) {
+      turn->places.push_back(
+          coarsest_.PlaceOf(cell.x + FirstOf(0), cell.y + FirstOf(0)));
+    }
+    SortPlaces(&turn->places);
     std::size_t begin = 0;
     while (begin < runs.size()) {
       std::size_t end = begin;
@@ -340,27 +537,26 @@ class PeakSearch {
       while (end < runs.size() && size < kNodesTogether) {
         size += StridedScores::LanesOf(runs[end++]);
       }
-      if (!coarsest_.Sum(places_, &runs[begin], end - begin, least_, &lanes_,
-                         &sums_)) {
+      if (!coarsest_.Sum(turn->places, &runs[begin], end - begin, least_,
+                         &turn->lanes, &turn->sums)) {
         begin = end;
         continue;
       }
-      const std::int32_t* bounds = sums_.data();
+      const std::int32_t* bounds = turn->sums.data();
       for (; begin < end; ++begin) {
         const NodeRun& run = runs[begin];
         for (int k = 0; k < run.count; ++k) {
           if (bounds[k] < least_ || bounds[k] <= 0) continue;
-          const Node node{bounds[k], kLevels - 1, rotation,
+          const Node node{bounds[k], kLevels - 1, turn->rotation,
                           FirstOf(run.column + k), FirstOf(run.row)};
-          open_.push_back(node);
+          turn->open.push_back(node);
           if (best < node) best = node;
         }
         bounds += StridedScores::LanesOf(run);
       }
     }
     while (best.bound > 0 && best.level > 0) best = BestPart(best);
-    Raise(best.bound);
-    clearest_ = std::max(clearest_, best.bound);
+    turn->best = best;
   }
 
   // Calls `visit(part)` with the four parts of a node that are in the window
@@ -547,6 +743,7 @@ class PeakSearch {
   const std::int64_t max_parts_;
   const PeakGrid& grid_;
   const StridedScores coarsest_;
+  const BlockScores blocks_;
   const Pose2 center_;
   // Cells each way.
   const int window_;
@@ -565,10 +762,6 @@ class PeakSearch {
   std::int64_t nodes_ = 0;
   // Of these, those that were opened at first.
   std::int64_t opened_ = 0;
-  // Of OpenRotation, kept for its memory.
-  std::vector<StridedScores::Place> places_;
-  std::vector<std::int16_t> lanes_;
-  std::vector<std::int32_t> sums_;
 };
 
 }  // namespace

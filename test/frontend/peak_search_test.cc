@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
+#include <plumbline/core/parallel_for.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/peak_search.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
+#include <random>
 #include <vector>
 
 namespace plumbline {
@@ -112,6 +116,111 @@ TEST_F(FindPeaksTest, NodesAreLimited) {
   std::int64_t just = used;
   options.nodes = &just;
   EXPECT_EQ(Find(options).size(), peaks.size());
+}
+
+// Pieces of wall and some points on a grid; the window reaches beyond it.
+struct ScatteredWorld {
+  static constexpr int kColumns = 150 + kPeakPad;
+  static constexpr int kRows = 131 + kPeakPad;
+  static constexpr double kResolution = 0.1;
+
+  explicit ScatteredWorld(unsigned seed) {
+    std::mt19937 random(seed);
+    const auto draw = [&](int below) {
+      return static_cast<int>(random() % static_cast<unsigned>(below));
+    };
+    std::vector<std::int16_t> scores(kColumns * kRows, 0);
+    for (int piece = 0; piece < 60; ++piece) {
+      int x = kPeakPad + draw(kColumns - kPeakPad);
+      int y = kPeakPad + draw(kRows - kPeakPad);
+      const bool is_level = draw(2) == 0;
+      for (int i = 0; i < 15 && x < kColumns && y < kRows; ++i) {
+        scores[y * kColumns + x] = static_cast<std::int16_t>(55 + draw(201));
+        ++(is_level ? x : y);
+      }
+    }
+    levels = ScoreLevels(scores, kColumns, kRows);
+    for (int i = 0; i < 60; ++i) {
+      points.emplace_back(0.1 * draw(60) - 3.0, 0.1 * draw(60) - 3.0);
+    }
+    Viewpoint viewpoint;
+    viewpoint.position = {7.0, 6.0};
+    viewpoints = {viewpoint};
+  }
+
+  PeakGrid Grid() const {
+    return {levels, kColumns, kRows, {0.0, 0.0}, kResolution, viewpoints};
+  }
+
+  // The score of the points moved by so many cells, of all that it can be.
+  double ScoreAt(const Pose2& center, int dx, int dy) const {
+    double sum = 0.0;
+    for (const Eigen::Vector2d& point : points) {
+      const auto cell = [](double at) {
+        return static_cast<int>(std::floor(at / kResolution));
+      };
+      const int x = cell(center[0] + point.x()) + dx + kPeakPad;
+      const int y = cell(center[1] + point.y()) + dy + kPeakPad;
+      if (x < 0 || y < 0 || x >= kColumns || y >= kRows) continue;
+      sum += levels[0][static_cast<std::size_t>(y) * kColumns + x];
+    }
+    return sum / (255.0 * static_cast<double>(points.size()));
+  }
+
+  std::vector<std::vector<std::int16_t>> levels;
+  std::vector<Eigen::Vector2d> points;
+  std::vector<Viewpoint> viewpoints;
+};
+
+TEST(FindPeaksInWideWindowTest, TheBestOfAllPoses) {
+  const Pose2 center(6.03, 5.52, 0.0);
+  const double window = 11.0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const ScatteredWorld world(seed);
+    double best = 0.0;
+    for (int dy = -110; dy <= 110; ++dy) {
+      for (int dx = -110; dx <= 110; ++dx) {
+        best = std::max(best, world.ScoreAt(center, dx, dy));
+      }
+    }
+    // Whatever is known before of how good a peak has to be.
+    for (const double least : {0.0, 0.5 * best, 0.999 * best}) {
+      const std::vector<ScoredPose> peaks =
+          FindPeaks(world.Grid(), world.points, center, window, 0.0,
+                    {least, 0.6, 3, 100.0}, nullptr);
+      ASSERT_FALSE(peaks.empty()) << seed;
+      EXPECT_NEAR(peaks[0].score, best, 1e-12) << seed;
+      const auto moved = [&](int axis) {
+        return static_cast<int>(
+            std::lround((peaks[0].pose[axis] - center[axis]) / 0.1));
+      };
+      EXPECT_NEAR(world.ScoreAt(center, moved(0), moved(1)), best, 1e-12);
+    }
+    EXPECT_TRUE(FindPeaks(world.Grid(), world.points, center, window, 0.0,
+                          {1.001 * best, 0.6, 3, 100.0}, nullptr)
+                    .empty());
+  }
+}
+
+TEST(FindPeaksInWideWindowTest, TheSameOnSeveralThreads) {
+  const ScatteredWorld world(7);
+  const auto find = [&](int num_threads) {
+    const ThreadsScope scope(num_threads);
+    return FindPeaks(world.Grid(), world.points, Pose2(6.0, 5.5, 0.3), 11.0,
+                     DegToRad(180.0), {0.1, 0.5, 20, 100.0}, nullptr);
+  };
+  const std::vector<ScoredPose> alone = find(1);
+  EXPECT_GT(alone.size(), 3u);
+  for (const int num_threads : {2, 5}) {
+    const std::vector<ScoredPose> together = find(num_threads);
+    ASSERT_EQ(together.size(), alone.size());
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      EXPECT_EQ(together[i].score, alone[i].score);
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(together[i].pose[axis], alone[i].pose[axis]);
+      }
+    }
+  }
 }
 
 TEST_F(FindPeaksTest, ClearestScoreIsThatOfSomePose) {

@@ -202,6 +202,31 @@ TEST(FindPeaksInWideWindowTest, TheBestOfAllPoses) {
   }
 }
 
+// A pose at which a few single cells are met is good, none beside it.
+TEST(FindPeaksInWideWindowTest, ASinglePoseAnywhere) {
+  constexpr int kSide = 120 + kPeakPad;
+  const std::vector<Eigen::Vector2i> marks = {{2, 3},   {31, 8},  {57, 26},
+                                              {14, 49}, {69, 61}, {44, 77}};
+  std::vector<std::int16_t> scores(kSide * kSide, 0);
+  std::vector<Eigen::Vector2d> points;
+  for (const Eigen::Vector2i& mark : marks) {
+    scores[(mark.y() + kPeakPad) * kSide + mark.x() + kPeakPad] = 255;
+    points.push_back(0.1 * (mark.cast<double>().array() + 0.5).matrix());
+  }
+  const auto levels = ScoreLevels(scores, kSide, kSide);
+  const std::vector<Viewpoint> viewpoints(1);
+  const PeakGrid grid{levels, kSide, kSide, {0.0, 0.0}, 0.1, viewpoints};
+  for (int dx = -21; dx <= 21; dx += 3) {
+    for (int dy = -21; dy <= 21; dy += 2) {
+      const std::vector<ScoredPose> peaks =
+          FindPeaks(grid, points, Pose2(0.1 * dx, 0.1 * dy, 0.0), 2.4, 0.0,
+                    {0.9, 0.9, 3, 100.0}, nullptr);
+      ASSERT_EQ(peaks.size(), 1u) << dx << ' ' << dy;
+      EXPECT_NEAR(peaks[0].pose.head<2>().norm(), 0.0, 1e-9);
+    }
+  }
+}
+
 TEST(FindPeaksInWideWindowTest, TheSameOnSeveralThreads) {
   const ScatteredWorld world(7);
   const auto find = [&](int num_threads) {

@@ -31,8 +31,13 @@ constexpr double kHeldSigma = 0.01;
 // numbers finite.
 constexpr double kFarSigma = 100.0;
 constexpr double kOpenTurn = 1.0;
+// Where the map is not asked whether it bends, rad.
+constexpr double kKnownTurn = 1e-3;
 // Without a match: the heading by odometry, rad a metre, and the way aside.
 constexpr double kWheelTurn = DegToRad(5.0);
+
+// Places between two whose distances are looked at.
+constexpr std::size_t kDistanceStep = 4;
 
 // Of a place, between two times that `stop` is asked.
 constexpr std::size_t kPlacesAtOnce = 64;
@@ -156,10 +161,13 @@ struct Places {
     return way[keys[run.second]] - way[keys[run.first]];
   }
 
-  // Whether the returns tell the place at least so well, m.
-  bool IsTold(std::size_t p, double sigma) const {
-    return std::min(before[p].weakest, other[p].weakest) <= sigma;
+  // How well the returns tell the place, m.
+  double SigmaOf(std::size_t p) const {
+    return std::min(before[p].weakest, other[p].weakest);
   }
+
+  // Whether they do at least so well, m.
+  bool IsTold(std::size_t p, double sigma) const { return SigmaOf(p) <= sigma; }
 };
 
 class PlaceComparison {
@@ -258,6 +266,8 @@ WheelModel LearnWheels(const std::vector<Scan>& scans,
                        const OpenWayOptions& options) {
   double by_wheels = 0.0;
   double by_map = 0.0;
+  // What the map's own errors make of the squares, m^2.
+  double by_returns = 0.0;
   std::vector<std::pair<double, double>> pieces;
   for (std::size_t p = 1; p < places.keys.size(); ++p) {
     if (!places.follows[p] || !places.IsTold(p, kSureSigma) ||
@@ -273,11 +283,12 @@ WheelModel LearnWheels(const std::vector<Scan>& scans,
     pieces.emplace_back(wheels.head<2>().norm(), map);
     by_wheels += pieces.back().first;
     by_map += map;
+    const double told = places.SigmaOf(p);
+    by_returns += told * told;
   }
   WheelModel model;
   const double prior = options.odometry_sigma * options.odometry_sigma;
-  double squares = prior * options.prior_way;
-  double way = options.prior_way;
+  double squares = 0.0;
   const double scale_prior = options.scale_sigma * options.scale_sigma;
   // The scale that is likeliest with this noise.
   model.scale = (by_map * by_wheels + prior / scale_prior) /
@@ -288,9 +299,10 @@ WheelModel LearnWheels(const std::vector<Scan>& scans,
         std::abs(map - model.scale * wheels),
         3.0 * options.odometry_sigma * std::sqrt(std::max(wheels, 0.1)));
     squares += left * left;
-    way += wheels;
   }
-  model.variance = squares / way;
+  model.variance =
+      (prior * options.prior_way + std::max(0.0, squares - by_returns)) /
+      (options.prior_way + by_wheels);
   model.scale_variance = 1.0 / (1.0 / scale_prior + by_wheels / model.variance);
   return model;
 }
@@ -343,22 +355,55 @@ std::vector<Run> OpenRuns(const Places& places, const WheelModel& wheels,
   return runs;
 }
 
-// The linear system of all places.
+// How much of the way from one place to another lies in runs, m.
+double LengthWithin(const Places& places, const Run& part,
+                    const std::vector<Run>& runs) {
+  double length = 0.0;
+  for (const Run& run : runs) {
+    const Run common(std::max(part.first, run.first),
+                     std::min(part.second, run.second));
+    if (common.first < common.second) length += places.LengthOf(common);
+  }
+  return length;
+}
+
+// The places whose distances from `from` are looked at.
+std::vector<std::size_t> FartherPlaces(const Places& places, std::size_t from,
+                                       const OpenWayOptions& options) {
+  std::vector<std::size_t> farther;
+  for (std::size_t p = from + 1; p < places.keys.size() && places.follows[p] &&
+                                 places.LengthOf({from, p}) <= options.most_way;
+       ++p) {
+    if ((p - from) % kDistanceStep == 0) farther.push_back(p);
+  }
+  return farther;
+}
+
+// The linear system of all places; their headings are known this well anyway,
+// rad.
 class Network {
  public:
   Network(const std::vector<Pose2>& poses, const Places& places,
-          const WheelModel& wheels, const OpenWayOptions& options)
+          const WheelModel& wheels, double heading_sigma,
+          const OpenWayOptions& options)
       : poses_(poses), places_(places), wheels_(wheels), options_(options) {
     const auto size = static_cast<Eigen::Index>(3 * places.keys.size());
     bias_ = Eigen::VectorXd::Zero(size);
     for (std::size_t p = 0; p < places.keys.size(); ++p) AddPlace(p);
     for (Eigen::Index i = 0; i < size; ++i) {
-      const double least = i % 3 == 2 ? kOpenTurn : kFarSigma;
+      const double least = i % 3 == 2 ? heading_sigma : kFarSigma;
       entries_.emplace_back(i, i, 1.0 / (least * least));
     }
     Eigen::SparseMatrix<double> normal(size, size);
     normal.setFromTriplets(entries_.begin(), entries_.end());
     solver_.compute(normal);
+    by_scale_ = solver_.solve(bias_);
+    // Odometry's scale is one more unknown of the system: all that is known of
+    // the places tells it, not only the pieces that show it well.
+    scale_variance_ =
+        1.0 / std::max(1.0 / (options.scale_sigma * options.scale_sigma),
+                       1.0 / (options.scale_sigma * options.scale_sigma) +
+                           scale_information_ - bias_.dot(by_scale_));
   }
 
   // Standard deviation of the length of a part of the way, m.
@@ -371,16 +416,58 @@ class Network {
       length.segment<2>(static_cast<Eigen::Index>(3 * p)) += step / way;
       length.segment<2>(static_cast<Eigen::Index>(3 * (p - 1))) -= step / way;
     }
-    const Eigen::VectorXd solved = solver_.solve(length);
-    const double by_scale = solved.dot(bias_);
-    return std::sqrt(std::max(0.0, length.dot(solved)) +
-                     wheels_.scale_variance * by_scale * by_scale);
+    const double by_scale = length.dot(by_scale_);
+    return std::sqrt(std::max(0.0, length.dot(solver_.solve(length))) +
+                     scale_variance_ * by_scale * by_scale);
+  }
+
+  // The distance between two places that is known worst, and its standard
+  // deviation, m.
+  std::pair<double, double> WorstDistance() const {
+    const std::size_t count = places_.keys.size();
+    // Of the positions of a place, and of those of a place and a farther one.
+    std::vector<Eigen::Matrix2d> own(count);
+    std::vector<std::vector<Eigen::Matrix2d>> shared(count);
+    std::vector<std::vector<std::size_t>> farther(count);
+    for (std::size_t p = 0; p < count; p += kDistanceStep) {
+      Eigen::MatrixXd position = Eigen::MatrixXd::Zero(bias_.size(), 2);
+      position.middleRows<2>(static_cast<Eigen::Index>(3 * p)).setIdentity();
+      const Eigen::MatrixXd covariance = solver_.solve(position);
+      const auto of = [&](std::size_t other) -> Eigen::Matrix2d {
+        return covariance.middleRows<2>(static_cast<Eigen::Index>(3 * other));
+      };
+      own[p] = of(p);
+      farther[p] = FartherPlaces(places_, p, options_);
+      for (const std::size_t q : farther[p]) shared[p].push_back(of(q));
+    }
+    std::pair<double, double> worst(0.0, 0.0);
+    for (std::size_t p = 0; p < count; p += kDistanceStep) {
+      for (std::size_t i = 0; i < farther[p].size(); ++i) {
+        const std::size_t q = farther[p][i];
+        const Eigen::Vector2d between = Difference(p, q);
+        const double distance = between.norm();
+        if (distance < options_.least_length) continue;
+        const Eigen::Vector2d along = between / distance;
+        const Eigen::Matrix2d covariance =
+            own[p] + own[q] - shared[p][i] - shared[p][i].transpose();
+        const double by_scale =
+            along.dot(by_scale_.segment<2>(static_cast<Eigen::Index>(3 * q)) -
+                      by_scale_.segment<2>(static_cast<Eigen::Index>(3 * p)));
+        const double sigma =
+            std::sqrt(std::max(0.0, along.dot(covariance * along)) +
+                      scale_variance_ * by_scale * by_scale);
+        if (sigma > worst.second) worst = {distance, sigma};
+      }
+    }
+    return worst;
   }
 
  private:
-  Eigen::Vector2d Step(std::size_t p) const {
-    return (poses_[places_.keys[p]] - poses_[places_.keys[p - 1]]).head<2>();
+  Eigen::Vector2d Difference(std::size_t from, std::size_t to) const {
+    return (poses_[places_.keys[to]] - poses_[places_.keys[from]]).head<2>();
   }
+
+  Eigen::Vector2d Step(std::size_t p) const { return Difference(p - 1, p); }
 
   void AddPlace(std::size_t p) {
     if (p > 0 && places_.follows[p]) AddWheels(p);
@@ -406,6 +493,7 @@ class Network {
     Add(p - 1, p, information);
     // Where a scale that is one unit too large would push both.
     const Eigen::Vector2d push = information.topLeftCorner<2, 2>() * step;
+    scale_information_ += push.dot(step);
     bias_.segment<2>(static_cast<Eigen::Index>(3 * p)) += push;
     bias_.segment<2>(static_cast<Eigen::Index>(3 * (p - 1))) -= push;
     // The heading of the first takes the second along.
@@ -426,8 +514,7 @@ class Network {
   // axes of the map.
   void Add(std::size_t from, std::size_t to,
            const Eigen::Matrix3d& information) {
-    const Eigen::Vector2d step =
-        (poses_[places_.keys[to]] - poses_[places_.keys[from]]).head<2>();
+    const Eigen::Vector2d step = Difference(from, to);
     Eigen::Matrix3d first = -Eigen::Matrix3d::Identity();
     first(0, 2) = step.y();
     first(1, 2) = -step.x();
@@ -452,7 +539,11 @@ class Network {
   const OpenWayOptions& options_;
   std::vector<Eigen::Triplet<double>> entries_;
   Eigen::VectorXd bias_;
+  double scale_information_ = 0.0;
   SymmetricFactor<double> solver_;
+  // How a scale that is one unit too large would move the places.
+  Eigen::VectorXd by_scale_;
+  double scale_variance_ = 0.0;
 };
 
 // Places along the way; nothing is known of them yet.
@@ -485,6 +576,14 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
                                   const std::vector<Pose2>& poses,
                                   const OpenWayOptions& options,
                                   const std::function<bool()>& stop) {
+  return FindUncertainLengths(scans, keys, poses, options, stop).ways;
+}
+
+UncertainLengths FindUncertainLengths(const std::vector<Scan>& scans,
+                                      const std::vector<int>& keys,
+                                      const std::vector<Pose2>& poses,
+                                      const OpenWayOptions& options,
+                                      const std::function<bool()>& stop) {
   if (keys.size() != poses.size()) {
     throw PLUMBLINE_ERROR(
         std::to_string(poses.size()) + " poses",
@@ -523,10 +622,25 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
   };
   WheelModel wheels = LearnWheels(scans, keys, poses, places, options);
   std::vector<Run> runs = OpenRuns(places, wheels, options);
-  if (std::none_of(runs.begin(), runs.end(),
-                   [&](const Run& run) { return may_be_told(wheels, run); })) {
-    return {};
-  }
+  const auto any_may_be_told = [&] {
+    return std::any_of(runs.begin(), runs.end(), [&](const Run& run) {
+      return may_be_told(wheels, run);
+    });
+  };
+  const auto distance_may_be_told = [&] {
+    for (std::size_t p = 0; p < count; p += kDistanceStep) {
+      const std::vector<std::size_t> farther =
+          FartherPlaces(places, p, options);
+      if (!farther.empty() &&
+          SigmaByWheels(wheels,
+                        LengthWithin(places, {p, farther.back()}, runs)) >
+              options.told_distance_sigma) {
+        return true;
+      }
+    }
+    return false;
+  };
+  if (!any_may_be_told() && !distance_may_be_told()) return {};
   if (!for_all([&](std::size_t p) {
         places.other[p] = comparison.Others(places, place_of, p);
       })) {
@@ -534,20 +648,30 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
   }
   wheels = LearnWheels(scans, keys, poses, places, options);
   runs = OpenRuns(places, wheels, options);
-  const Network network(poses, places, wheels, options);
-  std::vector<OpenWay> ways;
-  for (const Run& run : runs) {
-    if (!may_be_told(wheels, run)) continue;
-    OpenWay way;
-    way.begin = keys[places.keys[run.first]];
-    way.end = keys[places.keys[run.second]];
-    way.length = places.LengthOf(run);
-    way.sigma =
-        SigmaOfMap(network.SigmaOf(run), SigmaByWheels(wheels, way.length),
-                   MissedBy(scans, keys, poses, places, wheels, run, options));
-    if (way.sigma > options.told_sigma) ways.push_back(way);
+  UncertainLengths lengths;
+  if (any_may_be_told()) {
+    const Network network(poses, places, wheels, kOpenTurn, options);
+    for (const Run& run : runs) {
+      if (!may_be_told(wheels, run)) continue;
+      OpenWay way;
+      way.begin = keys[places.keys[run.first]];
+      way.end = keys[places.keys[run.second]];
+      way.length = places.LengthOf(run);
+      way.sigma = SigmaOfMap(
+          network.SigmaOf(run), SigmaByWheels(wheels, way.length),
+          MissedBy(scans, keys, poses, places, wheels, run, options));
+      if (way.sigma > options.told_sigma) lengths.ways.push_back(way);
+    }
   }
-  return ways;
+  if (distance_may_be_told()) {
+    const Network network(poses, places, wheels, kKnownTurn, options);
+    const auto [distance, sigma] = network.WorstDistance();
+    if (sigma > options.told_distance_sigma) {
+      lengths.distance = distance;
+      lengths.distance_sigma = sigma;
+    }
+  }
+  return lengths;
 }
 
 }  // namespace plumbline

@@ -30,10 +30,11 @@ struct OpenWayOptions {
   std::size_t max_others = 6;
   /// Odometry before anything is known of it: standard deviation after a metre,
   /// m, and of its scale. The first counts as much as this many metres of way
-  /// on which the returns show how good it is.
+  /// on which the returns show how good it is: it is a poor robot's, and most
+  /// are better by far.
   double odometry_sigma = 0.1;
   double scale_sigma = 0.05;
-  double prior_way = 3.0;
+  double prior_way = 0.5;
   /// Uncertainty of the length of a way (standard deviation, m) from which on
   /// it is reported. Ways that odometry alone knows better, and that are as
   /// long in the map to within this, are not looked into.
@@ -41,6 +42,11 @@ struct OpenWayOptions {
   /// Shorter ways are not compared with odometry, m: over them it has another
   /// length where it comes late.
   double least_length = 4.0;
+  /// The same of the distance between two places.
+  double told_distance_sigma = 0.18;
+  /// Distances are looked at between places with up to this much way between
+  /// them, m: over more the map is held by other things than this way.
+  double most_way = 60.0;
   int num_threads = 0;
 };
 
@@ -52,6 +58,16 @@ struct OpenWay {
   /// Length, m, and its standard deviation.
   double length = 0.0;
   double sigma = 0.0;
+};
+
+/// What is not known of how far places lie from each other.
+struct UncertainLengths {
+  /// FindOpenWays.
+  std::vector<OpenWay> ways;
+  /// How far those two places lie from each other, m, of which that is known
+  /// worst, and its standard deviation, m, where it is reported; otherwise 0.
+  double distance = 0.0;
+  double distance_sigma = 0.0;
 };
 
 /// The parts of the way along which the returns do not tell how far the robot
@@ -77,6 +93,17 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
                                   const std::vector<Pose2>& poses,
                                   const OpenWayOptions& options,
                                   const std::function<bool()>& stop = nullptr);
+
+/// FindOpenWays, and what short ways of that kind add up to: along a corridor
+/// that is seen 4 m far doors show the place every few metres, and odometry
+/// carries it from one to the next. Of each one the length may be known well
+/// enough, and that of all of them not. A distance counts along the line
+/// between its places, with at most `most_way` between them and no jump; that
+/// the map may bend between them is another matter and does not.
+UncertainLengths FindUncertainLengths(
+    const std::vector<Scan>& scans, const std::vector<int>& keys,
+    const std::vector<Pose2>& poses, const OpenWayOptions& options,
+    const std::function<bool()>& stop = nullptr);
 
 }  // namespace plumbline
 

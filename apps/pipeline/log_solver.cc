@@ -879,7 +879,8 @@ void LogSolver::CheckMap(Context* context) const {
   const MapReview review(context->scans, result.records, result.trajectory,
                          options_.check, options_.way_check,
                          [context] { return context->IsStopped(); });
-  review.Revise(map_.graph(), result.refined, tell_open_ways, &result.loose);
+  review.Revise(map_.graph(), result.refined, tell_open_ways, &result.loose,
+                &result.notes);
   AddNotesOn(review.Odometry(), &result.notes);
 }
 

@@ -102,6 +102,18 @@ void AddOpenWays(const std::vector<OpenWay>& ways,
   }
 }
 
+// Where the distance between two places is not known well.
+void AddNoteOn(const UncertainLengths& lengths,
+               std::vector<std::string>* notes) {
+  if (lengths.distance_sigma == 0.0) return;
+  char note[160];
+  std::snprintf(note, sizeof note,
+                "little in sight shows how far the robot went: places %.0f m "
+                "from each other are known to %.1f m",
+                lengths.distance, lengths.distance_sigma);
+  notes->push_back(note);
+}
+
 void AddDisputedWays(const std::vector<DisputedWay>& ways,
                      std::vector<LooseTrack>* loose) {
   for (const DisputedWay& way : ways) {
@@ -174,24 +186,26 @@ MapAgreement MapReview::Agreement() const {
   return CountAgreement(scans_, keys_, poses_, check_, stop_);
 }
 
-std::vector<OpenWay> MapReview::OpenWays() const {
+UncertainLengths MapReview::Lengths() const {
   OpenWayOptions options;
   options.points = check_.points;
   options.matcher = check_.matcher;
   options.num_threads = check_.num_threads;
-  return FindOpenWays(scans_, keys_, poses_, options, stop_);
+  return FindUncertainLengths(scans_, keys_, poses_, options, stop_);
 }
 
 double MapReview::LargestOpenSigma() const {
   double largest = 0.0;
-  for (const OpenWay& way : OpenWays()) largest = std::max(largest, way.sigma);
+  for (const OpenWay& way : Lengths().ways) {
+    largest = std::max(largest, way.sigma);
+  }
   return largest;
 }
 
 void MapReview::Revise(const Graph& graph,
                        const std::vector<RefinedScan>& refined,
-                       bool tell_open_ways,
-                       std::vector<LooseTrack>* loose) const {
+                       bool tell_open_ways, std::vector<LooseTrack>* loose,
+                       std::vector<std::string>* notes) const {
   const std::vector<MapContradiction> contradictions =
       FindContradictions(scans_, keys_, poses_, check_, stop_);
   const std::vector<BlockedWay> blocked =
@@ -212,7 +226,11 @@ void MapReview::Revise(const Graph& graph,
         FindContestedWays(scans_, trajectory_, odometry.scale, contested),
         odometry.disputed, loose);
   }
-  if (tell_open_ways) AddOpenWays(OpenWays(), loose);
+  if (tell_open_ways) {
+    const UncertainLengths lengths = Lengths();
+    AddOpenWays(lengths.ways, loose);
+    AddNoteOn(lengths, notes);
+  }
   std::stable_sort(loose->begin(), loose->end(),
                    [](const LooseTrack& a, const LooseTrack& b) {
                      return a.begin < b.begin;

@@ -14,6 +14,7 @@
 #include <plumbline/frontend/way_check.h>
 
 #include <functional>
+#include <string>
 #include <vector>
 
 namespace plumbline {
@@ -36,6 +37,8 @@ class MapReview {
   /// How uncertain the length of a way is that hangs on odometry (FindOpenWays;
   /// standard deviation of the most uncertain one, m); 0 where none does.
   double LargestOpenSigma() const;
+  /// What of the map's lengths is not known (FindUncertainLengths).
+  UncertainLengths Lengths() const;
   /// How odometry agrees with the map.
   OdometryAgreement Odometry() const {
     return CompareWithOdometry(scans_, trajectory_, OdometryCheckOptions());
@@ -49,12 +52,13 @@ class MapReview {
   /// while it missed much (`refined`, one per scan), ways that odometry has
   /// longer by far or that what was in sight contests and, with
   /// `tell_open_ways`, ways whose length hangs on odometry; drops those that
-  /// turn out to be right. Ordered by their first scans.
+  /// turn out to be right. Ordered by their first scans. What holds of no part
+  /// in particular is said in `notes`.
   void Revise(const Graph& graph, const std::vector<RefinedScan>& refined,
-              bool tell_open_ways, std::vector<LooseTrack>* loose) const;
+              bool tell_open_ways, std::vector<LooseTrack>* loose,
+              std::vector<std::string>* notes) const;
 
  private:
-  std::vector<OpenWay> OpenWays() const;
   void DropConfirmed(std::vector<LooseTrack>* loose) const;
   void WidenToStill(LooseTrack* track) const;
 

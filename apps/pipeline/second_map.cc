@@ -149,9 +149,14 @@ bool SecondMap::HasContradictions() const {
 
 double SecondMap::LargestOpenSigma() {
   if (!options_.check_map || run_.IsStopped()) return 0.0;
-  const double sigma = Review().LargestOpenSigma();
-  run_.may_have_open_ways = sigma > 0.0;
-  return sigma;
+  const UncertainLengths lengths = Review().Lengths();
+  run_.may_have_open_ways =
+      !lengths.ways.empty() || lengths.distance_sigma > 0.0;
+  double largest = 0.0;
+  for (const OpenWay& way : lengths.ways) {
+    largest = std::max(largest, way.sigma);
+  }
+  return largest;
 }
 
 void SecondMap::MakeWalls() {

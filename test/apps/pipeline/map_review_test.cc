@@ -78,32 +78,34 @@ LooseTrack SecondRound() {
 }
 
 TEST(MapReviewTest, WhatIsRightIsNoLongerReported) {
+  std::vector<std::string> notes;
   const ReviewedDrive drive = RoundsOfAHall();
   const MapReview review = drive.Review();
   EXPECT_FALSE(review.HasContradictions());
   EXPECT_GT(review.Agreement().agreeing, 20);
   std::vector<LooseTrack> loose = {SecondRound()};
-  review.Revise(Graph(), {}, true, &loose);
+  review.Revise(Graph(), {}, true, &loose, &notes);
   EXPECT_TRUE(loose.empty());
   // No match says where a guess lies, whatever agrees.
   loose = {SecondRound()};
   loose[0].found = false;
-  review.Revise(Graph(), {}, true, &loose);
+  review.Revise(Graph(), {}, true, &loose, &notes);
   EXPECT_EQ(loose.size(), 1u);
 }
 
 // Scans that odometry alone placed, unless that is told already.
 TEST(MapReviewTest, TellsWhatOdometryMissed) {
+  std::vector<std::string> notes;
   const ReviewedDrive drive = RoundsOfAHall();
   const MapReview review = drive.Review();
   std::vector<RefinedScan> refined(drive.trajectory.size());
   refined[40].missed_since = 29;
   refined[40].missed = Pose2(0.3, 0.3, 0.1);
   std::vector<LooseTrack> loose;
-  review.Revise(Graph(), refined, true, &loose);
+  review.Revise(Graph(), refined, true, &loose, &notes);
   EXPECT_TRUE(loose.empty());
   refined[40].missed = Pose2(0.6, -0.8, 0.1);
-  review.Revise(Graph(), refined, true, &loose);
+  review.Revise(Graph(), refined, true, &loose, &notes);
   ASSERT_EQ(loose.size(), 1u);
   EXPECT_EQ(loose[0].begin, 29);
   EXPECT_EQ(loose[0].end, 40);
@@ -115,11 +117,12 @@ TEST(MapReviewTest, TellsWhatOdometryMissed) {
   guess.begin = 20;
   guess.end = 50;
   loose = {guess};
-  review.Revise(Graph(), refined, true, &loose);
+  review.Revise(Graph(), refined, true, &loose, &notes);
   EXPECT_EQ(loose.size(), 1u);
 }
 
 TEST(MapReviewTest, TellsWaysThatOdometryHasLongerByFar) {
+  std::vector<std::string> notes;
   ReviewedDrive drive = RoundsOfAHall();
   Pose2 odometry = Pose2::Zero();
   Pose2 before = drive.scans.front().odometry;
@@ -131,7 +134,7 @@ TEST(MapReviewTest, TellsWaysThatOdometryHasLongerByFar) {
     drive.scans[i].odometry = odometry;
   }
   std::vector<LooseTrack> loose;
-  drive.Review().Revise(Graph(), {}, true, &loose);
+  drive.Review().Revise(Graph(), {}, true, &loose, &notes);
   ASSERT_EQ(loose.size(), 1u);
   EXPECT_NEAR(loose[0].begin, 19, 2);
   EXPECT_NEAR(loose[0].end, 50, 3);
@@ -141,6 +144,7 @@ TEST(MapReviewTest, TellsWaysThatOdometryHasLongerByFar) {
 }
 
 TEST(MapReviewTest, WhereSomethingIsWrongNothingIsTakenForSure) {
+  std::vector<std::string> notes;
   ReviewedDrive drive = RoundsOfAHall();
   for (std::size_t i = 80; i < drive.trajectory.size(); ++i) {
     drive.trajectory[i] =
@@ -148,7 +152,7 @@ TEST(MapReviewTest, WhereSomethingIsWrongNothingIsTakenForSure) {
   }
   EXPECT_TRUE(drive.Review().HasContradictions());
   std::vector<LooseTrack> loose = {SecondRound()};
-  drive.Review().Revise(Graph(), {}, true, &loose);
+  drive.Review().Revise(Graph(), {}, true, &loose, &notes);
   ASSERT_GE(loose.size(), 2u);
   EXPECT_TRUE(std::is_sorted(loose.begin(), loose.end(),
                              [](const LooseTrack& a, const LooseTrack& b) {
@@ -168,12 +172,13 @@ TEST(MapReviewTest, WhereSomethingIsWrongNothingIsTakenForSure) {
 }
 
 TEST(MapReviewTest, NothingOnceItIsToldToStop) {
+  std::vector<std::string> notes;
   const ReviewedDrive drive = RoundsOfAHall();
   const MapReview review = drive.Review([] { return true; });
   EXPECT_FALSE(review.HasContradictions());
   EXPECT_EQ(review.Agreement().agreeing, 0);
   std::vector<LooseTrack> loose = {SecondRound()};
-  review.Revise(Graph(), {}, true, &loose);
+  review.Revise(Graph(), {}, true, &loose, &notes);
   EXPECT_EQ(loose.size(), 1u);
 }
 
@@ -200,6 +205,7 @@ ReviewedDrive ThroughAWall() {
 }
 
 TEST(MapReviewTest, AWayThroughAWallOfTheMap) {
+  std::vector<std::string> notes;
   const ReviewedDrive drive = ThroughAWall();
   Registry registry;
   RegisterBuiltinRelations(&registry);
@@ -216,7 +222,7 @@ TEST(MapReviewTest, AWayThroughAWallOfTheMap) {
     return track.why.find("went through") != std::string::npos;
   };
   std::vector<LooseTrack> loose;
-  drive.Review().Revise(graph, {}, false, &loose);
+  drive.Review().Revise(graph, {}, false, &loose, &notes);
   const auto found = std::find_if(loose.begin(), loose.end(), through);
   ASSERT_NE(found, loose.end());
   EXPECT_LT(found->begin, 24);
@@ -228,17 +234,18 @@ TEST(MapReviewTest, AWayThroughAWallOfTheMap) {
   between.begin = 50;
   between.end = 51;
   loose = {between};
-  drive.Review().Revise(graph, {}, false, &loose);
+  drive.Review().Revise(graph, {}, false, &loose, &notes);
   EXPECT_EQ(std::count_if(loose.begin(), loose.end(), through), 0);
 
   // A map without that wall.
   loose.clear();
-  drive.Review().Revise(Graph(), {}, false, &loose);
+  drive.Review().Revise(Graph(), {}, false, &loose, &notes);
   EXPECT_EQ(std::count_if(loose.begin(), loose.end(), through), 0);
 }
 
 // Nothing but the two walls is in sight on 40 m.
 TEST(MapReviewTest, OpenWaysAreToldWhenAskedFor) {
+  std::vector<std::string> notes;
   const std::vector<testing::WallEnds> walls = testing::Room(120.0, 2.0);
   testing::Noise noise(4);
   ReviewedDrive drive;
@@ -247,10 +254,16 @@ TEST(MapReviewTest, OpenWaysAreToldWhenAskedFor) {
   }
   EXPECT_GT(drive.Review().LargestOpenSigma(), 0.2);
   std::vector<LooseTrack> loose;
-  drive.Review().Revise(Graph(), {}, false, &loose);
+  drive.Review().Revise(Graph(), {}, false, &loose, &notes);
   EXPECT_TRUE(loose.empty());
-  drive.Review().Revise(Graph(), {}, true, &loose);
+  EXPECT_TRUE(notes.empty());
+  drive.Review().Revise(Graph(), {}, true, &loose, &notes);
   ASSERT_FALSE(loose.empty());
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0].find("little in sight shows how far the robot went: "
+                          "places "),
+            0u)
+      << notes[0];
   EXPECT_NE(loose[0].why.find("how far the robot went"), std::string::npos);
   EXPECT_EQ(RoundsOfAHall().Review().LargestOpenSigma(), 0.0);
 }

@@ -43,7 +43,7 @@ struct OpenWayOptions {
   /// length where it comes late.
   double least_length = 4.0;
   /// The same of the distance between two places.
-  double told_distance_sigma = 0.18;
+  double told_distance_sigma = 0.16;
   /// Distances are looked at between places with up to this much way between
   /// them, m: over more the map is held by other things than this way.
   double most_way = 60.0;

@@ -38,7 +38,7 @@ struct OpenWayOptions {
   /// Uncertainty of the length of a way (standard deviation, m) from which on
   /// it is reported. Ways that odometry alone knows better, and that are as
   /// long in the map to within this, are not looked into.
-  double told_sigma = 0.2;
+  double told_sigma = 0.16;
   /// Shorter ways are not compared with odometry, m: over them it has another
   /// length where it comes late.
   double least_length = 4.0;

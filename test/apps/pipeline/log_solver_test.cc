@@ -403,12 +403,20 @@ TEST_F(LogSolverTest, AMapThatContradictsItselfIsReported) {
   }
   LogSolver solver(registry_, options);
   const LogSolverResult result = solver.Run(log);
-  ASSERT_FALSE(result.loose.empty());
+  // What contradicts itself does not tell well how far the robot went, either.
+  const auto count = [&](const std::string& why) {
+    return std::count_if(result.loose.begin(), result.loose.end(),
+                         [&](const LooseTrack& part) {
+                           return part.why.find(why) != std::string::npos;
+                         });
+  };
+  const auto contradicted = count("contradicts what it saw on other visits");
+  EXPECT_GE(contradicted, 1);
+  EXPECT_EQ(contradicted + count("shows how far the robot went"),
+            static_cast<std::ptrdiff_t>(result.loose.size()));
   for (const LooseTrack& part : result.loose) {
     EXPECT_LT(part.begin, part.end);
     EXPECT_LT(part.end, 1408);
-    EXPECT_NE(part.why.find("contradicts what it saw on other visits"),
-              std::string::npos);
   }
   options.check_map = false;
   LogSolver unchecked(registry_, options);

@@ -161,13 +161,10 @@ struct Places {
     return way[keys[run.second]] - way[keys[run.first]];
   }
 
-  // How well the returns tell the place, m.
-  double SigmaOf(std::size_t p) const {
-    return std::min(before[p].weakest, other[p].weakest);
+  // Whether the returns tell the place at least so well, m.
+  bool IsTold(std::size_t p, double sigma) const {
+    return std::min(before[p].weakest, other[p].weakest) <= sigma;
   }
-
-  // Whether they do at least so well, m.
-  bool IsTold(std::size_t p, double sigma) const { return SigmaOf(p) <= sigma; }
 };
 
 class PlaceComparison {
@@ -266,8 +263,6 @@ WheelModel LearnWheels(const std::vector<Scan>& scans,
                        const OpenWayOptions& options) {
   double by_wheels = 0.0;
   double by_map = 0.0;
-  // What the map's own errors make of the squares, m^2.
-  double by_returns = 0.0;
   std::vector<std::pair<double, double>> pieces;
   for (std::size_t p = 1; p < places.keys.size(); ++p) {
     if (!places.follows[p] || !places.IsTold(p, kSureSigma) ||
@@ -283,12 +278,10 @@ WheelModel LearnWheels(const std::vector<Scan>& scans,
     pieces.emplace_back(wheels.head<2>().norm(), map);
     by_wheels += pieces.back().first;
     by_map += map;
-    const double told = places.SigmaOf(p);
-    by_returns += told * told;
   }
   WheelModel model;
   const double prior = options.odometry_sigma * options.odometry_sigma;
-  double squares = 0.0;
+  double squares = prior * options.prior_way;
   const double scale_prior = options.scale_sigma * options.scale_sigma;
   // The scale that is likeliest with this noise.
   model.scale = (by_map * by_wheels + prior / scale_prior) /
@@ -300,9 +293,7 @@ WheelModel LearnWheels(const std::vector<Scan>& scans,
         3.0 * options.odometry_sigma * std::sqrt(std::max(wheels, 0.1)));
     squares += left * left;
   }
-  model.variance =
-      (prior * options.prior_way + std::max(0.0, squares - by_returns)) /
-      (options.prior_way + by_wheels);
+  model.variance = squares / (options.prior_way + by_wheels);
   model.scale_variance = 1.0 / (1.0 / scale_prior + by_wheels / model.variance);
   return model;
 }

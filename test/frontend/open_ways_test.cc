@@ -165,15 +165,15 @@ TEST(FindOpenWaysTest, ARoundCorridorHangsOnOdometry) {
 // A door frame every 8 m, seen 3 m far: odometry carries the place from one to
 // the next.
 TEST(FindUncertainLengthsTest, ShortWaysAddUp) {
-  std::vector<WallEnds> walls = RoomAndCorridor();
-  for (double x = 8.0; x < 100.0; x += 8.0) {
-    for (const double side : {-1.0, 1.0}) {
-      walls.push_back({{x, side}, {x, 0.6 * side}});
-      walls.push_back({{x, 0.6 * side}, {x + 0.4, 0.6 * side}});
-      walls.push_back({{x + 0.4, 0.6 * side}, {x + 0.4, side}});
+  const auto lengths = [](double pitch, double sigma, double range) {
+    std::vector<WallEnds> walls = RoomAndCorridor();
+    for (double x = 8.0; x < 100.0; x += pitch) {
+      for (const double side : {-1.0, 1.0}) {
+        walls.push_back({{x, side}, {x, 0.6 * side}});
+        walls.push_back({{x, 0.6 * side}, {x + 0.4, 0.6 * side}});
+        walls.push_back({{x + 0.4, 0.6 * side}, {x + 0.4, side}});
+      }
     }
-  }
-  const auto lengths = [&](double sigma, double range) {
     SeenDrive drive = DriveAlong(walls, Straight(-8.0, 45.0), sigma);
     for (Scan& scan : drive.scans) {
       for (float& one : scan.ranges) {
@@ -185,17 +185,18 @@ TEST(FindUncertainLengthsTest, ShortWaysAddUp) {
     options.told_sigma = 1.0;
     return FindUncertainLengths(drive.scans, drive.keys, drive.poses, options);
   };
-  const UncertainLengths poor = lengths(0.1, 3.0);
+  const UncertainLengths poor = lengths(8.0, 0.1, 3.0);
   EXPECT_TRUE(poor.ways.empty());
   EXPECT_GT(poor.distance_sigma, 0.3);
   EXPECT_LT(poor.distance_sigma, 1.5);
   EXPECT_GT(poor.distance, 20.0);
   EXPECT_LE(poor.distance, OpenWayOptions().most_way);
   // Good odometry is known to be good.
-  EXPECT_LT(lengths(0.01, 3.0).distance_sigma, 0.6 * poor.distance_sigma);
+  EXPECT_LT(lengths(8.0, 0.01, 3.0).distance_sigma, 0.6 * poor.distance_sigma);
   // From afar the frames are in sight all the time.
-  EXPECT_LT(lengths(0.1, 12.0).distance_sigma, 0.6 * poor.distance_sigma);
-  EXPECT_EQ(lengths(0.01, 12.0).distance_sigma, 0.0);
+  EXPECT_LT(lengths(8.0, 0.1, 12.0).distance_sigma, 0.6 * poor.distance_sigma);
+  // Many of them tell the place everywhere.
+  EXPECT_EQ(lengths(2.0, 0.02, 12.0).distance_sigma, 0.0);
 }
 
 TEST(FindOpenWaysTest, EndsWhenItIsTold) {

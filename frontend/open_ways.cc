@@ -562,6 +562,12 @@ Places SpreadPlaces(const std::vector<Pose2>& poses,
 
 }  // namespace
 
+double UncertainLengths::LargestSigma() const {
+  double largest = 0.0;
+  for (const OpenWay& way : ways) largest = std::max(largest, way.sigma);
+  return largest;
+}
+
 std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
                                   const std::vector<int>& keys,
                                   const std::vector<Pose2>& poses,

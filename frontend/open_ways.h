@@ -68,6 +68,9 @@ struct UncertainLengths {
   /// worst, and its standard deviation, m, where it is reported; otherwise 0.
   double distance = 0.0;
   double distance_sigma = 0.0;
+
+  /// Standard deviation of the most uncertain way's length, m; 0 without ways.
+  double LargestSigma() const;
 };
 
 /// The parts of the way along which the returns do not tell how far the robot

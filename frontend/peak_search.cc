@@ -56,6 +56,11 @@ constexpr std::size_t kPointsAtOnce = 16;
 // from stays at hand from one point to the next.
 constexpr std::size_t kNodesTogether = 4096;
 
+// Rounded down.
+int FloorDivided(int x, int by) {
+  return x >= 0 ? x / by : -((by - 1 - x) / by);
+}
+
 // Coarsest nodes of a row: [column, column + count).
 struct NodeRun {
   int column;
@@ -97,8 +102,8 @@ class StridedScores {
 
   // Of a cell that may lie outside of the grid.
   Place PlaceOf(int x, int y) const {
-    const int column = FloorDivided(x);
-    const int row = FloorDivided(y);
+    const int column = FloorDivided(x, kStride);
+    const int row = FloorDivided(y, kStride);
     return {Begin(x - kStride * column, y - kStride * row), row, column};
   }
 
@@ -140,10 +145,6 @@ class StridedScores {
   // Numbers of 16 bits, which compilers add in one instruction or two.
   using Lanes = std::int16_t __attribute__((vector_size(32)));
   static_assert(sizeof(Lanes) == kLanes * sizeof(std::int16_t));
-
-  static int FloorDivided(int x) {
-    return x >= 0 ? x / kStride : -((kStride - 1 - x) / kStride);
-  }
 
   // Index of the first score of the cells at (x, y) modulo kStride. Before and
   // behind each row are kLanes of no score.
@@ -201,8 +202,8 @@ class BlockScores {
 
   // Of a cell that the first node of the first block brings a point to.
   StridedScores::Place PlaceOf(int x, int y) const {
-    return scores_.PlaceOf(FloorDivided(x) + kBefore,
-                           FloorDivided(y) + kBefore);
+    return scores_.PlaceOf(FloorDivided(x, kStride) + kBefore,
+                           FloorDivided(y, kStride) + kBefore);
   }
   const StridedScores& scores() const { return scores_; }
 
@@ -211,10 +212,6 @@ class BlockScores {
   static constexpr int kReach = kStride + 1;
   // Blocks that begin before the grid may reach into it.
   static constexpr int kBefore = kReach - 1;
-
-  static int FloorDivided(int x) {
-    return x >= 0 ? x / kStride : -((kStride - 1 - x) / kStride);
-  }
 
   // The best of kReach squares each way from each square on.
   std::vector<std::int16_t> BestAround(const std::vector<std::int16_t>& scores,
@@ -460,12 +457,7 @@ class PeakSearch {
   // Those of the nodes at a rotation that lie in a block which may hold a peak.
   void FindLeft(const std::vector<NodeRun>& runs,
                 const std::vector<NodeRun>& blocks, Turn* turn) const {
-    turn->places.clear();
-    for (const Cell& cell : cells_[turn->rotation]) {
-      turn->places.push_back(
-          blocks_.PlaceOf(cell.x + FirstOf(0), cell.y + FirstOf(0)));
-    }
-    SortPlaces(&turn->places);
+    FillPlaces(blocks_, turn);
     turn->left.clear();
     std::size_t run = 0;
     for (std::size_t begin = 0; begin < blocks.size();) {
@@ -510,12 +502,20 @@ class PeakSearch {
     }
   }
 
-  // Neighbours look at the same scores.
-  static void SortPlaces(std::vector<StridedScores::Place>* places) {
-    std::sort(places->begin(), places->end(), [](const auto& a, const auto& b) {
-      return std::tie(a.begin, a.row, a.column) <
-             std::tie(b.begin, b.row, b.column);
-    });
+  // Where the points' scores at the rotation lie.
+  template <typename Scores>
+  void FillPlaces(const Scores& scores, Turn* turn) const {
+    turn->places.clear();
+    for (const Cell& cell : cells_[turn->rotation]) {
+      turn->places.push_back(
+          scores.PlaceOf(cell.x + FirstOf(0), cell.y + FirstOf(0)));
+    }
+    // Neighbours look at the same scores.
+    std::sort(turn->places.begin(), turn->places.end(),
+              [](const auto& a, const auto& b) {
+                return std::tie(a.begin, a.row, a.column) <
+                       std::tie(b.begin, b.row, b.column);
+              });
   }
 
   // Opens those of the nodes left at a rotation that may hold a peak, and goes
@@ -524,12 +524,7 @@ class PeakSearch {
     const std::vector<NodeRun>& runs = turn->left;
     turn->open.clear();
     Node best{0, kLevels - 1, turn->rotation, 0, 0};
-    turn->places.clear();
-    for (const Cell& cell : cells_[turn->rotation]) {
-      turn->places.push_back(
-          coarsest_.PlaceOf(cell.x + FirstOf(0), cell.y + FirstOf(0)));
-    }
-    SortPlaces(&turn->places);
+    FillPlaces(coarsest_, turn);
     std::size_t begin = 0;
     while (begin < runs.size()) {
       std::size_t end = begin;

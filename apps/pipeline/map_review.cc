@@ -194,13 +194,7 @@ UncertainLengths MapReview::Lengths() const {
   return FindUncertainLengths(scans_, keys_, poses_, options, stop_);
 }
 
-double MapReview::LargestOpenSigma() const {
-  double largest = 0.0;
-  for (const OpenWay& way : Lengths().ways) {
-    largest = std::max(largest, way.sigma);
-  }
-  return largest;
-}
+double MapReview::LargestOpenSigma() const { return Lengths().LargestSigma(); }
 
 void MapReview::Revise(const Graph& graph,
                        const std::vector<RefinedScan>& refined,

@@ -152,11 +152,7 @@ double SecondMap::LargestOpenSigma() {
   const UncertainLengths lengths = Review().Lengths();
   run_.may_have_open_ways =
       !lengths.ways.empty() || lengths.distance_sigma > 0.0;
-  double largest = 0.0;
-  for (const OpenWay& way : lengths.ways) {
-    largest = std::max(largest, way.sigma);
-  }
-  return largest;
+  return lengths.LargestSigma();
 }
 
 void SecondMap::MakeWalls() {

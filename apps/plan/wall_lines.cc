@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <queue>
 #include <tuple>
@@ -24,6 +25,10 @@ constexpr double kLargestBend = DegToRad(25.0);
 // What lies on one side of a wall, bent as the map is, is no farther apart than
 // this, m.
 constexpr double kOneSide = 0.2;
+// Beyond a gap of more than this, m, a wall has no larger step than that, m:
+// what has one is the front of a cupboard or a leaf of a door in the next room.
+constexpr double kNextRoom = 1.0;
+constexpr double kLargestStep = 0.1;
 // Two parts of one straight wall are offset by no more than this, m, and lie
 // beside each other along no more than that.
 constexpr double kInLineOffset = 0.1;
@@ -304,6 +309,38 @@ bool AreOneWall(const WallLine& line, const Face& a, const Face& b) {
          !from(between > 0.0 ? b : a, true);
 }
 
+// The step between what lies on one side of two parts of a line, where they are
+// nearest to each other, m; 0 when they have no side in common.
+double StepBetween(const WallLine& line, const std::vector<Face>& a,
+                   const std::vector<Face>& b) {
+  const auto is_seen_from = [&](const Face& face, bool left) {
+    const bool is_along = line.along.dot(face.end - face.begin) > 0.0;
+    return left == is_along ? face.from_left : face.from_right;
+  };
+  double nearest = std::numeric_limits<double>::infinity();
+  double step = 0.0;
+  for (const Face& face : a) {
+    const auto [begin, end] =
+        std::minmax({line.Along(face.begin), line.Along(face.end)});
+    for (const Face& other : b) {
+      if (!(is_seen_from(face, true) && is_seen_from(other, true)) &&
+          !(is_seen_from(face, false) && is_seen_from(other, false))) {
+        continue;
+      }
+      const auto [other_begin, other_end] =
+          std::minmax({line.Along(other.begin), line.Along(other.end)});
+      const double gap = std::max({other_begin - end, begin - other_end, 0.0});
+      const double between =
+          0.5 * std::abs(line.Across(face.begin) + line.Across(face.end) -
+                         line.Across(other.begin) - line.Across(other.end));
+      if (gap > nearest || (gap == nearest && between >= step)) continue;
+      nearest = gap;
+      step = between;
+    }
+  }
+  return step;
+}
+
 // Adds a face to a group when it is a part of the same wall; how far it is off,
 // or -1 when it is not.
 double Fits(const Group& group, const Face& face,
@@ -327,6 +364,10 @@ double Fits(const Group& group, const Face& face,
   if (!std::all_of(
           group.faces.begin(), group.faces.end(),
           [&](const Face& other) { return AreOneWall(line, face, other); })) {
+    return -1.0;
+  }
+  if (gap > kNextRoom &&
+      StepBetween(line, group.faces, {face}) > kLargestStep) {
     return -1.0;
   }
   // In line before near.
@@ -379,7 +420,8 @@ bool AreInLine(const Group& a, const Group& b, const WallLineOptions& options) {
   if (gap > options.in_line_gap || gap < -kInLineOverlap ||
       high - low > options.max_thickness ||
       high - low > kInLineOffset + std::max(line.high - line.low,
-                                            b.line.high - b.line.low)) {
+                                            b.line.high - b.line.low) ||
+      (gap > kNextRoom && StepBetween(line, a.faces, b.faces) > kLargestStep)) {
     return false;
   }
   return std::all_of(a.faces.begin(), a.faces.end(), [&](const Face& face) {

@@ -367,6 +367,37 @@ TEST(BuildingPlanTest, AThickWallIsOneWall) {
   EXPECT_NEAR(plan.doors[0].width(), 0.9, 0.11);
 }
 
+// A room below a corridor, and two above it whose wall is 0.4 m to the right of
+// the end of the room below. Cupboards before that wall have their front 0.15 m
+// beside the line of the wall below.
+Drawing CupboardsInLineWithAWall() {
+  Drawing drawing(15.0, 15.0);
+  drawing.Room(1.0, 6.0, 13.0, 8.0).Room(1.0, 1.0, 6.0, 5.8);
+  drawing.Room(1.0, 8.2, 6.4, 13.0).Room(6.6, 8.2, 13.0, 13.0);
+  drawing.Free(3.0, 5.7, 3.9, 6.1);
+  drawing.Free(3.0, 7.9, 3.9, 8.3).Free(9.0, 7.9, 9.9, 8.3);
+  drawing.Fill(5.85, 8.7, 6.4, 10.6, Space::kOccupied);
+  drawing.Fill(5.9, 8.75, 6.5, 10.55, Space::kUnknown);
+  return drawing;
+}
+
+TEST(BuildingPlanTest, CupboardsBesideALineOfWallAreNoneOfIt) {
+  const Drawing drawing = CupboardsInLineWithAWall();
+  double front = 0.0;
+  for (const WallLine& line : FindWallLines({}, {0.0}, drawing.space())) {
+    const double across = line.Across({5.87, 9.5});
+    if (std::abs(line.along[1]) > 0.9 && across > line.low - 0.05 &&
+        across < line.high + 0.05 && line.Along({5.87, 9.5}) > line.begin &&
+        line.Along({5.87, 9.5}) < line.end) {
+      front += line.weight;
+    }
+  }
+  EXPECT_NEAR(front, 1.7, 0.2);
+  const BuildingPlan plan = PlanOf(drawing);
+  ASSERT_EQ(plan.rooms.size(), 4u);
+  EXPECT_EQ(plan.doors.size(), 3u);
+}
+
 TEST(BuildingPlanTest, CupboardsBeforeAWallDoNotMakeItThick) {
   for (const WallLine& line :
        FindWallLines({}, {0.0}, RoomsWithAThickWall(0.9).space())) {

@@ -33,6 +33,10 @@ constexpr double kLargestStep = 0.1;
 // beside each other along no more than that.
 constexpr double kInLineOffset = 0.1;
 constexpr double kInLineOverlap = 0.5;
+// Long walls that are offset by no more than this, m, may have a longer gap
+// between them, m: a corridor runs through there, with rooms on its sides.
+constexpr double kSameLine = 0.05;
+constexpr double kLongInLineGap = 8.0;
 // The two faces of a thick wall lie beside each other along so much, m, and
 // this share of the shorter one. Along no more than this share of that may
 // anything look free between them: laser points go astray. And beside either
@@ -417,8 +421,11 @@ bool AreInLine(const Group& a, const Group& b, const WallLineOptions& options) {
     }
   }
   const double gap = std::max(begin - line.end, line.begin - end);
-  if (gap > options.in_line_gap || gap < -kInLineOverlap ||
-      high - low > options.max_thickness ||
+  const bool are_long = a.direction >= 0 &&
+                        std::min(line.weight, b.line.weight) >= kLongFace &&
+                        std::abs(line.Across(b.line.origin)) <= kSameLine;
+  if (gap > (are_long ? kLongInLineGap : options.in_line_gap) ||
+      gap < -kInLineOverlap || high - low > options.max_thickness ||
       high - low > kInLineOffset + std::max(line.high - line.low,
                                             b.line.high - b.line.low) ||
       (gap > kNextRoom && StepBetween(line, a.faces, b.faces) > kLargestStep)) {
@@ -456,8 +463,8 @@ bool AreThickWall(const Group& a, const Group& b, const SpaceGrid& space,
   const WallLine& line = a.line;
   double low = line.Across(b.faces.front().begin);
   double high = low;
-  double begin = line.begin;
-  double end = line.end;
+  double begin = line.Along(b.faces.front().begin);
+  double end = begin;
   for (const Face& face : b.faces) {
     for (const Vector2d& at : {face.begin, face.end}) {
       low = std::min(low, line.Across(at));
@@ -483,7 +490,8 @@ bool AreThickWall(const Group& a, const Group& b, const SpaceGrid& space,
   double beside_a = 0.0;
   double beside_b = 0.0;
   const double step = space.resolution;
-  for (double t = begin; t < end; t += step) {
+  for (double t = std::min(begin, line.begin); t < std::max(end, line.end);
+       t += step) {
     const auto at = [&](double v) {
       return space.At(Vector2d(line.At(t) + v * line.normal()));
     };
@@ -500,8 +508,10 @@ bool AreThickWall(const Group& a, const Group& b, const SpaceGrid& space,
       ++all;
       free += at(v) == Space::kFree;
     }
-    const bool has_a = has_face(line.low, line.high);
-    const bool has_b = has_face(low, high);
+    // Beyond its ends what lies there is of other lines.
+    const bool has_a =
+        t >= line.begin && t <= line.end && has_face(line.low, line.high);
+    const bool has_b = t >= begin && t <= end && has_face(low, high);
     if (has_a && has_b) {
       both += step;
       if (free > 0) seen_through += step;

@@ -405,6 +405,42 @@ TEST(BuildingPlanTest, CupboardsBeforeAWallDoNotMakeItThick) {
   }
 }
 
+// A thick wall of 8 m between two rooms, and beyond an unseen gap of 5 m in
+// line with its lower face a wall that was seen from below only.
+TEST(BuildingPlanTest, AWallFarFromAThickOneIsNoFaceOfIt) {
+  Drawing drawing(28.0, 10.0);
+  drawing.Room(16.0, 1.0, 24.0, 4.0).Room(16.0, 4.6, 24.0, 8.0);
+  drawing.Room(1.0, 1.0, 7.0, 4.0);
+  int thick = 0;
+  for (const WallLine& line : FindWallLines({}, {0.0}, drawing.space())) {
+    if (std::abs(line.along[0]) < 0.9 || line.high - line.low < 0.4) continue;
+    ++thick;
+    EXPECT_NEAR(line.end - line.begin, 8.0, 0.3);
+  }
+  EXPECT_EQ(thick, 1);
+}
+
+// Two walls of 4 m and more with a gap between them.
+TEST(BuildingPlanTest, LongWallsGoOnBeyondACorridor) {
+  const auto lines = [](double gap, double offset) {
+    Drawing drawing(24.0, 8.0);
+    drawing.Room(1.0, 1.0, 6.0, 4.0);
+    drawing.Room(6.0 + gap, 1.0 + offset, 22.0, 4.0);
+    int along_it = 0;
+    for (const WallLine& line : FindWallLines({}, {0.0}, drawing.space())) {
+      along_it += std::abs(line.along[0]) > 0.9 &&
+                  std::abs(line.Across({12.0, 1.0})) < 0.2;
+    }
+    return along_it;
+  };
+  EXPECT_EQ(lines(3.0, 0.0), 1);
+  EXPECT_EQ(lines(6.0, 0.0), 1);
+  EXPECT_EQ(lines(9.0, 0.0), 2);
+  // Not on one line.
+  EXPECT_EQ(lines(3.0, 0.1), 1);
+  EXPECT_EQ(lines(6.0, 0.1), 2);
+}
+
 // Four rooms at a corridor, two on either side, with walls between them in one
 // line. In one of the upper rooms cupboards stand before that wall, in a longer
 // row than what is seen of the wall: the rest of it is open.

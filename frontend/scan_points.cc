@@ -133,6 +133,9 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
   }
 
   const Eigen::Vector2d laser = scan.laser_offset.head<2>();
+  const bool has_jambs = scan.maximum_range > 0.0 &&
+                         scan.maximum_range <= options.short_range &&
+                         options.jamb_radius < options.normal_radius;
   // Whether a return lies on the surface of the one before it.
   std::vector<char> goes_on(points->size(), 0);
   for (std::size_t i = 1; i < points->size(); ++i) {
@@ -157,12 +160,14 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
           sums.back().Plus(positions[surface_end] - positions[surface]));
       ++surface_end;
     } while (surface_end < n && goes_on[surface_end]);
-    for (int i = surface; i < surface_end; ++i) {
-      ScanPoint& point = (*points)[i];
+    // The normal of a point over this radius, m, or where neighbours are far
+    // apart over more; zero where the surface is not straight.
+    const auto normal_over = [&](int i, double least_radius) {
+      Eigen::Vector2d normal = Eigen::Vector2d::Zero();
+      const ScanPoint& point = (*points)[i];
       // Far away neighbours are far apart.
-      const double radius =
-          std::max(options.normal_radius,
-                   2.5 * std::sqrt(2.0) * point.range * angle_step);
+      const double radius = std::max(
+          least_radius, 2.5 * std::sqrt(2.0) * point.range * angle_step);
       const double squared_radius = radius * radius;
       int begin = i;
       while (begin > surface &&
@@ -180,7 +185,7 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
       end = std::max(end,
                      std::min(surface_end, i + options.normal_neighbors + 1));
       const int count = end - begin;
-      if (count < 3) continue;
+      if (count < 3) return normal;
       const PrincipalAxis axis =
           AxisBetween(sums[begin - surface], sums[end - surface], count);
       const double across = axis.across / count;
@@ -188,12 +193,17 @@ void ExtractScanPoints(const Scan& scan, const ScanPointsOptions& options,
       const double tolerance = count > within
                                    ? kGrazedTolerance * options.normal_tolerance
                                    : options.normal_tolerance;
-      if (across > tolerance * tolerance || across > 0.1 * along) {
-        continue;
-      }
-      Eigen::Vector2d normal(-axis.direction.y(), axis.direction.x());
+      if (across > tolerance * tolerance || across > 0.1 * along) return normal;
+      normal = Eigen::Vector2d(-axis.direction.y(), axis.direction.x());
       if (normal.dot(laser - point.position) < 0.0) normal = -normal;
-      point.normal = normal;
+      return normal;
+    };
+    for (int i = surface; i < surface_end; ++i) {
+      Eigen::Vector2d& normal = (*points)[i].normal;
+      normal = normal_over(i, options.normal_radius);
+      if (has_jambs && normal.isZero()) {
+        normal = normal_over(i, options.jamb_radius);
+      }
     }
     surface = surface_end;
   }

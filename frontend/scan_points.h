@@ -31,12 +31,22 @@ struct ScanPointsOptions {
   /// surface goes: where beams graze they lie farther apart.
   double normal_radius = 0.25;
   int normal_neighbors = 2;
+  /// A laser that sees no farther than this, m, also has normals over
+  /// jamb_radius, m, where the surface is not straight over normal_radius:
+  /// along a corridor of which it sees a few metres the jambs of doors are all
+  /// that tells the place.
+  double short_range = 6.0;
+  double jamb_radius = 0.1;
   /// Standard deviation of a fitted surface's points, m, above which the
   /// point has no normal; half of it where the fit goes beyond normal_radius.
   double normal_tolerance = 0.04;
 
   /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
-  void ScaleToNoise(double scale) { normal_tolerance *= scale; }
+  /// Normals of noisy returns need a longer piece of surface.
+  void ScaleToNoise(double scale) {
+    normal_tolerance *= scale;
+    jamb_radius *= scale;
+  }
 };
 
 /// One return of a scan.

@@ -189,6 +189,8 @@ MapAgreement MapReview::Agreement() const {
 UncertainLengths MapReview::Lengths() const {
   OpenWayOptions options;
   options.points = check_.points;
+  // Normals over a decimetre help the map, but promise more than they hold.
+  options.points.short_range = 0.0;
   options.matcher = check_.matcher;
   options.num_threads = check_.num_threads;
   return FindUncertainLengths(scans_, keys_, poses_, options, stop_);

@@ -70,6 +70,36 @@ TEST(ScanPointsTest, PointsAndNormalsOfARoomWithLaserOffset) {
   EXPECT_GT(with_normal, 600);
 }
 
+// Doors are set back by some centimetres to a few decimetres. Along a corridor
+// that is seen a few metres far their jambs are all that tells the place.
+TEST(ScanPointsTest, JambsSeenByAShortLaserHaveNormalsOfTheirOwn) {
+  const std::vector<testing::WallEnds> walls = {
+      {{-5.0, -1.0}, {5.0, -1.0}}, {{-5.0, 1.0}, {0.6, 1.0}},
+      {{0.6, 1.0}, {0.6, 1.2}},    {{0.6, 1.2}, {1.5, 1.2}},
+      {{1.5, 1.2}, {1.5, 1.0}},    {{1.5, 1.0}, {5.0, 1.0}}};
+  // Returns on the farther jamb whose normals look along the corridor.
+  const auto count = [&](double range, double noise) {
+    Laser laser = FullCircle();
+    laser.maximum_range = range;
+    ScanPointsOptions options;
+    options.ScaleToNoise(noise);
+    int along = 0;
+    for (const ScanPoint& point :
+         PointsOf(MakeScan(walls, Pose2::Zero(), laser), options)) {
+      if (std::abs(point.position.x() - 1.5) < 1e-6 &&
+          point.position.y() > 1.03 && point.position.y() < 1.17 &&
+          point.normal.x() < -0.95) {
+        ++along;
+      }
+    }
+    return along;
+  };
+  EXPECT_GE(count(4.0, 1.0), 3);
+  EXPECT_EQ(count(30.0, 1.0), 0);
+  // Over a decimetre the noise of a poor laser would turn normals anywhere.
+  EXPECT_EQ(count(4.0, 2.5), 0);
+}
+
 TEST(ScanPointsTest, HandWorkedPositionAndBeam) {
   Scan scan = Beams({0.0f, 2.0f});
   scan.start_angle = 0.0;

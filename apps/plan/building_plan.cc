@@ -76,7 +76,7 @@ constexpr double kOffsetInPassage = 0.3;
 // each other, m, along so much, m, are one; what is left of the shorter one is
 // a wall from this length on, m.
 constexpr double kSameWallCosine = 0.996;
-constexpr double kSameWall = 0.1;
+constexpr double kSameWall = 0.15;
 constexpr double kLeastDouble = 0.5;
 constexpr double kLeastRest = 0.1;
 

@@ -84,7 +84,7 @@ struct PlanWall {
 Ring BodyOf(const PlanWall& wall);
 
 /// The walls without what two lines close together have twice: of walls with
-/// nearly one direction whose middles lie within 0.1 m of each other along 0.5
+/// nearly one direction whose middles lie within 0.15 m of each other along 0.5
 /// m and more, the longest keeps that part. In the order given.
 std::vector<PlanWall> WithoutDoubles(const std::vector<PlanWall>& walls);
 

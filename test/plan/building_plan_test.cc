@@ -158,6 +158,7 @@ TEST(BuildingPlanTest, WallsOnEachOtherAreDrawnOnce) {
       wall(0.0, 0.0, 5.0, 0.0),    //
       wall(4.0, 0.04, 6.0, 0.05),  // goes on from it
       wall(4.7, -0.05, 5.3, 0.0),  // meets it
+      wall(1.0, 0.13, 3.0, 0.13),  // on the one of 5 m as well
       wall(1.0, 0.25, 3.0, 0.25),  // another one
       wall(2.0, -1.0, 2.0, 1.0),   // crosses it
   });

@@ -72,9 +72,9 @@ constexpr double kSameDoor = 0.8;
 constexpr double kFacing = 0.95;
 constexpr double kDeepestPassage = 2.0;
 constexpr double kOffsetInPassage = 0.3;
-// Walls with nearly one direction, by its cosine, whose middles are so near to
-// each other, m, along so much, m, are one; what is left of the shorter one is
-// a wall from this length on, m.
+// Walls with nearly one direction, by its cosine, whose lines or the middles of
+// whose bodies are so near to each other, m, along so much, m, are one; what is
+// left of the shorter one is a wall from this length on, m.
 constexpr double kSameWallCosine = 0.996;
 constexpr double kSameWall = 0.15;
 constexpr double kLeastDouble = 0.5;
@@ -814,6 +814,10 @@ std::vector<PlanWall> WithoutDoubles(const std::vector<PlanWall>& walls) {
   std::stable_sort(
       order.begin(), order.end(),
       [&](std::size_t a, std::size_t b) { return length(a) > length(b); });
+  // How far the middle of a body lies to the left of begin to end, m.
+  const auto body = [&](std::size_t i) {
+    return 0.5 * (walls[i].left - walls[i].right);
+  };
   // What is left of each wall, along it, m.
   using Pieces = std::vector<std::pair<double, double>>;
   std::vector<Pieces> left(walls.size());
@@ -837,7 +841,12 @@ std::vector<PlanWall> WithoutDoubles(const std::vector<PlanWall>& walls) {
         if (to - from < kLeastDouble) continue;
         const Vector2d middle = wall.begin + 0.5 * (from + to) * along;
         const Vector2d across(-other[1], other[0]);
-        if (std::abs(across.dot(middle - begin)) > kSameWall) continue;
+        const double apart = across.dot(middle - begin);
+        const double side = along.dot(other) > 0.0 ? 1.0 : -1.0;
+        if (std::abs(apart) > kSameWall &&
+            std::abs(apart + side * body(i) - body(j)) > kSameWall) {
+          continue;
+        }
         Pieces rest;
         for (const auto& [a, b] : left[i]) {
           if (std::min(b, from) - a >= kLeastRest) {

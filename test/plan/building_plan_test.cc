@@ -171,6 +171,23 @@ TEST(BuildingPlanTest, WallsOnEachOtherAreDrawnOnce) {
   EXPECT_EQ(walls[4].begin, Vector2d(2.0, -1.0));
 }
 
+// Walls of which one face was seen lie on one side of their lines, so that
+// those of two lines may lie on each other.
+TEST(BuildingPlanTest, BodiesOnEachOtherAreDrawnOnce) {
+  const auto wall = [](double y, bool turned, double left, double right) {
+    PlanWall made;
+    made.begin = {turned ? 4.0 : 1.0, y};
+    made.end = {turned ? 1.0 : 4.0, y};
+    made.left = left;
+    made.right = right;
+    return made;
+  };
+  const PlanWall below = wall(0.0, false, 0.12, 0.0);
+  EXPECT_EQ(WithoutDoubles({below, wall(0.2, false, 0.0, 0.12)}).size(), 1u);
+  EXPECT_EQ(WithoutDoubles({below, wall(0.2, true, 0.12, 0.0)}).size(), 1u);
+  EXPECT_EQ(WithoutDoubles({below, wall(0.2, true, 0.0, 0.12)}).size(), 2u);
+}
+
 // Something wide hides most of a wall: nothing was seen between its front and
 // the wall, but the room is closed there.
 TEST(BuildingPlanTest, JogsOfWallsAreClosed) {

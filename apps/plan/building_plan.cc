@@ -77,7 +77,7 @@ constexpr double kOffsetInPassage = 0.3;
 // left of the shorter one is a wall from this length on, m.
 constexpr double kSameWallCosine = 0.996;
 constexpr double kSameWall = 0.15;
-constexpr double kLeastDouble = 0.5;
+constexpr double kLeastDouble = 0.4;
 constexpr double kLeastRest = 0.1;
 
 // How far the face of a line's wall lies to the left of a piece of it, m: where

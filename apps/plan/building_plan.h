@@ -85,7 +85,7 @@ Ring BodyOf(const PlanWall& wall);
 
 /// The walls without what two lines close together have twice: of walls with
 /// nearly one direction whose lines, or the middles of whose bodies, lie within
-/// 0.15 m of each other along 0.5 m and more, the longest keeps that part. In
+/// 0.15 m of each other along 0.4 m and more, the longest keeps that part. In
 /// the order given.
 std::vector<PlanWall> WithoutDoubles(const std::vector<PlanWall>& walls);
 

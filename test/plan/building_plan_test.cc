@@ -186,6 +186,11 @@ TEST(BuildingPlanTest, BodiesOnEachOtherAreDrawnOnce) {
   EXPECT_EQ(WithoutDoubles({below, wall(0.2, false, 0.0, 0.12)}).size(), 1u);
   EXPECT_EQ(WithoutDoubles({below, wall(0.2, true, 0.12, 0.0)}).size(), 1u);
   EXPECT_EQ(WithoutDoubles({below, wall(0.2, true, 0.0, 0.12)}).size(), 2u);
+  // A piece of half a metre to a rounding error, as profiles have them.
+  PlanWall piece = wall(0.07, true, 0.1, 0.0);
+  piece.begin[0] = 3.9;
+  piece.end[0] = 3.4 + 1e-9;
+  EXPECT_EQ(WithoutDoubles({below, piece}).size(), 1u);
 }
 
 // Something wide hides most of a wall: nothing was seen between its front and

@@ -60,6 +60,15 @@ constexpr double kCrack = 0.3;
 // Walls without a trace are looked for again in the parts of a region, up to so
 // many times.
 constexpr int kUnseenRounds = 3;
+// A corridor that leads to one room or none has so much floor, m^2.
+constexpr double kLeastDeadEnd = 15.0;
+// A way outside of all rooms is longer than this, m, and a larger share of all
+// poses, where a space is missing. Lines are drawn on by so much farther then,
+// if no more than so much of that way is left outside.
+constexpr double kLongOutside = 10.0;
+constexpr double kOftenOutside = 0.05;
+constexpr double kFarther = 2.0;
+constexpr double kLessOutside = 0.5;
 // Rooms with an opening of this between them are reached from each other, m:
 // the leaf of a door may hide much of it.
 constexpr double kLeastWay = 0.25;
@@ -280,9 +289,12 @@ void DropUnreached(const Arrangement& arrangement, std::vector<PlanRoom>* rooms,
   *rooms = std::move(kept);
 }
 
-PlanRoom::Kind KindOf(const Polygon& outline) {
-  return IsLongAndNarrow(outline) ? PlanRoom::Kind::kCorridor
-                                  : PlanRoom::Kind::kRoom;
+// A strip that leads to no more than one other room is the part of a room that
+// was seen beside its furniture, or a closet, when it is small.
+PlanRoom::Kind KindOf(const PlanRoom& room) {
+  const bool leads_on = room.neighbors.size() > 1 || room.area >= kLeastDeadEnd;
+  return leads_on && IsLongAndNarrow(room.outline) ? PlanRoom::Kind::kCorridor
+                                                   : PlanRoom::Kind::kRoom;
 }
 
 // A straight wall from sample `first` to `last` (not included) of a line.
@@ -325,7 +337,8 @@ struct Division {
 std::vector<DrawnLine> DrawAndMeasure(const std::vector<WallLine>& lines,
                                       const SpaceGrid& space,
                                       const BuildingPlanOptions& options) {
-  std::vector<DrawnLine> drawn = DrawLines(lines, options.reach);
+  std::vector<DrawnLine> drawn =
+      DrawLines(lines, options.reach, options.beyond);
   MeasureLines(space, options.doors, &drawn);
   return drawn;
 }
@@ -457,18 +470,24 @@ bool HasJamb(const Sides& sides, const std::vector<bool>& is_open, int first,
 
 // Whether an opening, from sample `first` to `last` (not included), has a piece
 // of its own wall on both sides, and not the wall across its end on one: beside
-// the end of a bed or of a shelf there is a gap up to the wall.
-bool HasBothJambs(const WallProfile& profile, int first, int last) {
-  const auto wall = [&](int from, int step) {
-    int count = 0;
-    for (int k = from; k >= 0 && k < profile.size() && count < kLeastOwnJamb &&
-                       profile.At(k) == Mark::kWall;
+// the end of a bed or of a shelf there is a gap up to the wall. A wall across
+// is no thicker than twice such a piece; where more stands, it is the opening's
+// own, though the border of the room may run beside it.
+bool HasBothJambs(const WallProfile& profile, const Sides& sides, int first,
+                  int last) {
+  const int middle = (first + last) / 2;
+  const auto has_wall = [&](int from, int step) {
+    int wall = 0;
+    int own = 0;
+    for (int k = from; k >= 0 && k < profile.size() &&
+                       wall < 2 * kLeastOwnJamb && profile.At(k) == Mark::kWall;
          k += step) {
-      ++count;
+      ++wall;
+      own += AreSame(sides, k, middle);
     }
-    return count >= kLeastOwnJamb;
+    return own >= kLeastOwnJamb || wall >= 2 * kLeastOwnJamb;
   };
-  return wall(first - 1, -1) && wall(last, 1);
+  return has_wall(first - 1, -1) && has_wall(last, 1);
 }
 
 // Walls and doors along a line.
@@ -539,7 +558,7 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
     const bool is_door =
         has_both ||
         LeadsSomewhere(on, i, j, door.rooms[0] >= 0 ? -1 : 1, space);
-    if (!has_both && is_door && !HasBothJambs(on.profile, i, j)) {
+    if (!has_both && is_door && !HasBothJambs(on.profile, sides, i, j)) {
       i = j;
       continue;
     }
@@ -747,12 +766,21 @@ void JoinDoorsOfPassages(const SpaceGrid& space, std::vector<PlanDoor>* doors) {
   }
 }
 
-// Marks the rooms that the robot was in; returns whether it was in one of them
-// for the most part of its way.
-bool MarkEntered(const std::vector<Pose2>& path, std::vector<PlanRoom>* rooms) {
+// How much of the robot's way lies in rooms.
+struct WayInRooms {
+  // Poses.
   int inside = 0;
   int outside = 0;
+  // m
+  double outside_length = 0.0;
+};
+
+// Marks the rooms that the robot was in.
+WayInRooms MarkEntered(const std::vector<Pose2>& path,
+                       std::vector<PlanRoom>* rooms) {
+  WayInRooms way;
   std::size_t last = 0;  // where it was before
+  Vector2d before = Vector2d::Constant(std::nan(""));
   for (const Pose2& pose : path) {
     const Vector2d here = pose.head<2>();
     if (!here.allFinite()) continue;
@@ -762,10 +790,16 @@ bool MarkEntered(const std::vector<Pose2>& path, std::vector<PlanRoom>* rooms) {
       is_inside = (*rooms)[which].outline.Contains(here);
       if (is_inside) last = which;
     }
-    if (is_inside) (*rooms)[last].is_entered = true;
-    ++(is_inside ? inside : outside);
+    if (is_inside) {
+      (*rooms)[last].is_entered = true;
+      ++way.inside;
+    } else {
+      ++way.outside;
+      if (before.allFinite()) way.outside_length += (here - before).norm();
+    }
+    before = here;
   }
-  return inside >= outside;
+  return way;
 }
 
 // Which doors the robot drove through, and which rooms are neighbors.
@@ -794,6 +828,70 @@ void TakePath(const std::vector<Pose2>& path, BuildingPlan* plan) {
         std::unique(room.neighbors.begin(), room.neighbors.end()),
         room.neighbors.end());
   }
+}
+
+// Rooms as lines of walls have them.
+struct Rooms {
+  Division division;
+  // The largest first.
+  std::vector<PlanRoom> rooms;
+  std::vector<int> room_of_face;
+  WayInRooms way;
+};
+
+Rooms FindRooms(std::vector<WallLine> lines, const SpaceGrid& space,
+                const std::vector<Pose2>& path,
+                const BuildingPlanOptions& options) {
+  // The edges of furniture are no walls.
+  const std::vector<double> wall = WallOfChains(lines, options.min_wall);
+  std::vector<WallLine> long_lines, short_lines;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    (wall[i] >= options.min_wall ? long_lines : short_lines)
+        .push_back(lines[i]);
+  }
+  lines = std::move(long_lines);
+  std::vector<DrawnLine> drawn_lines = DrawAndMeasure(lines, space, options);
+  const std::size_t count = lines.size();
+  const Partitions partitions =
+      FindPartitions(short_lines, drawn_lines, space, options.reach);
+  Append(partitions.sure, &lines);
+  if (!partitions.likely.empty()) {
+    std::vector<WallLine> with = lines;
+    Append(partitions.likely, &with);
+    const Division trial =
+        Divide(DrawAndMeasure(with, space, options), space, path, options);
+    for (const int line : LinesBetweenRoomsWithDoors(
+             trial.arrangement, trial.region, static_cast<int>(lines.size()),
+             static_cast<int>(with.size()))) {
+      lines.push_back(with[static_cast<std::size_t>(line)]);
+    }
+  }
+  if (lines.size() > count) {
+    drawn_lines = DrawAndMeasure(lines, space, options);
+  }
+  Rooms found;
+  Division& division = found.division;
+  division = Divide(std::move(drawn_lines), space, path, options);
+  for (int i = 0; i < kUnseenRounds; ++i) {
+    const std::vector<WallLine> unseen =
+        FindUnseenWalls(division.arrangement, division.region, division.drawn,
+                        space, options.unseen);
+    if (unseen.empty()) break;
+    Append(unseen, &lines);
+    division =
+        Divide(DrawAndMeasure(lines, space, options), space, path, options);
+  }
+  found.rooms = RoomsOf(division.arrangement, division.region, division.drawn,
+                        space, options, &found.room_of_face);
+  found.way = MarkEntered(path, &found.rooms);
+  return found;
+}
+
+// Whether the robot drove through a space for a good part of its way that no
+// room is.
+bool LacksSpace(const WayInRooms& way) {
+  return way.outside_length >= kLongOutside &&
+         way.outside >= kOftenOutside * (way.inside + way.outside);
 }
 
 }  // namespace
@@ -882,55 +980,28 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
                               const SpaceGrid& space,
                               const std::vector<Pose2>& path,
                               const BuildingPlanOptions& options) {
-  std::vector<WallLine> lines =
+  const std::vector<WallLine> lines =
       FindWallLines(walls, directions, space, options.lines);
-  // The edges of furniture are no walls.
-  const std::vector<double> wall = WallOfChains(lines, options.min_wall);
-  std::vector<WallLine> long_lines, short_lines;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    (wall[i] >= options.min_wall ? long_lines : short_lines)
-        .push_back(lines[i]);
-  }
-  lines = std::move(long_lines);
-  std::vector<DrawnLine> drawn_lines = DrawAndMeasure(lines, space, options);
-  const std::size_t count = lines.size();
-  const Partitions partitions =
-      FindPartitions(short_lines, drawn_lines, space, options.reach);
-  Append(partitions.sure, &lines);
-  if (!partitions.likely.empty()) {
-    std::vector<WallLine> with = lines;
-    Append(partitions.likely, &with);
-    const Division trial =
-        Divide(DrawAndMeasure(with, space, options), space, path, options);
-    for (const int line : LinesBetweenRoomsWithDoors(
-             trial.arrangement, trial.region, static_cast<int>(lines.size()),
-             static_cast<int>(with.size()))) {
-      lines.push_back(with[static_cast<std::size_t>(line)]);
+  Rooms found = FindRooms(lines, space, path, options);
+  if (LacksSpace(found.way)) {
+    // A hall so wide that some of its walls were not seen: the others are drawn
+    // on farther until they meet.
+    BuildingPlanOptions farther = options;
+    farther.reach *= kFarther;
+    farther.beyond = options.reach;
+    Rooms other = FindRooms(lines, space, path, farther);
+    if (other.way.outside_length <= kLessOutside * found.way.outside_length) {
+      found = std::move(other);
     }
   }
-  if (lines.size() > count) {
-    drawn_lines = DrawAndMeasure(lines, space, options);
-  }
-  Division division = Divide(std::move(drawn_lines), space, path, options);
-  for (int i = 0; i < kUnseenRounds; ++i) {
-    const std::vector<WallLine> unseen =
-        FindUnseenWalls(division.arrangement, division.region, division.drawn,
-                        space, options.unseen);
-    if (unseen.empty()) break;
-    Append(unseen, &lines);
-    division =
-        Divide(DrawAndMeasure(lines, space, options), space, path, options);
-  }
-  const auto& [drawn, arrangement, region] = division;
+  const auto& [drawn, arrangement, region] = found.division;
+  std::vector<int>& room_of_face = found.room_of_face;
 
   BuildingPlan plan;
-  std::vector<int> room_of_face;
-  plan.rooms =
-      RoomsOf(arrangement, region, drawn, space, options, &room_of_face);
-  if (!MarkEntered(path, &plan.rooms)) {
+  plan.rooms = std::move(found.rooms);
+  if (found.way.inside < found.way.outside) {
     DropUnreached(arrangement, &plan.rooms, &room_of_face);
   }
-  for (PlanRoom& room : plan.rooms) room.kind = KindOf(room.outline);
   const std::vector<Sides> sides = SidesOf(arrangement, room_of_face, drawn);
   for (std::size_t i = 0; i < drawn.size(); ++i) {
     ReadLine(drawn[i], sides[i], space, options, &plan);
@@ -948,6 +1019,7 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
   DropDoubleDoors(&plan.doors);
   JoinDoorsOfPassages(space, &plan.doors);
   TakePath(path, &plan);
+  for (PlanRoom& room : plan.rooms) room.kind = KindOf(room);
   return plan;
 }
 

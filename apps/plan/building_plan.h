@@ -25,6 +25,8 @@ struct BuildingPlanOptions {
   double min_wall = 2.0;
   /// Lines of walls are drawn on by at most this to meet others, m.
   double reach = 6.0;
+  /// ... which may end so far before they meet, m.
+  double beyond = 1.5;
   /// Least width of a door, m.
   double min_door = 0.5;
   /// Least share of a room's area that was seen to be free.
@@ -38,7 +40,8 @@ struct BuildingPlanOptions {
 
 /// A closed space.
 struct PlanRoom {
-  /// A corridor is long and narrow.
+  /// A corridor is long and narrow; one that leads to one room or none has 15
+  /// m^2 and more.
   enum class Kind { kRoom, kCorridor };
   Kind kind = Kind::kRoom;
   /// Inner faces of its walls, m, map frame.

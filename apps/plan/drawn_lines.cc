@@ -78,8 +78,7 @@ bool Crossing(const WallLine& a, const WallLine& b, double* t_a, double* t_b) {
 }
 
 // Draws lines on to those that they would meet.
-void DrawOn(double reach, std::vector<DrawnLine>* drawn) {
-  constexpr double kBeyond = 1.5;
+void DrawOn(double reach, double beyond_other, std::vector<DrawnLine>* drawn) {
   constexpr int kMeetings = 2;
   struct Meeting {
     double distance;
@@ -117,12 +116,12 @@ void DrawOn(double reach, std::vector<DrawnLine>* drawn) {
       }
       const double beyond =
           std::max({0.0, other.begin - t_other, t_other - other.end});
-      if (beyond > kBeyond) continue;
+      if (beyond > beyond_other) continue;
       const double low = line.begin - t;
       const double high = t - line.end;
       // What a line meets within itself may still have to be drawn up to it.
       if (low <= 0.0 && high <= 0.0) {
-        if (beyond <= kBeyond) stretch(j, t_other);
+        stretch(j, t_other);
       } else if (low > 0.0 && low <= reach) {
         before.push_back({low, j, t, t_other});
       } else if (high > 0.0 && high <= reach) {
@@ -588,14 +587,14 @@ Partitions FindPartitions(const std::vector<WallLine>& lines,
 }
 
 std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
-                                 double reach) {
+                                 double reach, double beyond) {
   std::vector<DrawnLine> drawn;
   for (const WallLine& line : lines) {
     DrawnLine entry;
     entry.line = line;
     drawn.push_back(std::move(entry));
   }
-  DrawOn(reach, &drawn);
+  DrawOn(reach, beyond, &drawn);
   std::vector<DrawnLine> caps = Caps(drawn, reach);
   drawn.insert(drawn.end(), std::make_move_iterator(caps.begin()),
                std::make_move_iterator(caps.end()));

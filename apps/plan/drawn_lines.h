@@ -64,11 +64,12 @@ struct DoorOptions {
 /// Occupied cells this far beside the faces of a wall still belong to it, m.
 constexpr double kBesideWall = 0.1;
 
-/// Draws lines on to others that they meet within `reach`, m, and closes spaces
-/// whose ends were not seen with further lines, across the ends of walls, which
-/// have WallLine::is_wall false.
+/// Draws lines on to others that they meet within `reach`, m, no more than
+/// `beyond`, m, from the end of the other, and closes spaces whose ends were
+/// not seen with further lines, across the ends of walls, which have
+/// WallLine::is_wall false.
 std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
-                                 double reach);
+                                 double reach, double beyond);
 
 /// Lines with little wall that may divide rooms.
 struct Partitions {

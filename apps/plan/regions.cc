@@ -18,6 +18,12 @@ using Eigen::Vector2d;
 
 // Space that was not seen is filled up to this, m^2.
 constexpr double kMaxPocket = 5.0;
+// Of a room that furniture hides in part: what was not seen of a face that is
+// larger than a pocket counts so much less when so large a share of its border,
+// and more, is wall or door, and not less up to this one.
+constexpr double kHiddenFloor = 0.5;
+constexpr double kEnclosed = 0.7;
+constexpr double kBarelyEnclosed = 0.3;
 // Share of a pocket's border that a room must have, and that may lie open to
 // what is no room.
 constexpr double kLeastPocketBorder = 0.2;
@@ -67,11 +73,36 @@ constexpr double kSliver = 0.5;
 // Regions that touch in no more than a corner are no neighbors, m.
 constexpr double kLeastBorder = 0.1;
 
+std::vector<BorderLengths> BordersOfFaces(const Arrangement& arrangement) {
+  std::vector<BorderLengths> borders(arrangement.faces.size());
+  for (const ArrangementEdge& edge : arrangement.edges) {
+    for (const int face : {edge.left, edge.right}) {
+      if (face >= 0) borders[static_cast<std::size_t>(face)].Add(edge.lengths);
+    }
+  }
+  return borders;
+}
+
+// What a square metre of a face counts that was not seen. A bed hides half of a
+// room that was looked into through its door, but not the walls around it.
+double WeightOfUnknown(const Polygon& face, const BorderLengths& border) {
+  const double length = border.length();
+  if (length <= 0.0 || face.Area() <= kMaxPocket) return 1.0;
+  const double wall =
+      (border.Of(Mark::kWall) + border.Of(Mark::kDoor)) / length;
+  const double enclosed =
+      (wall - kBarelyEnclosed) / (kEnclosed - kBarelyEnclosed);
+  return 1.0 - kHiddenFloor * std::clamp(enclosed, 0.0, 1.0);
+}
+
 std::vector<bool> InsideOf(const Arrangement& arrangement,
                            const RegionOptions& options) {
   MinCut cut(arrangement.faces.size());
+  const std::vector<BorderLengths> borders = BordersOfFaces(arrangement);
   for (std::size_t i = 0; i < arrangement.faces.size(); ++i) {
-    cut.AddNodeCost(i, arrangement.free[i], arrangement.unknown[i]);
+    cut.AddNodeCost(i, arrangement.free[i],
+                    WeightOfUnknown(arrangement.faces[i], borders[i]) *
+                        arrangement.unknown[i]);
   }
   for (const ArrangementEdge& edge : arrangement.edges) {
     const double cost =

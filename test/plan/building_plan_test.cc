@@ -534,6 +534,56 @@ TEST(BuildingPlanTest, AGapBesideABedIsNoDoor) {
   EXPECT_TRUE(plan.doors.empty());
 }
 
+// The bed of the next room stands in one row with the first, behind the wall
+// between the two.
+TEST(BuildingPlanTest, AGapBesideABedIsNoDoorThoughTheRowGoesOn) {
+  Drawing drawing(12.0, 18.0);
+  for (const double low : {1.0, 7.25}) {
+    drawing.Room(1.0, low, 9.0, low + 6.0);
+    drawing.Fill(6.0, low + 2.0, 9.2, low + 6.1, Space::kUnknown);
+    drawing.Fill(6.0, low + 2.0, 9.0, low + 2.05, Space::kOccupied);
+    drawing.Fill(6.0, low + 2.0, 6.05, low + 5.0, Space::kOccupied);
+    drawing.Fill(6.0, low + 5.0, 7.6, low + 5.05, Space::kOccupied);
+    drawing.Free(6.0, low + 5.05, 7.6, low + 6.0);
+    drawing.Fill(1.0, low + 6.0, 7.6, low + 6.25, Space::kOccupied);
+  }
+  const BuildingPlan plan = PlanOf(drawing);
+  EXPECT_EQ(plan.rooms.size(), 2u);
+  EXPECT_TRUE(plan.doors.empty());
+}
+
+// Six rooms of 3.4 by 5.2 m along a corridor, seen from their doors. A bed of 1
+// by 2 m in each hides what lies behind it; `wedge` m of the wall behind were
+// seen past its end, and so much of what lies beside it.
+BuildingPlan RoomsWithBeds(double wedge, double beside) {
+  Drawing drawing(26.0, 12.0);
+  drawing.Room(1.0, 1.0, 22.9, 3.0);
+  for (int i = 0; i < 6; ++i) {
+    const double x = 1.2 + 3.6 * i;
+    drawing.Room(x, 3.2, x + 3.4, 8.4);
+    drawing.Fill(x + 1.3, 4.9, x + 3.45, 8.5, Space::kUnknown);
+    drawing.Fill(x + 2.3, 4.9, x + 3.45, 4.9 + beside, Space::kOccupied);
+    drawing.Free(x + 2.3, 4.9, x + 3.4, 4.9 + beside);
+    drawing.Fill(x + 1.3, 4.9, x + 2.3, 4.95, Space::kOccupied);
+    drawing.Fill(x + 1.3, 4.9, x + 1.35, 6.9, Space::kOccupied);
+    drawing.Free(x + 1.3, 7.1, x + 1.3 + wedge, 8.4);
+    drawing.Fill(x + 1.3, 8.4, x + 1.3 + wedge, 8.45, Space::kOccupied);
+    drawing.Free(x + 0.3, 2.9, x + 1.2, 3.3);
+  }
+  return PlanOf(drawing);
+}
+
+TEST(BuildingPlanTest, WhatABedHidesOfARoomBelongsToIt) {
+  const BuildingPlan plan = RoomsWithBeds(0.6, 0.4);
+  ASSERT_EQ(plan.rooms.size(), 7u);
+  EXPECT_EQ(plan.rooms[0].kind, PlanRoom::Kind::kCorridor);
+  // Those with a neighbor on both sides.
+  for (std::size_t i = 1; i < 5; ++i) {
+    EXPECT_NEAR(plan.rooms[i].area, 3.5 * 5.3, 1.0);
+    EXPECT_EQ(plan.rooms[i].kind, PlanRoom::Kind::kRoom);
+  }
+}
+
 TEST(BuildingPlanTest, RowsOfRacksDoNotDivideAHall) {
   Drawing drawing(32.0, 18.0);
   drawing.Room(1.0, 1.0, 30.0, 16.0);
@@ -942,6 +992,31 @@ TEST(BuildingPlanTest, OneRoomAndOneCorridor) {
   const BuildingPlan corridor = PlanOf(Drawing(32.0, 5.0).Room(1, 1, 31, 3));
   ASSERT_EQ(corridor.rooms.size(), 1u);
   EXPECT_EQ(corridor.rooms[0].kind, PlanRoom::Kind::kCorridor);
+}
+
+// A closet of 1 by 4.5 m with its door in its short side.
+TEST(BuildingPlanTest, ASmallStripThatLeadsNowhereIsNoCorridor) {
+  Drawing drawing(26.0, 12.0);
+  drawing.Room(1.0, 1.0, 20.0, 3.0).Room(8.0, 3.2, 9.0, 7.7);
+  drawing.Free(8.1, 2.9, 8.9, 3.3);
+  const BuildingPlan plan = PlanOf(drawing);
+  ASSERT_EQ(plan.rooms.size(), 2u);
+  EXPECT_EQ(plan.rooms[0].kind, PlanRoom::Kind::kCorridor);
+  EXPECT_EQ(plan.rooms[1].kind, PlanRoom::Kind::kRoom);
+}
+
+// A hall of 24 by 20 m whose corner is out of the laser's sight, 5 m along both
+// walls.
+TEST(BuildingPlanTest, WallsOfAHallMeetOutOfSight) {
+  Drawing drawing(28.0, 24.0);
+  drawing.Room(1.0, 1.0, 25.0, 21.0);
+  drawing.Fill(20.0, 0.9, 25.1, 6.0, Space::kUnknown);
+  const std::vector<Pose2> path = {Pose2(5.0, 10.0, 0.0),
+                                   Pose2(18.0, 15.0, 0.0)};
+  const BuildingPlan plan = PlanOf(drawing, path);
+  ASSERT_EQ(plan.rooms.size(), 1u);
+  EXPECT_NEAR(plan.rooms[0].area, 24.0 * 20.0, 4.0);
+  EXPECT_TRUE(plan.rooms[0].is_entered);
 }
 
 TEST(BuildingPlanTest, NoWallsNoRooms) {

@@ -65,10 +65,11 @@ extern "C" void EndAtInterrupt(int) {
 }
 
 // What one solve gives back the next one takes: to get it from the system again
-// costs more than to fill it. Where memory is managed otherwise that is left as
-// it is.
+// costs more than to fill it. Where memory is managed otherwise, as by a
+// sanitizer, that is left as it is.
 void KeepMemory() {
-#ifdef __GLIBC__
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
   constexpr int kLargestKept = 32 << 20;
   constexpr int kMostKept = 1 << 30;
   mallopt(M_MMAP_THRESHOLD, kLargestKept);

@@ -172,8 +172,8 @@ void OccupancyGrid::Clear(int column0, int row0, int column1, int row1,
       }
       if (((own_x | own_y) & ~(kTileSize - 1)) != 0) break;
     }
-    x = (tile_x << kTileBits) + own_x;
-    y = (tile_y << kTileBits) + own_y;
+    x = tile_x * kTileSize + own_x;
+    y = tile_y * kTileSize + own_y;
   }
 }
 

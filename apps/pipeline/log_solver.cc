@@ -166,6 +166,8 @@ struct LogSolver::Processed {
   std::vector<SettledScan> settled;
   // None whose place is not.
   bool all_settled = false;
+  // As it is known now: the refiner may be scans ahead of who takes this.
+  double noise_scale = 1.0;
   double seconds = 0.0;
 };
 
@@ -239,6 +241,7 @@ LogSolver::Processed LogSolver::Process(const Scan& scan,
                 });
   processed.settled = Settled();
   processed.all_settled = refiner_.IsSettled();
+  processed.noise_scale = refiner_.noise_scale();
   processed.seconds = watch.Seconds();
   return processed;
 }
@@ -252,21 +255,22 @@ std::vector<SettledScan> LogSolver::Settled() {
 
 void LogSolver::TakeSettled(const std::vector<Scan>& scans,
                             const std::vector<SettledScan>& all,
-                            double* em_seconds) {
+                            double noise_scale, double* em_seconds) {
   for (const SettledScan& settled : all) {
     const auto index = static_cast<std::size_t>(settled.index);
     refined_[index] = settled.refined;
     num_settled_ = index + 1;
-    TakeKeyScan(scans, settled, em_seconds);
+    TakeKeyScan(scans, settled, noise_scale, em_seconds);
   }
 }
 
 void LogSolver::TakeKeyScan(const std::vector<Scan>& scans,
-                            const SettledScan& settled, double* em_seconds) {
+                            const SettledScan& settled, double noise_scale,
+                            double* em_seconds) {
   if (!settled.refined.is_key) return;
   const auto index = static_cast<std::size_t>(settled.index);
   builder_->AddScan(MakeKeyScan(settled.index, scans[index], settled.refined,
-                                settled.points, refiner_.noise_scale()));
+                                settled.points, noise_scale));
   if (options_.em_every > 0 && scans_since_em_ >= options_.em_every) {
     scans_since_em_ = 0;
     const ScopedTimer timer(em_seconds);
@@ -287,8 +291,9 @@ void LogSolver::TakeAnew(const std::vector<Scan>& scans, double* em_seconds) {
   map_.Renew(StructureDetectors());
   scans_since_em_ = 0;
   features_at_last_global_ = 0;
+  const double noise_scale = refiner_.noise_scale();
   ScanPointsOptions points = options_.odometry.points;
-  points.ScaleToNoise(refiner_.noise_scale());
+  points.ScaleToNoise(noise_scale);
   SettledScan settled;
   for (std::size_t i = 0; i < refined_.size(); ++i) {
     ++scans_since_em_;
@@ -297,7 +302,7 @@ void LogSolver::TakeAnew(const std::vector<Scan>& scans, double* em_seconds) {
     if (settled.refined.is_key) {
       ExtractScanPoints(scans[i], points, &settled.points);
     }
-    TakeKeyScan(scans, settled, em_seconds);
+    TakeKeyScan(scans, settled, noise_scale, em_seconds);
   }
 }
 
@@ -307,7 +312,7 @@ void LogSolver::TakeScan(const std::vector<Scan>& scans,
   double em_seconds = 0.0;
   refined_.push_back(processed.refined);
   ++scans_since_em_;
-  TakeSettled(scans, processed.settled, &em_seconds);
+  TakeSettled(scans, processed.settled, processed.noise_scale, &em_seconds);
   if (num_settled_ < refined_.size()) {
     // The robot is lost: until it is found a guess from the last key scan.
     RefinedScan& guess = refined_.back();
@@ -563,7 +568,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
     const Stopwatch watch;
     double em_seconds = 0.0;
     refiner_.Finish([&context] { return context.IsStopped(); });
-    TakeSettled(scans, Settled(), &em_seconds);
+    TakeSettled(scans, Settled(), refiner_.noise_scale(), &em_seconds);
     if (!result.interrupted) {
       const LateMetre late =
           FindLateMetre(refiner_.metre_uses(), options_.late_metre);

@@ -295,11 +295,13 @@ class LogSolver {
   // Whether a stage that began with `begin` scans ends after so many.
   bool EndsStage(std::size_t begin, std::size_t end,
                  const Processed& last) const;
-  // Those whose place is settled go on into the map.
+  // Those whose place is settled go on into the map; `noise_scale` as it was
+  // when they were (the refiner may be ahead).
   void TakeSettled(const std::vector<Scan>& scans,
-                   const std::vector<SettledScan>& all, double* em_seconds);
-  void TakeKeyScan(const std::vector<Scan>& scans, const SettledScan& settled,
+                   const std::vector<SettledScan>& all, double noise_scale,
                    double* em_seconds);
+  void TakeKeyScan(const std::vector<Scan>& scans, const SettledScan& settled,
+                   double noise_scale, double* em_seconds);
   // Makes the map once more: parts of the track that hung loose were found
   // when all scans were in.
   void TakeAnew(const std::vector<Scan>& scans, double* em_seconds);

@@ -631,7 +631,8 @@ std::vector<KeyView> Mirrored(std::vector<KeyView> track) {
 double Search::MirroredSupport() {
   if (mirrored_support_) return *mirrored_support_;
   const std::vector<KeyView> mirrored = Mirrored(track_);
-  Search search(map_, mirrored, std::nullopt, options_);
+  const std::optional<Pose2> anywhere;
+  Search search(map_, mirrored, anywhere, options_);
   const std::size_t windows = search.num_windows();
   const std::size_t searches = std::min(windows, kBatch);
   for (std::size_t i = 0; i < searches; ++i) {

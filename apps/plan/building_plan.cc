@@ -4,6 +4,7 @@
 #include <plumbline/plan/drawn_lines.h>
 #include <plumbline/plan/free_standing.h>
 #include <plumbline/plan/furniture_rows.h>
+#include <plumbline/plan/narrow_ends.h>
 #include <plumbline/plan/room_shape.h>
 #include <plumbline/plan/rooms_with_doors.h>
 #include <plumbline/plan/sides.h>
@@ -354,6 +355,7 @@ Division Divide(std::vector<DrawnLine> drawn, const SpaceGrid& space,
                       &division.region);
   JoinAcrossFreeStanding(space, division.arrangement, division.drawn,
                          &division.region);
+  JoinNarrowEnds(division.arrangement, path, &division.region);
   GiveFrontsToRooms(division.arrangement, division.drawn, &division.region);
   return division;
 }

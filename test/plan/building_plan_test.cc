@@ -584,6 +584,22 @@ TEST(BuildingPlanTest, WhatABedHidesOfARoomBelongsToIt) {
   }
 }
 
+// Four cars of 1.8 by 4.8 m are parked at a wall of a hall, 0.8 m apart.
+TEST(BuildingPlanTest, GapsBetweenParkedCarsAreNoRooms) {
+  Drawing drawing(28.0, 20.0);
+  drawing.Room(1.0, 1.0, 25.0, 17.0);
+  for (int i = 0; i < 4; ++i) {
+    const double x = 4.0 + 2.6 * i;
+    drawing.Fill(x, 1.0, x + 1.8, 5.8, Space::kOccupied);
+    drawing.Fill(x + 0.05, 0.9, x + 1.75, 5.75, Space::kUnknown);
+  }
+  const std::vector<Pose2> path = {Pose2(3.0, 10.0, 0.0),
+                                   Pose2(20.0, 10.0, 0.0)};
+  const BuildingPlan plan = PlanOf(drawing, path);
+  EXPECT_EQ(plan.rooms.size(), 1u);
+  EXPECT_TRUE(plan.doors.empty());
+}
+
 TEST(BuildingPlanTest, RowsOfRacksDoNotDivideAHall) {
   Drawing drawing(32.0, 18.0);
   drawing.Room(1.0, 1.0, 30.0, 16.0);

@@ -11,8 +11,10 @@ namespace {
 // A narrow region is no wider than this, m, and not larger than that, m^2.
 constexpr double kNarrow = 1.3;
 constexpr double kLargest = 8.0;
-// Share of its width that is open; and what may be open to other regions, m.
+// Share of its width that is open, at its end and not along its side; and what
+// may be open to other regions, m.
 constexpr double kWholeWidth = 0.85;
+constexpr double kAlongTheSide = 1.3;
 constexpr double kElsewhere = 0.3;
 // Share of the rest of its border that is wall: what was seen of a room through
 // its door is as narrow, but has no walls beside it.
@@ -79,7 +81,7 @@ void JoinNarrowEnds(const Arrangement& arrangement,
     const double width = SidesOfRectangle(outlines.front()).first;
     const BorderLengths& border = borders[id];
     if (widest < 0 || areas[widest] < areas[id] || open < kWholeWidth * width ||
-        all - open > kElsewhere ||
+        open > kAlongTheSide * width || all - open > kElsewhere ||
         border.Of(Mark::kWall) < kWalled * (border.length() - open) ||
         HoldsOne(outlines, path)) {
       continue;

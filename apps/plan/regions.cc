@@ -19,8 +19,10 @@ using Eigen::Vector2d;
 // Space that was not seen is filled up to this, m^2.
 constexpr double kMaxPocket = 5.0;
 // Of a room that furniture hides in part: what was not seen of a face that is
-// larger than a pocket counts so much less when so large a share of its border,
-// and more, is wall or door, and not less up to this one.
+// larger than a pocket, up to so much, m^2, counts so much less when so large a
+// share of its border, and more, is wall or door, and not less up to this one.
+// What is larger may be the next room, whose wall was seen from there alone.
+constexpr double kMostHidden = 9.0;
 constexpr double kHiddenFloor = 0.5;
 constexpr double kEnclosed = 0.7;
 constexpr double kBarelyEnclosed = 0.3;
@@ -85,9 +87,12 @@ std::vector<BorderLengths> BordersOfFaces(const Arrangement& arrangement) {
 
 // What a square metre of a face counts that was not seen. A bed hides half of a
 // room that was looked into through its door, but not the walls around it.
-double WeightOfUnknown(const Polygon& face, const BorderLengths& border) {
+double WeightOfUnknown(const Polygon& face, double unknown,
+                       const BorderLengths& border) {
   const double length = border.length();
-  if (length <= 0.0 || face.Area() <= kMaxPocket) return 1.0;
+  if (length <= 0.0 || face.Area() <= kMaxPocket || unknown > kMostHidden) {
+    return 1.0;
+  }
   const double wall =
       (border.Of(Mark::kWall) + border.Of(Mark::kDoor)) / length;
   const double enclosed =
@@ -101,7 +106,8 @@ std::vector<bool> InsideOf(const Arrangement& arrangement,
   const std::vector<BorderLengths> borders = BordersOfFaces(arrangement);
   for (std::size_t i = 0; i < arrangement.faces.size(); ++i) {
     cut.AddNodeCost(i, arrangement.free[i],
-                    WeightOfUnknown(arrangement.faces[i], borders[i]) *
+                    WeightOfUnknown(arrangement.faces[i],
+                                    arrangement.unknown[i], borders[i]) *
                         arrangement.unknown[i]);
   }
   for (const ArrangementEdge& edge : arrangement.edges) {

@@ -70,6 +70,9 @@ constexpr double kLongOutside = 10.0;
 constexpr double kOftenOutside = 0.05;
 constexpr double kFarther = 2.0;
 constexpr double kLessOutside = 0.5;
+// What is a room then has so much wall around it, and lies open for no more.
+constexpr double kClosedHall = 0.6;
+constexpr double kOpenHall = 0.2;
 // Rooms with an opening of this between them are reached from each other, m:
 // the leaf of a door may hide much of it.
 constexpr double kLeastWay = 0.25;
@@ -991,6 +994,9 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
     BuildingPlanOptions farther = options;
     farther.reach *= kFarther;
     farther.beyond = options.reach;
+    // Drawn so far, the fronts of a yard meet, too.
+    farther.min_closed = std::max(options.min_closed, kClosedHall);
+    farther.max_open = std::min(options.max_open, kOpenHall);
     Rooms other = FindRooms(lines, space, path, farther);
     if (other.way.outside_length <= kLessOutside * found.way.outside_length) {
       found = std::move(other);

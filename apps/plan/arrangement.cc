@@ -122,4 +122,16 @@ Arrangement Arrange(const std::vector<DrawnLine>& drawn,
   return arrangement;
 }
 
+std::map<int, RegionParts> PartsOfRegions(const Arrangement& arrangement,
+                                          const std::vector<int>& region) {
+  std::map<int, RegionParts> parts;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    if (region[i] < 0) continue;
+    RegionParts& own = parts[region[i]];
+    own.faces.push_back(arrangement.faces[i]);
+    own.area += arrangement.faces[i].Area();
+  }
+  return parts;
+}
+
 }  // namespace plumbline

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <map>
 #include <vector>
 
 namespace plumbline {
@@ -56,6 +57,17 @@ struct Arrangement {
   std::vector<double> unknown;
   std::vector<ArrangementEdge> edges;
 };
+
+/// The faces of a region, and m^2 of them all.
+struct RegionParts {
+  std::vector<Polygon> faces;
+  double area = 0.0;
+};
+
+/// By the number of the region what belongs to it. `region`: that of each face,
+/// -1 for none.
+std::map<int, RegionParts> PartsOfRegions(const Arrangement& arrangement,
+                                          const std::vector<int>& region);
 
 /// Cuts the plane along lines. The same lines give the same faces in order.
 Arrangement Arrange(const std::vector<DrawnLine>& drawn,

@@ -145,18 +145,12 @@ void JoinAcrossFurniture(const Arrangement& arrangement,
   const std::vector<std::vector<bool>> driven = DrivenAcross(drawn, path);
   for (bool is_changed = true; is_changed;) {
     is_changed = false;
-    std::map<int, std::vector<Polygon>> faces;
-    std::map<int, double> areas;
-    for (std::size_t i = 0; i < region->size(); ++i) {
-      const int id = (*region)[i];
-      if (id < 0) continue;
-      faces[id].push_back(arrangement.faces[i]);
-      areas[id] += arrangement.faces[i].Area();
-    }
+    const std::map<int, RegionParts> parts =
+        PartsOfRegions(arrangement, *region);
     const std::map<int, std::map<int, Ways>> ways =
         WaysBetween(arrangement, drawn, driven, *region);
     const auto is_way_out = [&](int other, const Ways& way) {
-      return areas[other] >= kLeastRoom &&
+      return parts.at(other).area >= kLeastRoom &&
              (way.has_row || way.widest >= kLeastWayOut);
     };
     for (const auto& [part, others] : ways) {
@@ -165,7 +159,7 @@ void JoinAcrossFurniture(const Arrangement& arrangement,
       for (const auto& [other, way] : others) {
         if (is_way_out(other, way) && way.has_row) into = other;
       }
-      if (into < 0 || areas[part] > areas[into]) continue;
+      if (into < 0 || parts.at(part).area > parts.at(into).area) continue;
       // Two rooms along a corridor have a door each to it.
       bool is_shared = false;
       for (const auto& [third, way] : others) {
@@ -175,8 +169,9 @@ void JoinAcrossFurniture(const Arrangement& arrangement,
         is_shared = is_shared || (of_into != ways.at(into).end() &&
                                   is_way_out(third, of_into->second));
       }
-      if (is_shared || IsLongAndNarrow(UnionOf(faces[into]).front()) ||
-          (has_others && IsLongAndNarrow(UnionOf(faces[part]).front()))) {
+      if (is_shared || IsLongAndNarrow(UnionOf(parts.at(into).faces).front()) ||
+          (has_others &&
+           IsLongAndNarrow(UnionOf(parts.at(part).faces).front()))) {
         continue;
       }
       std::replace(region->begin(), region->end(), part, into);

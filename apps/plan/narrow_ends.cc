@@ -20,13 +20,9 @@ constexpr double kElsewhere = 0.3;
 // its door is as narrow, but has no walls beside it.
 constexpr double kWalled = 0.5;
 
-bool HoldsOne(const std::vector<Polygon>& outlines,
-              const std::vector<Pose2>& path) {
+bool HoldsOne(const Polygon& outline, const std::vector<Pose2>& path) {
   return std::any_of(path.begin(), path.end(), [&](const Pose2& pose) {
-    return std::any_of(outlines.begin(), outlines.end(),
-                       [&](const Polygon& outline) {
-                         return outline.Contains(pose.head<2>());
-                       });
+    return outline.Contains(pose.head<2>());
   });
 }
 
@@ -37,14 +33,8 @@ void JoinNarrowEnds(const Arrangement& arrangement,
   const auto region_of = [&](int face) {
     return face < 0 ? -1 : (*region)[static_cast<std::size_t>(face)];
   };
-  std::map<int, std::vector<Polygon>> faces;
-  std::map<int, double> areas;
-  for (std::size_t i = 0; i < region->size(); ++i) {
-    const int id = (*region)[i];
-    if (id < 0) continue;
-    faces[id].push_back(arrangement.faces[i]);
-    areas[id] += arrangement.faces[i].Area();
-  }
+  const std::map<int, RegionParts> regions =
+      PartsOfRegions(arrangement, *region);
   // Openings by the regions on both sides, either first, m.
   std::map<int, std::map<int, double>> openings;
   std::map<int, BorderLengths> borders;
@@ -60,13 +50,12 @@ void JoinNarrowEnds(const Arrangement& arrangement,
     borders[right].Add(edge.lengths);
   }
   std::map<int, int> joined;
-  for (const auto& [id, parts] : faces) {
-    if (areas[id] > kLargest) continue;
-    const std::vector<Polygon> outlines = UnionOf(parts);
-    if (outlines.size() != 1 ||
-        !Offset(outlines.front(), -0.5 * kNarrow).empty()) {
-      continue;
-    }
+  for (const auto& [id, parts] : regions) {
+    if (parts.area > kLargest) continue;
+    const std::vector<Polygon> outlines = UnionOf(parts.faces);
+    if (outlines.size() != 1) continue;
+    const Polygon& outline = outlines.front();
+    if (!Offset(outline, -0.5 * kNarrow).empty()) continue;
     int widest = -1;
     double open = 0.0;
     double all = 0.0;
@@ -78,12 +67,14 @@ void JoinNarrowEnds(const Arrangement& arrangement,
         widest = other;
       }
     }
-    const double width = SidesOfRectangle(outlines.front()).first;
+    const double width = SidesOfRectangle(outline).first;
     const BorderLengths& border = borders[id];
-    if (widest < 0 || areas[widest] < areas[id] || open < kWholeWidth * width ||
-        open > kAlongTheSide * width || all - open > kElsewhere ||
+    // To larger ones alone, so that no two go to each other.
+    if (widest < 0 || regions.at(widest).area <= parts.area ||
+        open < kWholeWidth * width || open > kAlongTheSide * width ||
+        all - open > kElsewhere ||
         border.Of(Mark::kWall) < kWalled * (border.length() - open) ||
-        HoldsOne(outlines, path)) {
+        HoldsOne(outline, path)) {
       continue;
     }
     joined[id] = widest;

@@ -24,6 +24,8 @@ namespace {
 // First and last key scans of a track that are searched with.
 constexpr std::size_t kLocalKeys = 12;
 constexpr std::size_t kGlobalKeys = 24;
+// Around the place where odometry has them they are looked for so far, m.
+constexpr double kOdometryReach = 15.0;
 // Odometry that moves by no more has not moved, m and rad; so many scans after
 // a gap it may still tell of the way at once.
 constexpr double kStandsWay = 0.02;
@@ -929,10 +931,17 @@ void OdometryRefiner::CatchUp(const Scan& scan, const Pose2& by_wheels,
   }
   now->refined.pose = Compose(shift, now->refined.pose);
   for (TrackKey& key : open_->keys) key.pose = Compose(shift, key.pose);
-  for (TrackKey& key : track_.keys) key.pose = Compose(shift, key.pose);
-  track_.last_pose = Compose(shift, track_.last_pose);
-  track_.matched_pose = Compose(shift, track_.matched_pose);
+  MoveTrack(shift);
   RebuildReference(&track_);
+}
+
+void OdometryRefiner::MoveTrack(const Pose2& shift) {
+  for (TrackKey& key : track_.keys) key.pose = Compose(shift, key.pose);
+  track_.wheels.MoveBy(shift);
+  for (Pose2* pose :
+       {&track_.last_pose, &track_.matched_pose, &still_pose_, &ahead_.pose}) {
+    *pose = Compose(shift, *pose);
+  }
 }
 
 void OdometryRefiner::BeginTrack(const Scan& scan, SettledScan* first) {
@@ -1089,23 +1098,17 @@ void OdometryRefiner::Tie(bool last) {
   if (first.tie == TrackTie::kNone && count >= tracking.first_global_keys &&
       (last || count >= open_->next_global)) {
     open_->next_global = 2 * count;
-    std::vector<std::size_t> where(search_.seen().size());
-    std::iota(where.begin(), where.end(), std::size_t{0});
     const std::size_t end = open_->keys.size();
     const std::size_t begin = end > kGlobalKeys ? end - kGlobalKeys : 0;
     middle = (begin + end) / 2;
-    if (search_.FindAnywhere(open_->keys, search_.AreaOf(where), begin, end,
-                             open_->seen_through, nullptr, &found)) {
-      const std::size_t nearest = search_.NearestOf(found, where);
-      const SeenKey& key = search_.seen()[nearest];
-      if (IsInReach(found, middle, nearest) &&
-          (!open_->odometry_holds ||
-           AgreesWithOdometry(found, middle, nearest))) {
-        first.tie = TrackTie::kMatched;
-        first.since = key.scan;
-        first.since_key.mean = key.pose;
-        part_ = key.part;
-      }
+    std::size_t since = 0;
+    if (FindWhereOdometryLeads(begin, end, &found, &since) ||
+        FindInAll(begin, end, &found, &since)) {
+      const SeenKey& key = search_.seen()[since];
+      first.tie = TrackTie::kMatched;
+      first.since = key.scan;
+      first.since_key.mean = key.pose;
+      part_ = key.part;
     }
   }
   if (first.tie == TrackTie::kMatched) {
@@ -1239,9 +1242,9 @@ bool OdometryRefiner::IsInReach(const FoundTrack& found, std::size_t middle,
          kJumpWay + kFastest * open_->blind_seconds;
 }
 
-bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
-                                         std::size_t middle,
-                                         std::size_t since) const {
+double OdometryRefiner::AgainstOdometry(const FoundTrack& found,
+                                        std::size_t middle,
+                                        std::size_t since) const {
   // What neighbouring matches have in common adds up faster than a random walk.
   const auto generous = [this](const std::vector<Pose2>& poses) {
     UncertainPose2 way = DriftAlong(poses, options_.drift);
@@ -1257,7 +1260,7 @@ bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
           blind_ways_.rbegin(), blind_ways_.rend(),
           [&key](const BlindWay& one) { return one.to == key.scan; });
       // A guess lies between of which nothing tells.
-      if (way == blind_ways_.rend()) return true;
+      if (way == blind_ways_.rend()) return 0.0;
       predicted = Compose(Compose(predicted, generous(piece)), way->motion);
       piece.clear();
     }
@@ -1277,9 +1280,58 @@ bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
       predicted.covariance + Diagonal(kTieSigma, kTieAngle);
   const double innovation = left.dot(covariance.inverse() * left);
   if (trace_) trace_("odometry against it " + std::to_string(innovation));
-  return innovation <= options_.tracking.max_innovation &&
-         std::abs(left[2]) <=
-             MostWrongTurn(open_->blind_way, open_->blind_turn);
+  return std::abs(left[2]) <= MostWrongTurn(open_->blind_way, open_->blind_turn)
+             ? innovation
+             : std::numeric_limits<double>::infinity();
+}
+
+bool OdometryRefiner::AgreesWithOdometry(const FoundTrack& found,
+                                         std::size_t middle,
+                                         std::size_t since) const {
+  return AgainstOdometry(found, middle, since) <=
+         options_.tracking.max_innovation;
+}
+
+bool OdometryRefiner::FindWhereOdometryLeads(std::size_t begin, std::size_t end,
+                                             FoundTrack* found,
+                                             std::size_t* since) const {
+  if (!open_->odometry_holds) return false;
+  const std::size_t middle = (begin + end) / 2;
+  const Pose2& there = open_->keys[middle].pose;
+  const std::vector<std::size_t> where =
+      search_.KeysAround(there, kOdometryReach);
+  if (where.size() < TrackSearch::kShortestVisit) return false;
+  TrackSearch::SearchArea area = search_.AreaOf(where);
+  area.center = there;
+  area.window = kOdometryReach;
+  std::vector<FoundTrack> hypotheses;
+  for (FoundTrack& one : search_.FindAll(open_->keys, area, begin, end,
+                                         open_->seen_through, nullptr)) {
+    const std::size_t nearest = search_.NearestOf(one, where);
+    if (!IsInReach(one, middle, nearest)) continue;
+    const double against = AgainstOdometry(one, middle, nearest);
+    if (against > options_.tracking.max_innovation) continue;
+    // As likely as odometry has it there, so is it a rival.
+    one.quality *= std::exp(-0.5 * against);
+    hypotheses.push_back(one);
+  }
+  if (!search_.IsClear(hypotheses, found)) return false;
+  *since = search_.NearestOf(*found, where);
+  return true;
+}
+
+bool OdometryRefiner::FindInAll(std::size_t begin, std::size_t end,
+                                FoundTrack* found, std::size_t* since) const {
+  std::vector<std::size_t> where(search_.seen().size());
+  std::iota(where.begin(), where.end(), std::size_t{0});
+  if (!search_.FindAnywhere(open_->keys, search_.AreaOf(where), begin, end,
+                            open_->seen_through, nullptr, found)) {
+    return false;
+  }
+  const std::size_t middle = (begin + end) / 2;
+  *since = search_.NearestOf(*found, where);
+  return IsInReach(*found, middle, *since) &&
+         (!open_->odometry_holds || AgreesWithOdometry(*found, middle, *since));
 }
 
 void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
@@ -1336,8 +1388,7 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
     key.pose = Compose(shift, key.pose);
     search_.Add(key, part_);
   }
-  for (TrackKey& key : track_.keys) key.pose = Compose(shift, key.pose);
-  track_.last_pose = Compose(shift, track_.last_pose);
+  MoveTrack(shift);
   // What was seen before goes on being the reference.
   if (first.tie == TrackTie::kMatched && first.since < 0) {
     std::deque<TrackKey>& before = open_->before.keys;

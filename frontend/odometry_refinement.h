@@ -417,18 +417,33 @@ class OdometryRefiner {
   UncertainPose2 BlindMotion() const;
   // Of a tie that is a guess.
   Eigen::Matrix3d LooseCovariance() const;
-  // Whether a pose of the open track's key scan `middle` lies within what
-  // odometry and the tracks leave open since the archive's key scan `since`;
-  // true where they say nothing of it.
+  // Chi-square (3 degrees of freedom) of a pose of the open track's key scan
+  // `middle` against odometry and the tracks since the archive's key scan
+  // `since`; infinite where it cannot have turned by so much, 0 where they say
+  // nothing of it.
+  double AgainstOdometry(const FoundTrack& found, std::size_t middle,
+                         std::size_t since) const;
+  // Whether it lies within what these leave open.
   bool AgreesWithOdometry(const FoundTrack& found, std::size_t middle,
                           std::size_t since) const;
   // Whether a robot can have got there in the time without a match, however
   // wrong odometry is; true where it cannot be told.
   bool IsInReach(const FoundTrack& found, std::size_t middle,
                  std::size_t since) const;
+  // Where key scans [begin, end) of the open track lie in what was seen around
+  // the place that odometry leads to, where it tells of the way: a place is no
+  // rival where odometry makes it unlikely. `since`: the archive's key scan
+  // next to it.
+  bool FindWhereOdometryLeads(std::size_t begin, std::size_t end,
+                              FoundTrack* found, std::size_t* since) const;
+  // Where they lie in all that was ever seen.
+  bool FindInAll(std::size_t begin, std::size_t end, FoundTrack* found,
+                 std::size_t* since) const;
   // Looks once more for what hangs on ties that proved doubtful.
   void JoinDoubtfulParts();
   void Settle(const Pose2& shift, const RefinedScan& first);
+  // Moves the track, all that lies in its frame, by a motion of that frame.
+  void MoveTrack(const Pose2& shift);
 
   const OdometryRefinementOptions usual_options_;
   // For the laser's noise.

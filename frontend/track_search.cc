@@ -314,6 +314,18 @@ TrackSearch::SearchArea TrackSearch::AreaOf(
   return view;
 }
 
+std::vector<std::size_t> TrackSearch::KeysAround(const Pose2& pose,
+                                                 double reach) const {
+  std::vector<std::size_t> around;
+  for (std::size_t k = 0; k < seen_.size(); ++k) {
+    if (seen_[k].part == seen_.back().part &&
+        (seen_[k].pose - pose).head<2>().norm() <= reach + kNear) {
+      around.push_back(k);
+    }
+  }
+  return around;
+}
+
 bool TrackSearch::FindAnywhere(const std::vector<TrackKey>& keys,
                                const SearchArea& area, std::size_t begin,
                                std::size_t end, double seen_through,

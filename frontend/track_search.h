@@ -138,6 +138,9 @@ class TrackSearch {
     double window;
   };
   SearchArea AreaOf(const std::vector<std::size_t>& where) const;
+  /// Key scans of seen(), ascending, that say what was seen within `reach` (m)
+  /// of a pose. Of the last one's part only: where others lie is a guess.
+  std::vector<std::size_t> KeysAround(const Pose2& pose, double reach) const;
 
   /// The same in an area. Visits of `found` are positions in its `where`.
   /// `nodes`: as ScanMatcher::Peaks has it.

@@ -1,5 +1,6 @@
 #include <plumbline/frontend/wheel_track.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -68,6 +69,14 @@ void WheelTrack::Follow(const Eigen::Vector2d& matched,
   position_ += gain * innovation;
   const Eigen::Matrix2d left = covariance_ - gain * covariance_;
   covariance_ = 0.5 * (left + left.transpose()) + Isotropic(kLeastVariance);
+}
+
+void WheelTrack::MoveBy(const Pose2& motion) {
+  const Eigen::Matrix2d rotation =
+      Eigen::Rotation2Dd(motion[2]).toRotationMatrix();
+  position_ = rotation * position_ + motion.head<2>();
+  const Eigen::Matrix2d moved = rotation * covariance_ * rotation.transpose();
+  covariance_ = 0.5 * (moved + moved.transpose());
 }
 
 }  // namespace plumbline

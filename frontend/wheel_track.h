@@ -37,6 +37,9 @@ class WheelTrack {
   void Follow(const Eigen::Vector2d& matched,
               const Eigen::Matrix3d& information);
 
+  /// The map's frame is moved: what lay at p lies at `motion` p (m, m, rad).
+  void MoveBy(const Pose2& motion);
+
   /// Writes or reads all of it (state_archive.h).
   template <typename Archive>
   friend void Exchange(Archive& archive, WheelTrack& track) {

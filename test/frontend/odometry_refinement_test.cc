@@ -941,6 +941,56 @@ TEST(OdometryRefinerTest, OdometryThatCatchesUpAfterAGapTellsOfTheWay) {
   }
 }
 
+// Along a corridor of equal pillars the robot turns back while scans are
+// missing. One pillar looks like the next; odometry, once it catches up, says
+// which.
+TEST(OdometryRefinerTest, OdometryTellsLookalikesApartAfterAGap) {
+  std::vector<WallEnds> walls = Room(60.0, 2.4);
+  for (double x = -28.0; x < 29.0; x += 2.5) {
+    for (const WallEnds& side : testing::Moved(Room(0.8, 0.6), {x, 1.2, 0.0})) {
+      walls.push_back(side);
+    }
+  }
+  Laser laser;
+  laser.sigma = 0.01;
+  Noise noise(5);
+  OdometryRefiner refiner(RefinerOptions());
+  constexpr int kGap = 100;
+  Pose2 truth(-8.0, -0.2, 0.0);
+  Pose2 before = truth;
+  double time = 100.0;
+  std::vector<Pose2> poses;
+  std::vector<RefinedScan> refined;
+  for (int i = 0; i < 190; ++i) {
+    time += 0.2;
+    if (i == kGap) {
+      before = truth;
+      truth = Compose(truth, {0.6, 0.2, kPi});
+      time += 10.0;
+    } else if (i > 0) {
+      truth = Compose(truth, {0.1, 0.0, 0.0});
+    }
+    Scan scan = MakeScan(walls, truth, laser, &noise);
+    scan.timestamp = time;
+    scan.odometry = i == kGap ? before : truth;
+    poses.push_back(truth);
+    refiner.Process(scan);
+    refined = TakeAll(&refiner, std::move(refined));
+  }
+  refiner.Finish();
+  refined = TakeAll(&refiner, std::move(refined));
+  ASSERT_EQ(refined.size(), poses.size());
+  EXPECT_EQ(refined[kGap].tie, TrackTie::kMatched);
+  EXPECT_GE(refined[kGap].since, 0);
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    EXPECT_LT(PositionError(refined[i].pose, poses[i]), 0.15) << i;
+    // All that lies in the track's frame moves with it.
+    if (i == 0 || i == kGap) continue;
+    const Pose2 step = Between(refined[i - 1].pose, refined[i].pose);
+    EXPECT_LT(PositionError(step, {0.1, 0.0, 0.0}), 0.05) << i;
+  }
+}
+
 // The first scan after the gap may fit a little aside, and as odometry stands
 // still the robot is then taken to go on as before: odometry has not caught up
 // by that.

@@ -158,6 +158,24 @@ TEST(WheelTrackTest, TurnedTheWorldTurnsIt) {
   }
 }
 
+// By hand: (3, -4) turned by a quarter is (4, 3).
+TEST(WheelTrackTest, MovesWithTheFrame) {
+  WheelTrack track;
+  track.Follow({3.0, -4.0}, kClear);
+  track.Move({1.0, 0.0, 0.0}, 0.0);
+  track.Follow({4.0, -4.0}, Eigen::Vector3d(1e6, 1.0, 1e6).asDiagonal());
+  const Eigen::Vector2d before = track.position();
+  const Eigen::Matrix2d covariance = track.Covariance();
+  track.MoveBy({10.0, 20.0, 0.5 * kPi});
+  EXPECT_NEAR(track.position().x(), 10.0 - before.y(), 1e-12);
+  EXPECT_NEAR(track.position().y(), 20.0 + before.x(), 1e-12);
+  EXPECT_NEAR(before.y(), -4.0, 1e-12);
+  // What was across is along.
+  EXPECT_LT(covariance(0, 0), 0.9 * covariance(1, 1));
+  EXPECT_NEAR(track.Covariance()(0, 0), covariance(1, 1), 1e-15);
+  EXPECT_NEAR(track.Covariance()(1, 1), covariance(0, 0), 1e-15);
+}
+
 TEST(WheelTrackTest, IsWrittenAndRead) {
   WheelTrack track = At({1.0, 2.0});
   track.Move(Pose2(0.3, 0.0, 0.1), 0.4);

@@ -1414,9 +1414,20 @@ void OdometryRefiner::Finish(const std::function<bool()>& stop) {
   if (open_ != nullptr) Tie(true);
   if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
   guessed_ = -1;
+  const std::vector<GuessedTurn> turns =
+      FindGuessedTurns(search_.seen(), loose_of_, options_.guessed_turns);
   late_ties_ = JoinParts(options_.tracking, options_.drift, loose_of_,
                          blind_ways_, &search_, &loose_);
   JoinDoubtfulParts();
+  for (const GuessedTurn& turn : turns) {
+    const bool is_tied =
+        std::any_of(late_ties_.begin(), late_ties_.end(),
+                    [&](const LateTie& tie) { return tie.scan == turn.scan; });
+    search_.Trace("TURN of the guess at scan " + std::to_string(turn.scan) +
+                  ": " + std::to_string(RadToDeg(turn.turn)) +
+                  (is_tied ? " (tied)" : ""));
+    if (!is_tied) guessed_turns_.push_back(turn);
+  }
   search_.set_stop(nullptr);
   // No scan follows.
   search_.Clear();

@@ -3,6 +3,7 @@
 
 #include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/guessed_turns.h>
 #include <plumbline/frontend/match_drift.h>
 #include <plumbline/frontend/odometry_calibration.h>
 #include <plumbline/frontend/part_joining.h>
@@ -93,6 +94,7 @@ struct OdometryRefinementOptions {
   /// A turn between scans from which on the wide search is always made, rad.
   double search_turn = DegToRad(4.0);
   TrackingOptions tracking;
+  GuessedTurnOptions guessed_turns;
   /// Noise of the laser's ranges (standard deviation, m); 0: as the scans so
   /// far show it.
   double range_sigma = 0.0;
@@ -185,6 +187,10 @@ class OdometryRefiner {
 
   /// Parts that Finish found, in the order of scans.
   const std::vector<LateTie>& late_ties() const { return late_ties_; }
+  /// Guesses whose turn the directions of walls correct, in the order of scans.
+  const std::vector<GuessedTurn>& guessed_turns() const {
+    return guessed_turns_;
+  }
   /// What motions between key scans made of odometry's metre, in the order of
   /// the log (late_metre.h).
   const std::vector<MetreUse>& metre_uses() const { return metre_uses_; }
@@ -476,6 +482,7 @@ class OdometryRefiner {
   // Ties by one match with all that was seen.
   std::vector<FoundTie> found_ties_;
   std::vector<LateTie> late_ties_;
+  std::vector<GuessedTurn> guessed_turns_;
   std::vector<MetreUse> metre_uses_;
   // Odometry at the last key scan; sum of chi-squares of the motions that were
   // compared with matches.

@@ -564,6 +564,7 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
   LogSolverResult& result = context.result;
   result.interrupted = refined_.size() < scans.size();
   std::vector<LooseTrack> missed;
+  std::vector<GuessedTurn> guessed_turns;
   {
     const Stopwatch watch;
     double em_seconds = 0.0;
@@ -577,8 +578,14 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
         CorrectMotions(late.corrections, &refined_);
       }
       missed = CorrectMissedSteps(&context);
-      if (!refiner_.late_ties().empty() || !late.corrections.empty() ||
-          !missed.empty()) {
+      if (options_.structure) guessed_turns = refiner_.guessed_turns();
+      for (const GuessedTurn& guessed : guessed_turns) {
+        Pose2& motion =
+            refined_[static_cast<std::size_t>(guessed.scan)].since_key.mean;
+        motion = WithTurn(motion, guessed.turn);
+      }
+      if (!refiner_.late_ties().empty() || !guessed_turns.empty() ||
+          !late.corrections.empty() || !missed.empty()) {
         TakeAnew(scans, &em_seconds);
       }
     }
@@ -598,6 +605,10 @@ LogSolverResult LogSolver::FinishWith(const std::vector<Scan>& scans, Stage end,
   result.noise_scale = refiner_.noise_scale();
   ScaleToNoise(result.noise_scale);
   result.loose = refiner_.loose();
+  for (const GuessedTurn& guessed : guessed_turns) {
+    result.loose[static_cast<std::size_t>(guessed.loose)].why +=
+        ", turned into the directions of the walls before it";
+  }
   result.loose.insert(result.loose.end(), missed.begin(), missed.end());
   result.feature_matches = builder_->num_matches();
   result.features_created = builder_->num_created();

@@ -161,6 +161,75 @@ TEST_F(LogSolverTest, WhatHangsLooselyIsReported) {
   EXPECT_FALSE(result.loose.front().why.empty());
 }
 
+// Of the length of all walls, the share that is parallel or at right angles to
+// the first ones.
+double ParallelShare(const Graph& graph, const Graph& first) {
+  const auto for_each = [](const Graph& of, const auto& use) {
+    for (const Feature* feature : of.Features()) {
+      if (!feature->type->Is(FeatureRole::kWall) || feature->level != 0) {
+        continue;
+      }
+      const std::optional<Wall> wall = WallOf(*feature);
+      if (wall) use(*wall);
+    }
+  };
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for_each(first, [&](const Wall& wall) {
+    sum += wall.length() * Eigen::Vector2d(std::cos(4.0 * wall.angle),
+                                           std::sin(4.0 * wall.angle));
+  });
+  const double direction = std::atan2(sum.y(), sum.x());
+  double parallel = 0.0;
+  double all = 0.0;
+  for_each(graph, [&](const Wall& wall) {
+    all += wall.length();
+    if (std::abs(NormalizeAngle(4.0 * wall.angle - direction)) <
+        4.0 * DegToRad(3.0)) {
+      parallel += wall.length();
+    }
+  });
+  return parallel / all;
+}
+
+// Odometry turns wrongly while scans are missing: beyond the gap is another
+// wing, but its walls are parallel to what was seen before.
+TEST_F(LogSolverTest, AGuessIsTurnedIntoTheDirectionsOfTheBuilding) {
+  Log log = Office(400);
+  Pose2 shift = Pose2::Zero();
+  for (std::size_t i = 200; i < log.scans.size(); ++i) {
+    Scan& scan = log.scans[i];
+    scan.timestamp += 100.0;
+    // As in a mirror.
+    std::reverse(scan.ranges.begin(), scan.ranges.end());
+    scan.odometry[1] = -scan.odometry[1] + 40.0;
+    scan.odometry[2] = -scan.odometry[2];
+    if (i == 200) {
+      const Pose2 there(scan.odometry[0], scan.odometry[1], 0.0);
+      shift = Compose(Compose(there, Pose2(0.0, 0.0, DegToRad(25.0))),
+                      Inverse(there));
+    }
+    scan.odometry = Compose(shift, scan.odometry);
+  }
+  LogSolver first(registry_, {});
+  first.Run(Office(200));
+  LogSolver solver(registry_, {});
+  const LogSolverResult result = solver.Run(log);
+  ASSERT_FALSE(result.loose.empty());
+  EXPECT_FALSE(result.loose.front().found);
+  EXPECT_NE(result.loose.front().why.find("turned into the directions"),
+            std::string::npos)
+      << result.loose.front().why;
+  EXPECT_GT(ParallelShare(solver.graph(), first.graph()), 0.9);
+  // Measurements alone say nothing of it.
+  LogSolverOptions options;
+  options.structure = false;
+  LogSolver without(registry_, options);
+  const LogSolverResult plain = without.Run(log);
+  ASSERT_FALSE(plain.loose.empty());
+  EXPECT_EQ(plain.loose.front().why.find("turned"), std::string::npos);
+  EXPECT_LT(ParallelShare(without.graph(), first.graph()), 0.75);
+}
+
 TEST_F(LogSolverTest, AStateOfAnotherLogIsRefused) {
   const Log log = Office(60);
   std::string state;

@@ -811,7 +811,7 @@ void LogSolver::AdjustPoses(Context* context) {
   if (options_.refine != Refinement::kFull || context->IsStopped()) return;
   const ScopedTimer timer(&context->result.adjustment_seconds);
   context->Begin("adjustment of poses");
-  context->second.AdjustPoses();
+  context->second.AdjustPoses(context->has_own_frame);
 }
 
 void LogSolver::MakeWalls(Context* context) {

@@ -2,6 +2,7 @@
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/wall_completion.h>
 #include <plumbline/pipeline/bent_map.h>
+#include <plumbline/pipeline/guessed_parts.h>
 #include <plumbline/pipeline/log_solver.h>
 #include <plumbline/pipeline/loop_closures.h>
 #include <plumbline/pipeline/second_map.h>
@@ -60,8 +61,35 @@ void SecondMap::DropGathered() {
   gathered_ = {};
 }
 
-void SecondMap::AdjustPoses() {
+void SecondMap::AdjustPoses(bool find_parts) {
   KeepFirst();
+  AdjustPosesOfRun();
+  if (find_parts && FindParts()) AdjustPosesOfRun();
+  if (run_.IsStopped()) ReturnToFirst();
+}
+
+bool SecondMap::FindParts() {
+  if (run_.IsStopped() || !HasGuessedParts(run_.result)) return false;
+  TrackPlacementOptions placement;
+  placement.points = options_.odometry.points;
+  placement.matcher = options_.odometry.matcher;
+  placement.ScaleToNoise(run_.result.noise_scale);
+  std::vector<Pose2> keys = adjustment_->KeyPoses();
+  LogSolverResult& result = run_.result;
+  first_refined_ = result.refined;
+  first_records_ = result.records;
+  first_loose_ = result.loose;
+  if (!PlaceGuessedParts(
+          run_.scans, WithinOneBuilding(placement),
+          [this] { return run_.IsStopped(); }, &run_.result, &keys)) {
+    ForgetParts();
+    return false;
+  }
+  run_.keys = std::move(keys);
+  return true;
+}
+
+void SecondMap::AdjustPosesOfRun() {
   // What was taken for walls must not make odometry worse.
   const std::vector<Pose2> by_odometry =
       PosesByMotions(run_.result.records, run_.keys);
@@ -69,7 +97,6 @@ void SecondMap::AdjustPoses() {
   AdjustFrom(is_bent ? by_odometry : run_.keys, options_.adjustment);
   TryFrom(is_bent ? run_.keys : by_odometry,
           options_.check_map && HasKink(adjustment_->KeyPoses(), by_odometry));
-  if (run_.IsStopped()) ReturnToFirst();
 }
 
 void SecondMap::KeepFirst() {
@@ -203,6 +230,13 @@ void SecondMap::AdjustWalls() {
   adjustment_.reset();
   first_map_.clear();
   first_trajectory_.clear();
+  ForgetParts();
+}
+
+void SecondMap::ForgetParts() {
+  first_refined_.clear();
+  first_records_.clear();
+  first_loose_.clear();
 }
 
 void SecondMap::ReturnToFirst() {
@@ -214,6 +248,12 @@ void SecondMap::ReturnToFirst() {
   result.trajectory = std::move(first_trajectory_);
   first_trajectory_.clear();
   first_map_.clear();
+  if (!first_records_.empty()) {
+    result.refined = std::move(first_refined_);
+    result.records = std::move(first_records_);
+    result.loose = std::move(first_loose_);
+  }
+  ForgetParts();
   // They stand in the map.
   result.closures.clear();
   result.scan_relations = result.wall_votes = 0;

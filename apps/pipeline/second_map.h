@@ -47,8 +47,11 @@ class SecondMap {
 
   /// Adjusts the poses alone, from the key poses of the run or from odometry,
   /// whichever agrees better with what was seen. Sets the places and the
-  /// trajectory of the run. Throws Error when a solve fails; likewise below.
-  void AdjustPoses();
+  /// trajectory of the run. Parts of the log whose place is a guess are then
+  /// looked for in the rest (PlaceGuessedParts), if `find_parts`, and all is
+  /// adjusted once more when some were found. Throws Error when a solve fails;
+  /// likewise below.
+  void AdjustPoses(bool find_parts = false);
   /// Adds walls to adjusted poses.
   void MakeWalls();
   /// Adjusts poses and walls; then this map stands, or is refused
@@ -68,7 +71,7 @@ class SecondMap {
   template <typename Archive>
   void ExchangeFirst(Archive& archive) {
     ExchangeAll(archive, first_map_, first_trajectory_, first_length_,
-                vote_excess_);
+                vote_excess_, first_refined_, first_records_, first_loose_);
   }
   /// The adjustment that is under way; nothing where none is.
   void WriteAdjustment(StateWriter* state);
@@ -77,6 +80,12 @@ class SecondMap {
  private:
   void KeepFirst();
   void ReturnToFirst();
+  // The poses alone, from those of the run or by odometry.
+  void AdjustPosesOfRun();
+  // Whether parts that hung on a guess were found; their poses in the run are
+  // moved.
+  bool FindParts();
+  void ForgetParts();
   // The poses alone by all scans, from these of the key scans.
   void AdjustFrom(const std::vector<Pose2>& start,
                   const JointAdjustmentOptions& options);
@@ -100,6 +109,10 @@ class SecondMap {
   // While it is under way.
   std::string first_map_;
   std::vector<Pose2> first_trajectory_;
+  // Where parts were found: what the run had of them before; else empty.
+  std::vector<RefinedScan> first_refined_;
+  std::vector<KeyScanRecord> first_records_;
+  std::vector<LooseTrack> first_loose_;
   double first_length_ = 0.0;
   double vote_excess_ = 1.0;
   std::atomic<bool> is_gathering_dropped_{false};

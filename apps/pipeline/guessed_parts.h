@@ -1,0 +1,41 @@
+#ifndef PLUMBLINE_PIPELINE_GUESSED_PARTS_H_
+#define PLUMBLINE_PIPELINE_GUESSED_PARTS_H_
+
+#include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/scan.h>
+#include <plumbline/frontend/track_placement_options.h>
+#include <plumbline/pipeline/log_solver.h>
+
+#include <functional>
+#include <vector>
+
+namespace plumbline {
+
+/// Whether the place of some part of the log is a guess (TrackTie::kLoose).
+bool HasGuessedParts(const LogSolverResult& result);
+
+/// Options of PlaceTrack for two parts of one log. That both are of one
+/// building is known, or as good as: doors that stand elsewhere, and the mirror
+/// image that fits as well, say nothing against it. What is asked for is that
+/// no other place of the building comes near.
+TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options);
+
+/// Looks for the parts whose place is a guess among what the largest part saw,
+/// largest first, when the poses of either are straight: drift over a thousand
+/// metres makes parts contradict each other that are right (JoinParts has no
+/// other poses). The largest part grows by what is found.
+///
+/// `poses`: of the records' scans, in a frame in which the first one stays
+/// where it is; parts that were found are moved in them, with what hangs on
+/// them by a guess. In `result` their ties become matched ones, and
+/// LogSolverResult::loose tells that they were found. `options` are those of
+/// WithinOneBuilding, for the noise of the laser. Returns whether any was
+/// found; when `stop` (may be null) has returned true nothing more is.
+bool PlaceGuessedParts(const std::vector<Scan>& scans,
+                       const TrackPlacementOptions& options,
+                       const std::function<bool()>& stop,
+                       LogSolverResult* result, std::vector<Pose2>* poses);
+
+}  // namespace plumbline
+
+#endif  // PLUMBLINE_PIPELINE_GUESSED_PARTS_H_

@@ -1,0 +1,163 @@
+#include <gtest/gtest.h>
+#include <plumbline/pipeline/guessed_parts.h>
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "frontend/long_hall.h"
+
+namespace plumbline {
+namespace {
+
+using testing::HeadingError;
+using testing::LongHall;
+using testing::MakeScan;
+using testing::PositionError;
+using testing::WallEnds;
+
+// A log of key scans, part by part, each of which begins with a guess.
+struct GuessedLog {
+  std::vector<Scan> scans;
+  LogSolverResult result;
+  std::vector<Pose2> truth;
+  std::vector<Pose2> poses;
+
+  // Drives along the hall at `y` from x to x, with poses that are off by
+  // `shift`.
+  void Drive(const std::vector<WallEnds>& hall, double from, double to,
+             double y, const Pose2& shift) {
+    testing::Laser laser = testing::FullCircle();
+    laser.angle_step = DegToRad(2.0);
+    laser.beams = 180;
+    const int first = static_cast<int>(scans.size());
+    const double step = to > from ? 0.3 : -0.3;
+    const int count = static_cast<int>((to - from) / step);
+    for (int k = 0; k < count; ++k) {
+      const Pose2 at(from + step * k, y, step > 0.0 ? 0.0 : kPi);
+      const int scan = static_cast<int>(scans.size());
+      scans.push_back(MakeScan(hall, at, laser));
+      truth.push_back(at);
+      poses.push_back(Compose(shift, at));
+      RefinedScan refined;
+      refined.is_key = true;
+      KeyScanRecord record;
+      record.scan = scan;
+      if (k > 0) {
+        record.motion.mean = Between(poses[poses.size() - 2], poses.back());
+      } else if (first > 0) {
+        refined.tie = TrackTie::kLoose;
+        record.is_loose = true;
+        record.motion.mean = Between(poses[poses.size() - 2], poses.back());
+        LooseTrack loose;
+        loose.begin = first - 1;
+        loose.why = "scans are missing; where it went on is a guess, turned";
+        result.loose.push_back(loose);
+      }
+      result.refined.push_back(refined);
+      result.records.push_back(record);
+    }
+    if (first > 0) result.loose.back().end = static_cast<int>(scans.size()) - 1;
+  }
+
+  bool Place(const std::function<bool()>& stop = nullptr) {
+    return PlaceGuessedParts(scans, WithinOneBuilding(TrackPlacementOptions()),
+                             stop, &result, &poses);
+  }
+
+  void ExpectTrue(std::size_t begin, std::size_t end) const {
+    for (std::size_t k = begin; k < end; ++k) {
+      EXPECT_LT(PositionError(poses[k], truth[k]), 0.1) << k;
+      EXPECT_LT(HeadingError(poses[k], truth[k]), DegToRad(0.5)) << k;
+    }
+  }
+};
+
+const Pose2 kLost(60.0, -30.0, 2.2);
+
+// The robot was carried and sees the hall once more, on another way.
+TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
+  GuessedLog log;
+  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+  const std::size_t second = log.scans.size();
+  log.Drive(LongHall(), 17.0, -17.0, -0.2, kLost);
+  ASSERT_TRUE(HasGuessedParts(log.result));
+  ASSERT_TRUE(log.Place());
+  log.ExpectTrue(0, log.scans.size());
+  EXPECT_EQ(log.poses.front(), log.truth.front());
+  const KeyScanRecord& tied = log.result.records[second];
+  EXPECT_FALSE(tied.is_loose);
+  EXPECT_EQ(tied.from, static_cast<int>(second) - 1);
+  const Pose2 way = Between(log.truth[second - 1], log.truth[second]);
+  EXPECT_LT(PositionError(tied.motion.mean, way), 0.1);
+  EXPECT_GT(tied.motion.covariance(0, 0), 0.01 - 1e-9);
+  EXPECT_EQ(log.result.refined[second].tie, TrackTie::kMatched);
+  EXPECT_EQ(log.result.refined[second].since, static_cast<int>(second) - 1);
+  ASSERT_EQ(log.result.loose.size(), 1u);
+  EXPECT_TRUE(log.result.loose[0].found);
+  EXPECT_EQ(log.result.loose[0].end, static_cast<int>(second));
+  EXPECT_EQ(log.result.loose[0].why,
+            "scans are missing; found again by all that it saw afterwards");
+  EXPECT_FALSE(HasGuessedParts(log.result));
+}
+
+// The larger part comes second: the map's frame is that of the first scan all
+// the same.
+TEST(GuessedPartsTest, TheFirstScanStays) {
+  GuessedLog log;
+  log.Drive(LongHall(), -17.5, 15.0, 0.3, Pose2::Zero());
+  const std::size_t second = log.scans.size();
+  log.Drive(LongHall(), 18.0, -18.0, -0.1, kLost);
+  ASSERT_TRUE(log.Place());
+  log.ExpectTrue(0, log.scans.size());
+  EXPECT_LT(PositionError(log.poses.front(), log.truth.front()), 1e-9);
+  EXPECT_LT(HeadingError(log.poses.front(), log.truth.front()), 1e-9);
+  EXPECT_EQ(log.result.records[second].from, static_cast<int>(second) - 1);
+}
+
+// What is too short to be looked for stays where it hangs.
+TEST(GuessedPartsTest, WhatHangsOnAPartGoesAlong) {
+  GuessedLog log;
+  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+  log.Drive(LongHall(), 17.0, -17.0, -0.2, kLost);
+  const std::size_t third = log.scans.size();
+  log.Drive(LongHall(), -17.0, -14.0, 0.0, kLost);
+  ASSERT_TRUE(log.Place());
+  log.ExpectTrue(0, log.scans.size());
+  EXPECT_EQ(log.result.refined[third].tie, TrackTie::kLoose);
+  EXPECT_TRUE(log.result.records[third].is_loose);
+  ASSERT_EQ(log.result.loose.size(), 2u);
+  EXPECT_TRUE(log.result.loose[0].found);
+  EXPECT_FALSE(log.result.loose[1].found);
+}
+
+// Nothing is found in a hall that looks the same in a mirror, nor where nothing
+// is looked for.
+TEST(GuessedPartsTest, AnotherHallIsNotFound) {
+  std::vector<WallEnds> mirrored = LongHall();
+  for (WallEnds& wall : mirrored) {
+    wall.a.y() *= -1.0;
+    wall.b.y() *= -1.0;
+  }
+  for (const bool is_stopped : {false, true}) {
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    log.Drive(is_stopped ? LongHall() : mirrored, 17.0, -17.0, -0.2, kLost);
+    const std::vector<Pose2> before = log.poses;
+    EXPECT_FALSE(log.Place([&] { return is_stopped; }));
+    EXPECT_EQ(log.poses, before);
+    EXPECT_TRUE(HasGuessedParts(log.result));
+    EXPECT_FALSE(log.result.loose[0].found);
+  }
+}
+
+TEST(GuessedPartsTest, ALogWithoutGuessesIsLeftAlone) {
+  GuessedLog log;
+  log.Drive(LongHall(), -18.0, -10.0, 0.2, Pose2::Zero());
+  EXPECT_FALSE(HasGuessedParts(log.result));
+  EXPECT_FALSE(log.Place());
+  EXPECT_FALSE(GuessedLog().Place());
+}
+
+}  // namespace
+}  // namespace plumbline

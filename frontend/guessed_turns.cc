@@ -125,7 +125,11 @@ std::vector<GuessedTurn> FindGuessedTurns(const std::vector<SeenKey>& seen,
     if (is_guess && before && before->keeps && here.keeps && before->last &&
         here.first) {
       const double turn = FoldedAngle(*before->last - *here.first);
-      if (std::abs(turn) <= options.most_turn) {
+      const double over_gap = std::abs(
+          NormalizeAngle(seen[begin].pose[2] - seen[begin - 1].pose[2]));
+      if (std::abs(turn) <=
+          std::min(options.most_turn,
+                   options.least_turn + options.most_share * over_gap)) {
         const auto part = static_cast<std::size_t>(seen[begin].part);
         turns.push_back({seen[begin].scan, turn, loose_of[part - 1]});
       }

@@ -26,8 +26,11 @@ struct GuessedTurnOptions {
   /// A track whose directions change by more than this from window to window,
   /// rad, goes through wings at other angles.
   double most_change = DegToRad(5.0);
-  /// Turns are off by no more than this, rad: odometry is off by a fifth of
-  /// what the robot turned at most times.
+  /// Odometry is off by no more than this share of what the robot turned from
+  /// before the gap to behind it, and `least_turn`, and never by more than
+  /// `most_turn`, rad.
+  double most_share = 0.25;
+  double least_turn = DegToRad(3.0);
   double most_turn = DegToRad(20.0);
 };
 
@@ -51,8 +54,9 @@ struct GuessedTurn {
 /// changes to a new one a guess lies. Poses of neighboring parts are as the
 /// guesses have them. `loose_of`: by part but the first, its entry among the
 /// loose tracks. Returns the turns in the order of scans; guesses without
-/// clear directions, and those that would turn by more than
-/// GuessedTurnOptions::most_turn, are left out. Cost: linear in the key scans.
+/// clear directions, and those that would turn by more than odometry can be off
+/// (a wing at another angle may lie there), are left out. Cost: linear in the
+/// key scans.
 std::vector<GuessedTurn> FindGuessedTurns(const std::vector<SeenKey>& seen,
                                           const std::vector<int>& loose_of,
                                           const GuessedTurnOptions& options);

@@ -195,15 +195,17 @@ double ParallelShare(const Graph& graph, const Graph& first) {
 // wing, but its walls are parallel to what was seen before.
 TEST_F(LogSolverTest, AGuessIsTurnedIntoTheDirectionsOfTheBuilding) {
   Log log = Office(400);
+  // In the middle of a turn.
+  const std::size_t gap = 215;
   Pose2 shift = Pose2::Zero();
-  for (std::size_t i = 200; i < log.scans.size(); ++i) {
+  for (std::size_t i = gap; i < log.scans.size(); ++i) {
     Scan& scan = log.scans[i];
     scan.timestamp += 100.0;
     // As in a mirror.
     std::reverse(scan.ranges.begin(), scan.ranges.end());
     scan.odometry[1] = -scan.odometry[1] + 40.0;
     scan.odometry[2] = -scan.odometry[2];
-    if (i == 200) {
+    if (i == gap) {
       const Pose2 there(scan.odometry[0], scan.odometry[1], 0.0);
       shift = Compose(Compose(there, Pose2(0.0, 0.0, DegToRad(25.0))),
                       Inverse(there));
@@ -211,7 +213,7 @@ TEST_F(LogSolverTest, AGuessIsTurnedIntoTheDirectionsOfTheBuilding) {
     scan.odometry = Compose(shift, scan.odometry);
   }
   LogSolver first(registry_, {});
-  first.Run(Office(200));
+  first.Run(Office(gap));
   LogSolver solver(registry_, {});
   const LogSolverResult result = solver.Run(log);
   ASSERT_FALSE(result.loose.empty());
@@ -219,7 +221,7 @@ TEST_F(LogSolverTest, AGuessIsTurnedIntoTheDirectionsOfTheBuilding) {
   EXPECT_NE(result.loose.front().why.find("turned into the directions"),
             std::string::npos)
       << result.loose.front().why;
-  EXPECT_GT(ParallelShare(solver.graph(), first.graph()), 0.9);
+  EXPECT_GT(ParallelShare(solver.graph(), first.graph()), 0.85);
   // Measurements alone say nothing of it.
   LogSolverOptions options;
   options.structure = false;

@@ -111,6 +111,7 @@ TrackDirections DirectionsOf(const std::vector<SeenKey>& seen,
 
 std::vector<GuessedTurn> FindGuessedTurns(const std::vector<SeenKey>& seen,
                                           const std::vector<int>& loose_of,
+                                          const std::vector<BlindWay>& blind,
                                           const GuessedTurnOptions& options) {
   std::vector<GuessedTurn> turns;
   std::optional<TrackDirections> before;
@@ -125,13 +126,18 @@ std::vector<GuessedTurn> FindGuessedTurns(const std::vector<SeenKey>& seen,
     if (is_guess && before && before->keeps && here.keeps && before->last &&
         here.first) {
       const double turn = FoldedAngle(*before->last - *here.first);
-      const double over_gap = std::abs(
-          NormalizeAngle(seen[begin].pose[2] - seen[begin - 1].pose[2]));
-      if (std::abs(turn) <=
-          std::min(options.most_turn,
-                   options.least_turn + options.most_share * over_gap)) {
+      const int scan = seen[begin].scan;
+      double most = options.most_turn;
+      if (std::any_of(blind.begin(), blind.end(),
+                      [&](const BlindWay& way) { return way.to == scan; })) {
+        const double over_gap =
+            NormalizeAngle(seen[begin].pose[2] - seen[begin - 1].pose[2]);
+        most = std::min(
+            most, options.least_turn + options.most_share * std::abs(over_gap));
+      }
+      if (std::abs(turn) <= most) {
         const auto part = static_cast<std::size_t>(seen[begin].part);
-        turns.push_back({seen[begin].scan, turn, loose_of[part - 1]});
+        turns.push_back({scan, turn, loose_of[part - 1]});
       }
     }
     before = here;

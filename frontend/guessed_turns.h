@@ -2,6 +2,7 @@
 #define PLUMBLINE_FRONTEND_GUESSED_TURNS_H_
 
 #include <plumbline/factors/angle.h>
+#include <plumbline/frontend/part_joining.h>
 #include <plumbline/frontend/track_search.h>
 
 #include <vector>
@@ -26,9 +27,9 @@ struct GuessedTurnOptions {
   /// A track whose directions change by more than this from window to window,
   /// rad, goes through wings at other angles.
   double most_change = DegToRad(5.0);
-  /// Odometry is off by no more than this share of what the robot turned from
-  /// before the gap to behind it, and `least_turn`, and never by more than
-  /// `most_turn`, rad.
+  /// Odometry that tells of the way over a gap is off by no more than this
+  /// share of what the robot turned from before the gap to behind it, and
+  /// `least_turn`. No guess is turned by more than `most_turn`, rad.
   double most_share = 0.25;
   double least_turn = DegToRad(3.0);
   double most_turn = DegToRad(20.0);
@@ -53,12 +54,13 @@ struct GuessedTurn {
 /// `seen`: key scans in the order of the log; where the number of the part
 /// changes to a new one a guess lies. Poses of neighboring parts are as the
 /// guesses have them. `loose_of`: by part but the first, its entry among the
-/// loose tracks. Returns the turns in the order of scans; guesses without
-/// clear directions, and those that would turn by more than odometry can be off
-/// (a wing at another angle may lie there), are left out. Cost: linear in the
-/// key scans.
+/// loose tracks. `blind`: the ways of which odometry tells. Returns the turns
+/// in the order of scans; guesses without clear directions, and those that
+/// would turn by more than odometry can be off (a wing at another angle may lie
+/// there), are left out. Cost: linear in the key scans.
 std::vector<GuessedTurn> FindGuessedTurns(const std::vector<SeenKey>& seen,
                                           const std::vector<int>& loose_of,
+                                          const std::vector<BlindWay>& blind,
                                           const GuessedTurnOptions& options);
 
 /// The motion to the first scan of a guessed track with so much more turn: the

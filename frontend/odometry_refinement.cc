@@ -1414,8 +1414,8 @@ void OdometryRefiner::Finish(const std::function<bool()>& stop) {
   if (open_ != nullptr) Tie(true);
   if (guessed_ >= 0) loose_[guessed_].end = count_ - 1;
   guessed_ = -1;
-  const std::vector<GuessedTurn> turns =
-      FindGuessedTurns(search_.seen(), loose_of_, options_.guessed_turns);
+  const std::vector<GuessedTurn> turns = FindGuessedTurns(
+      search_.seen(), loose_of_, blind_ways_, options_.guessed_turns);
   late_ties_ = JoinParts(options_.tracking, options_.drift, loose_of_,
                          blind_ways_, &search_, &loose_);
   JoinDoubtfulParts();

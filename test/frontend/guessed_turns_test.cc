@@ -50,8 +50,9 @@ void See(const SeenWalls& walls, int count, int part, double askew,
   }
 }
 
-std::vector<GuessedTurn> Turns(const std::vector<SeenKey>& seen) {
-  return FindGuessedTurns(seen, {4, 6}, GuessedTurnOptions());
+std::vector<GuessedTurn> Turns(const std::vector<SeenKey>& seen,
+                               const std::vector<BlindWay>& blind = {}) {
+  return FindGuessedTurns(seen, {4, 6}, blind, GuessedTurnOptions());
 }
 
 const SeenWalls kRightAngled{{0.0, 0.5 * kPi, kPi}};
@@ -122,16 +123,22 @@ TEST(GuessedTurnsTest, OdometryIsNotOffByHalfARightAngle) {
   EXPECT_TRUE(Turns(seen).empty());
 }
 
-// After a way straight on odometry is off by little: what stands at an angle is
-// a wing that does.
+// After a way straight on of which odometry tells it is off by little: what
+// stands at an angle is a wing that does.
 TEST(GuessedTurnsTest, OdometryIsOffByAShareOfTheTurn) {
+  BlindWay way;
+  way.from = 1000;
+  way.to = 1010;
   for (const double askew : {2.0, 12.0}) {
-    std::vector<SeenKey> seen;
-    See(kRightAngled, 101, 0, 0.0, &seen);
-    See(kRightAngled, 100, 1, DegToRad(askew), &seen);
-    const std::vector<GuessedTurn> turns = Turns(seen);
-    ASSERT_EQ(turns.size(), askew < 3.0 ? 1u : 0u);
-    if (!turns.empty()) EXPECT_NEAR(RadToDeg(turns[0].turn), -2.0, 0.5);
+    for (const bool is_straight : {true, false}) {
+      std::vector<SeenKey> seen;
+      See(kRightAngled, 101, 0, 0.0, &seen);
+      See(is_straight ? kRightAngled : kBehind, 100, 1, DegToRad(askew), &seen);
+      // Where it tells of nothing anything may be.
+      EXPECT_EQ(Turns(seen).size(), 1u);
+      const bool is_within = !is_straight || askew < 3.0;
+      EXPECT_EQ(Turns(seen, {way}).size(), is_within ? 1u : 0u) << askew;
+    }
   }
 }
 

@@ -1,7 +1,7 @@
-#include <plumbline/factors/angle.h>
 #include <plumbline/frontend/key_views.h>
 #include <plumbline/frontend/track_placement.h>
 #include <plumbline/pipeline/guessed_parts.h>
+#include <plumbline/pipeline/placement_tie.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,13 +21,6 @@ constexpr std::size_t kLeastWindows = 3;
 // more than so many are in all.
 constexpr double kMoreRest = 1.25;
 constexpr int kMostPlacements = 24;
-// Standard deviations of a tie, m and rad, and what they gain by a metre of way
-// from where the parts were compared: a weak pull, since matches of scans hold
-// the parts once they are near.
-constexpr double kTieSigma = 0.1;
-constexpr double kTieSigmaPerMetre = 0.02;
-constexpr double kTieAngle = DegToRad(1.0);
-constexpr double kTieAnglePerMetre = DegToRad(0.1);
 // Windows that have to agree (twice as many where another place has any), and
 // the share that may contradict: places that were found by parts of carried
 // robots and were wrong had up to 7, and 0.4.
@@ -180,13 +173,8 @@ class PartPlacing {
         *std::prev(std::lower_bound(earlier.begin(), earlier.end(), first));
     const double way = WayBetween(from, earlier[at_earlier], earlier) +
                        WayBetween(first, later[at_later], later);
-    const double sigma = kTieSigma + kTieSigmaPerMetre * way;
-    const double angle = kTieAngle + kTieAnglePerMetre * way;
-    UncertainPose2 tie;
-    tie.mean = Between(views_[from].pose, views_[first].pose);
-    tie.covariance =
-        Eigen::Vector3d(sigma * sigma, sigma * sigma, angle * angle)
-            .asDiagonal();
+    const UncertainPose2 tie =
+        PlacementTie(Between(views_[from].pose, views_[first].pose), way);
     KeyScanRecord& tied = result_.records[first];
     tied.from = static_cast<int>(from);
     tied.is_loose = false;

@@ -4,6 +4,7 @@
 #include <plumbline/frontend/joint_adjustment.h>
 #include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/relocalization.h>
+#include <plumbline/pipeline/placement_tie.h>
 #include <plumbline/pipeline/several_logs.h>
 
 #include <algorithm>
@@ -15,13 +16,6 @@
 namespace plumbline {
 namespace {
 
-// Standard deviations of the tie between two logs, m and rad, and what they
-// gain by a metre of way from where the logs were compared to the first scan:
-// a weak pull, since matches of scans hold them once they are near.
-constexpr double kTieSigma = 0.1;
-constexpr double kTieSigmaPerMetre = 0.02;
-constexpr double kTieAngle = DegToRad(1.0);
-constexpr double kTieAnglePerMetre = DegToRad(0.1);
 // Two placements of a log in a map are one place when they put it so near to
 // each other where they are firmest, m and rad.
 constexpr double kSamePlace = 1.0;
@@ -76,14 +70,10 @@ UncertainPose2 TieOf(const TrackPlacement& placement, const FirstMap& log,
                .head<2>()
                .norm();
   }
-  const double sigma = kTieSigma + kTieSigmaPerMetre * way;
-  const double angle = kTieAngle + kTieAnglePerMetre * way;
-  UncertainPose2 tie;
-  tie.mean = Between(group.views[static_cast<std::size_t>(placement.from)].pose,
-                     Compose(placement.pose, log.views.front().pose));
-  tie.covariance =
-      Eigen::Vector3d(sigma * sigma, sigma * sigma, angle * angle).asDiagonal();
-  return tie;
+  return PlacementTie(
+      Between(group.views[static_cast<std::size_t>(placement.from)].pose,
+              Compose(placement.pose, log.views.front().pose)),
+      way);
 }
 
 // Appends a log to a map of several, as if the robot had been lost and found

@@ -108,6 +108,16 @@ TEST(FindOpenWaysTest, ACorridorWithNichesDoesNot) {
   EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}).empty());
 }
 
+// As where another log begins, next to where the last one ended.
+TEST(FindOpenWaysTest, OdometryThatBeginsAnewSaysNothingOfTheRest) {
+  SeenDrive drive =
+      DriveAlong(WithNiches(RoomAndCorridor()), Straight(-8.0, 70.0), 0.05);
+  for (std::size_t k = 10; k < drive.scans.size(); ++k) {
+    drive.scans[k].odometry[0] += 100.0;
+  }
+  EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}).empty());
+}
+
 TEST(FindOpenWaysTest, AShortCorridorDoesNot) {
   const SeenDrive drive =
       DriveAlong(RoomAndCorridor(), Straight(-8.0, 5.0), 0.01);

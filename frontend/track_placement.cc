@@ -434,6 +434,7 @@ class Search {
   // Whether so much agrees, and so little contradicts, that doors which were
   // opened or shut do not make another building of it.
   bool IsPlain(Candidate* place) {
+    if (IsSure(place)) return true;
     const int agreeing = place->agreeing;
     if (agreeing < options_.min_plain_agreeing ||
         place->contradicting > options_.max_plain_contradicting *
@@ -452,6 +453,27 @@ class Search {
            CountMovedDoors(contradictions, options_.min_door_spacing) == 0 &&
            MirroredSupport() <=
                options_.max_plain_mirrored_share * place->support();
+  }
+
+  // Whether so much agrees, next to nothing contradicts, and the track fits
+  // nowhere else and its mirror image nowhere at all, that more doors may have
+  // been opened or shut: those of another floor stand elsewhere.
+  bool IsSure(Candidate* place) {
+    const int agreeing = place->agreeing;
+    const double rival = options_.max_sure_rival * place->support();
+    if (agreeing < options_.min_sure_agreeing ||
+        place->contradicting > options_.max_sure_contradicting *
+                                   (agreeing + place->contradicting) ||
+        untold_rival_ > rival ||
+        InformationShare(*place) < options_.min_sure_information_share) {
+      return false;
+    }
+    const WallContradictions& contradictions = ContradictionsOf(place);
+    const auto changed = static_cast<double>(contradictions.number());
+    return contradictions.longest() <=
+               options_.max_sure_contradicting_stretch &&
+           changed * options_.min_plain_agreeing_per_change <= agreeing &&
+           CountMovedDoors(contradictions) == 0 && MirroredSupport() <= rival;
   }
 
   // What the returns say of the direction that they say least of, as a share of

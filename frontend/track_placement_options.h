@@ -104,6 +104,18 @@ struct TrackPlacementOptions {
   double min_plain_agreeing_per_change = 1.5;
   int min_plain_agreeing_per_moved_door = 12;
   double min_door_spacing = 1.2;
+  /// What makes a place plain though more doors were opened and shut, as over
+  /// hours in a large building (and double doors, so that a piece of wall that
+  /// contradicts may be this long, m): so many windows agree, no more than this
+  /// share of those that say yes or no contradicts, no other place, nor the
+  /// mirror image, finds more than this share of its support, no door stands
+  /// elsewhere, and the returns say at least this share of its place in the
+  /// direction that they say least of.
+  int min_sure_agreeing = 24;
+  double max_sure_contradicting = 0.05;
+  double max_sure_rival = 0.2;
+  double min_sure_information_share = 0.2;
+  double max_sure_contradicting_stretch = 1.4;
   /// With a start that somebody gave: windows that have to agree, doors that
   /// stand elsewhere, and how far from it the track may start, m and rad. Where
   /// it would start farther from there by more than start_precision, m, is no

@@ -20,6 +20,15 @@ namespace {
 // each other where they are firmest, m and rad.
 constexpr double kSamePlace = 1.0;
 constexpr double kSamePlaceTurn = DegToRad(5.0);
+// Maps that close no loop of their own are bent by so many times as much as
+// those of one building may differ, and may be compared again so often after
+// they were adjusted together.
+constexpr double kMoreMisfit = 3.0;
+constexpr int kMostTrials = 3;
+// Longest piece of wall, m, that contradicts in maps that are bent, where what
+// was opened and shut is not counted.
+constexpr double kLongestContradicting = 2.5;
+constexpr int kNever = 1000000;
 
 // Key scans of an earlier map, as those of a log that was solved.
 LogSolverResult ResultOf(const KeyScanArchive& earlier) {
@@ -46,9 +55,14 @@ struct FirstMap {
   std::vector<KeyView> views;
   bool is_straight = false;
   // Of its frame in that of the first log of its group, and its first key scan
-  // in that of the one that it hangs on there.
+  // in that of the one that it hangs on there, which is this one of the
+  // group's.
   Pose2 pose = Pose2::Zero();
   UncertainPose2 tie;
+  int tied_to = -1;
+  // Its trajectory as it was adjusted together with the group's, frame of this
+  // map; empty where it was placed without.
+  std::vector<Pose2> together;
 };
 
 // Logs that were placed in each other's building.
@@ -61,24 +75,54 @@ struct Group {
   double noise_scale = 1.0;
 };
 
-UncertainPose2 TieOf(const TrackPlacement& placement, const FirstMap& log,
-                     const Group& group) {
+// Ties a log to a group where it was placed there: `track` are its views,
+// `map` those of the group.
+void TieTo(const std::vector<KeyView>& map, const std::vector<KeyView>& track,
+           const TrackPlacement& placement, FirstMap* log) {
   double way = 0.0;
   for (int k = 1; k <= placement.to; ++k) {
-    way += (log.views[static_cast<std::size_t>(k)].pose -
-            log.views[static_cast<std::size_t>(k) - 1].pose)
+    way += (track[static_cast<std::size_t>(k)].pose -
+            track[static_cast<std::size_t>(k) - 1].pose)
                .head<2>()
                .norm();
   }
-  return PlacementTie(
-      Between(group.views[static_cast<std::size_t>(placement.from)].pose,
-              Compose(placement.pose, log.views.front().pose)),
-      way);
+  log->tied_to = placement.from;
+  log->tie =
+      PlacementTie(Between(map[static_cast<std::size_t>(placement.from)].pose,
+                           Compose(placement.pose, track.front().pose)),
+                   way);
+}
+
+// These views and, moved by a pose, those.
+std::vector<KeyView> Joined(std::vector<KeyView> views, const Pose2& pose,
+                            const std::vector<KeyView>& others) {
+  views.reserve(views.size() + others.size());
+  for (const KeyView& other : others) {
+    views.push_back(other);
+    views.back().pose = Compose(pose, other.pose);
+  }
+  return views;
+}
+
+// Options of PlaceTrack for maps that are bent and will be adjusted together: a
+// place that they may have in common.
+TrackPlacementOptions WhereBent(TrackPlacementOptions options) {
+  options.max_misfit *= kMoreMisfit;
+  options.max_misfit_per_metre *= kMoreMisfit;
+  options.min_agreeing = options.min_plain_agreeing;
+  options.max_contradicting_stretch = kLongestContradicting;
+  options.min_moved_doors = kNever;
+  options.min_exchanged = kNever;
+  options.min_agreeing_per_change = 1;
+  options.max_mirrored_share = kNever;
+  options.min_certain_information_share =
+      0.5 * options.min_sure_information_share;
+  return options;
 }
 
 // Appends a log to a map of several, as if the robot had been lost and found
 // again.
-void Append(int from_record, FirstMap* log, LogSolverResult* whole) {
+void Append(FirstMap* log, LogSolverResult* whole) {
   LogSolverResult& part = log->result;
   const bool is_first = whole->records.empty();
   const int scans = static_cast<int>(whole->refined.size());
@@ -101,9 +145,9 @@ void Append(int from_record, FirstMap* log, LogSolverResult* whole) {
   if (!is_first) {
     RefinedScan& first = part.refined.front();
     first.tie = TrackTie::kMatched;
-    first.since = whole->records[static_cast<std::size_t>(from_record)].scan;
+    first.since = whole->records[static_cast<std::size_t>(log->tied_to)].scan;
     first.since_key = log->tie;
-    part.records.front().from = from_record;
+    part.records.front().from = log->tied_to;
     part.records.front().motion = log->tie;
   }
   for (LooseTrack& loose : part.loose) {
@@ -271,7 +315,7 @@ class Merger {
     map.scans = options_.earlier->scans;
     map.result = std::move(earlier_result_);
     for (const std::size_t i : group.logs) {
-      Append(result_.logs[i].placement.from, &maps_[i], &map.result);
+      Append(&maps_[i], &map.result);
       std::move(logs_[i].scans.begin(), logs_[i].scans.end(),
                 std::back_inserter(map.scans));
     }
@@ -326,16 +370,16 @@ class Merger {
         placement = again;
       }
     }
+    if (!placement.found && !start && !IsStopped()) {
+      PlaceTogether(i, options, group, &placement);
+    }
     Tell(i, *group, placement);
     if (!placement.found) return false;
-    log.tie = TieOf(placement, log, *group);
+    TieTo(group->views, log.views, placement, &log);
     log.pose = placement.pose;
     group->logs.push_back(i);
     group->noise_scale = noise_scale;
-    for (KeyView view : log.views) {
-      view.pose = Compose(log.pose, view.pose);
-      group->views.push_back(std::move(view));
-    }
+    group->views = Joined(std::move(group->views), log.pose, log.views);
     group->is_straight = false;
     return true;
   }
@@ -366,6 +410,84 @@ class Merger {
     placement->is_candidate = false;
     placement->doubt = placement->why_not + "; but the map fits in it";
     placement->why_not.clear();
+  }
+
+  // Where the track lies in the map, by the track's windows or else by the
+  // map's.
+  TrackPlacement PlaceEitherWay(const std::vector<KeyView>& map,
+                                const std::vector<KeyView>& track,
+                                const TrackPlacementOptions& options) {
+    const TrackPlacement placement =
+        PlaceTrack(map, track, std::nullopt, options, control_.run.stop);
+    if (placement.found || placement.has_twin) return placement;
+    TrackPlacement other =
+        PlaceTrack(track, map, std::nullopt, options, control_.run.stop);
+    if (!other.found || other.has_twin) return placement;
+    other.pose = Inverse(other.pose);
+    std::swap(other.from, other.to);
+    std::swap(other.walls_through_map, other.walls_through_track);
+    return other;
+  }
+
+  // Where much of a log is found, but not as certainly as it has to be, its map
+  // and the group's may be too much bent for that: both are adjusted together
+  // as if it was its place, and what was not certain is asked again of what
+  // they are then. They stay as they were unless it is found.
+  void PlaceTogether(std::size_t i, const TrackPlacementOptions& options,
+                     Group* group, TrackPlacement* placement) {
+    if (options_.earlier != nullptr || placement->has_twin ||
+        placement->agreeing < options.min_plain_agreeing) {
+      return;
+    }
+    FirstMap& log = maps_[i];
+    std::vector<std::size_t> logs = group->logs;
+    logs.push_back(i);
+    std::vector<KeyView> map = group->views;
+    std::vector<KeyView> track = log.views;
+    for (int trial = 0; trial < kMostTrials; ++trial) {
+      const TrackPlacement bent =
+          PlaceEitherWay(map, track, WhereBent(options));
+      if (!bent.found) return;
+      TieTo(map, track, bent, &log);
+      std::vector<KeyView> both = Joined(map, bent.pose, track);
+      StraightenViews(logs, &both);
+      if (IsStopped()) return;
+      const auto middle =
+          both.begin() + static_cast<std::ptrdiff_t>(map.size());
+      map.assign(both.begin(), middle);
+      track.assign(middle, both.end());
+      TrackPlacement straight = PlaceEitherWay(map, track, options);
+      if (!straight.found) continue;
+      // In the frame of the log its first view stays where it is.
+      const Pose2 frame =
+          Compose(track.front().pose, Inverse(log.views.front().pose));
+      for (KeyView& view : track) {
+        view.pose = Compose(Inverse(frame), view.pose);
+      }
+      straight.pose = Compose(straight.pose, frame);
+      *placement = straight;
+      group->views = std::move(map);
+      log.views = std::move(track);
+      KeepTogether(log.views.begin(), &log);
+      auto views = group->views.cbegin();
+      for (const std::size_t other : group->logs) {
+        views = KeepTogether(views, &maps_[other]);
+      }
+      return;
+    }
+  }
+
+  // What a log's map of several begins with; returns where its views end.
+  static std::vector<KeyView>::const_iterator KeepTogether(
+      std::vector<KeyView>::const_iterator views, FirstMap* log) {
+    const Pose2 frame = Compose(log->views.front().pose, Inverse(views->pose));
+    std::vector<Pose2> keys;
+    for (std::size_t k = 0; k < log->views.size(); ++k, ++views) {
+      keys.push_back(Compose(frame, views->pose));
+    }
+    log->together =
+        InterpolateScans(log->result.refined, log->result.records, keys);
+    return views;
   }
 
   // What came nearest to being its place is what there is to say of it; a
@@ -416,13 +538,12 @@ class Merger {
       copy.result = maps_[i].result;
       copy.pose = maps_[i].pose;
       copy.tie = maps_[i].tie;
-      Append(result_.logs[i].placement.from, &copy, &whole);
+      copy.tied_to = maps_[i].tied_to;
+      Append(&copy, &whole);
       scans.insert(scans.end(), logs_[i].scans.begin(), logs_[i].scans.end());
     }
     std::vector<Pose2> poses;
-    for (const KeyScanRecord& record : whole.records) {
-      poses.push_back(whole.trajectory[static_cast<std::size_t>(record.scan)]);
-    }
+    for (const KeyView& view : *views) poses.push_back(view.pose);
     Graph graph;
     SolverSession session(&graph, registry_, options_.solver.session);
     JointAdjustmentOptions adjustment_options = options_.solver.adjustment;
@@ -476,8 +597,10 @@ class Merger {
     std::vector<LogSolverResult> before;
     for (const std::size_t i : group.logs) {
       before.push_back(maps_[i].result);
-      const TrackPlacement& placement = result_.logs[i].placement;
-      Append(placement.from, &maps_[i], &first);
+      if (!maps_[i].together.empty()) {
+        maps_[i].result.trajectory = maps_[i].together;
+      }
+      Append(&maps_[i], &first);
       std::move(logs_[i].scans.begin(), logs_[i].scans.end(),
                 std::back_inserter(map.scans));
       wall_length = std::max(wall_length, maps_[i].wall_length);

@@ -164,6 +164,35 @@ TEST_F(SeveralLogsTest, BentFirstMapsAreStraightened) {
   EXPECT_LT(LargestError(straight.maps.front()), 0.25);
 }
 
+// Where each of two maps is bent in itself so that adjusting them one by one
+// does not help, they are adjusted together, and what is asked of a place is
+// asked again.
+TEST_F(SeveralLogsTest, BentFirstMapsAreStraightenedTogether) {
+  const Log office = Office();
+  const std::size_t n = office.scans.size();
+  const auto solve = [&](const SeveralLogsOptions& options) {
+    return SolveSeveralLogs(
+        registry_, {Piece(office, 0, n / 2), Piece(office, n / 2, n)}, options);
+  };
+  SeveralLogsOptions options;
+  options.placement.max_misfit_per_metre = 0.0;
+  const double bent = solve(options).logs[1].placement.misfit;
+  options.placement.max_misfit = 0.9 * bent;
+  const double alone = solve(options).logs[1].placement.misfit;
+  ASSERT_LT(alone, 0.9 * bent);
+  options.placement.max_misfit = 0.9 * alone;
+  const SeveralLogsResult apart = solve(options);
+  ASSERT_EQ(apart.maps.size(), 2u);
+  EXPECT_THAT(apart.logs[1].placement.why_not,
+              ::testing::HasSubstr("not together"));
+  // Of so many parts that is no chance.
+  options.placement.min_plain_agreeing = apart.logs[1].placement.agreeing;
+  const SeveralLogsResult together = solve(options);
+  ASSERT_EQ(together.maps.size(), 1u) << together.logs[1].placement.why_not;
+  EXPECT_LT(together.logs[1].placement.misfit, 0.9 * alone);
+  EXPECT_LT(LargestError(together.maps.front()), 0.25);
+}
+
 TEST_F(SeveralLogsTest, DifferentBuildingsAreKeptApart) {
   const Log office = Office();
   Log other = Enlarged(Piece(office, 0, 500));
@@ -483,6 +512,8 @@ struct Floor {
   // Rooms whose doors are shut; the robot drives into the second and the fifth
   // above and into the third below.
   std::set<std::size_t> shut[2];
+  // Rooms above whose doors are double doors.
+  std::set<std::size_t> wide;
   bool is_back = false;
   // The rooms below are those above turned by 180 degrees.
   bool is_turned = false;
@@ -505,9 +536,10 @@ Log DriveAlong(const Floor& floor, std::uint64_t seed) {
       const double door = floor.doors[row][room];
       const double begin = floor.ends[row][room];
       const double end = floor.ends[row][room + 1];
+      const double half = row == 0 && floor.wide.count(room) > 0 ? 1.1 : 0.45;
       if (floor.shut[row].count(room) == 0) {
-        wall(from, 1.1 * side, door - 0.45, 1.1 * side);
-        from = door + 0.45;
+        wall(from, 1.1 * side, door - half, 1.1 * side);
+        from = door + half;
       }
       if (room > 0) wall(begin, 1.1 * side, begin, 6.1 * side);
       // A desk and a shelf.
@@ -564,6 +596,31 @@ TEST_F(SeveralLogsTest, DoorsOpenedAndShutMakeNoOtherBuilding) {
     const Pose2 first = result.maps[0].result.trajectory[result.logs[1].begin];
     EXPECT_LT(std::hypot(first[0] - (is_turned ? 1.0 : 35.0), first[1]), 0.3);
   }
+}
+
+// So much wall that is there on one day alone is another building's, unless so
+// many parts agree that it is a double door.
+TEST_F(SeveralLogsTest, ADoubleDoorThatWasShutMakesNoOtherBuilding) {
+  Floor monday;
+  monday.wide = {3};
+  Floor tuesday = monday;
+  tuesday.shut[0] = {3};
+  tuesday.is_back = true;
+  const Log one = DriveAlong(monday, 1);
+  const Log other = DriveAlong(tuesday, 2);
+  SeveralLogsOptions options;
+  const SeveralLogsResult apart =
+      SolveSeveralLogs(registry_, {one, other}, options);
+  EXPECT_EQ(apart.maps.size(), 2u);
+  EXPECT_THAT(apart.logs[1].placement.why_not,
+              ::testing::HasSubstr("m of wall where the other has none"));
+  options.placement.min_sure_agreeing = apart.logs[1].placement.agreeing;
+  const SeveralLogsResult sure =
+      SolveSeveralLogs(registry_, {one, other}, options);
+  ASSERT_EQ(sure.maps.size(), 1u) << sure.logs[1].placement.why_not;
+  EXPECT_GT(sure.logs[1].placement.contradicting_length,
+            options.placement.max_contradicting_stretch);
+  EXPECT_FALSE(sure.logs[1].placement.doubt.empty());
 }
 
 // A building that looks the same from its other end: a log of one half may be

@@ -36,6 +36,12 @@ constexpr double kRivalTurn = DegToRad(15.0);
 // A contradicting window speaks against a place like so many agreeing ones for
 // it.
 constexpr double kContradictionWeight = 2.0;
+// A window is where the track has it when it lies no farther from there, m. It
+// is asked so often again, and agrees as well elsewhere with this share of its
+// quality.
+constexpr double kInPlace = 0.1;
+constexpr int kPasses = 2;
+constexpr double kAsClearly = 0.95;
 // The share of the best place's support from which on another one may be the
 // place where the best contradicts the map.
 constexpr double kNearlyAsMuch = 0.9;
@@ -87,6 +93,16 @@ bool AreOne(const Candidate& a, const Candidate& b,
   return true;
 }
 
+void Count(Candidate* candidate) {
+  candidate->agreeing = candidate->contradicting = candidate->doubtful = 0;
+  for (const WindowJudgement& judgement : candidate->judgements) {
+    const WindowVerdict verdict = judgement.verdict;
+    candidate->agreeing += verdict == WindowVerdict::kAgrees ? 1 : 0;
+    candidate->contradicting += verdict == WindowVerdict::kContradicts ? 1 : 0;
+    candidate->doubtful += verdict == WindowVerdict::kDoubtful ? 1 : 0;
+  }
+}
+
 // Asks all windows, the ones near the one that speaks for it first: a track
 // bends, and those that agree carry on to the next.
 void JudgeCandidate(const std::vector<KeyView>& map,
@@ -119,15 +135,48 @@ void JudgeCandidate(const std::vector<KeyView>& map,
     }
     candidate->judgements[w] =
         JudgeWindow(map, track, windows[w], guess, options);
+    Count(candidate);
     const WindowVerdict verdict = candidate->judgements[w].verdict;
-    candidate->agreeing += verdict == WindowVerdict::kAgrees ? 1 : 0;
-    candidate->contradicting += verdict == WindowVerdict::kContradicts ? 1 : 0;
-    candidate->doubtful += verdict == WindowVerdict::kDoubtful ? 1 : 0;
     if (w == candidate->window && verdict != WindowVerdict::kAgrees) return;
     if (candidate->contradicting >= 3 &&
         candidate->contradicting > candidate->agreeing) {
       return;
     }
+  }
+}
+
+// Along a bare corridor a window lies wherever the one before it had led. Asks
+// those again which lie elsewhere than the track as a whole has them, and takes
+// them to be there where they agree there as well.
+void AskAgain(const std::vector<KeyView>& map,
+              const std::vector<KeyView>& track,
+              const std::vector<TrackWindow>& windows,
+              const TrackPlacementOptions& options, Candidate* candidate) {
+  for (int pass = 0; pass < kPasses; ++pass) {
+    bool any = false;
+    for (std::size_t w = 0; w < windows.size(); ++w) {
+      WindowJudgement& judgement = candidate->judgements[w];
+      const Pose2 there = Compose(candidate->pose, windows[w].middle);
+      const auto off = [&there](const Pose2& pose) {
+        return (pose - there).head<2>().norm();
+      };
+      if (judgement.verdict == WindowVerdict::kUnknown ||
+          off(judgement.pose) <= kInPlace) {
+        continue;
+      }
+      const WindowJudgement again =
+          JudgeWindow(map, track, windows[w], there, options);
+      if (again.verdict != WindowVerdict::kAgrees ||
+          (judgement.verdict == WindowVerdict::kAgrees &&
+           (again.quality < kAsClearly * judgement.quality ||
+            off(again.pose) >= off(judgement.pose)))) {
+        continue;
+      }
+      judgement = again;
+      any = true;
+    }
+    if (!any) return;
+    candidate->pose = FitTrack(windows, candidate->judgements);
   }
 }
 
@@ -221,8 +270,11 @@ class Search {
       judged_.push_back(found);
       Candidate& candidate = judged_.back();
       JudgeCandidate(map_, track_, windows_, options_, &candidate);
-      if (candidate.agreeing > 0) {
-        candidate.pose = FitTrack(windows_, candidate.judgements);
+      if (candidate.agreeing == 0) continue;
+      candidate.pose = FitTrack(windows_, candidate.judgements);
+      if (candidate.agreeing >= options_.min_agreeing) {
+        AskAgain(map_, track_, windows_, options_, &candidate);
+        Count(&candidate);
       }
     }
     return true;
@@ -701,6 +753,21 @@ TrackPlacement PlaceTrack(const std::vector<KeyView>& map,
     }
   }
   return placement;
+}
+
+PlaceSupport JudgePlace(const std::vector<KeyView>& map,
+                        const std::vector<KeyView>& track, const Pose2& pose,
+                        const TrackPlacementOptions& options) {
+  PlaceSupport support;
+  for (const TrackWindow& window :
+       MakeTrackWindows(track, static_cast<std::size_t>(options.window_keys))) {
+    const WindowVerdict verdict =
+        JudgeWindow(map, track, window, Compose(pose, window.middle), options)
+            .verdict;
+    support.agreeing += verdict == WindowVerdict::kAgrees ? 1 : 0;
+    support.contradicting += verdict == WindowVerdict::kContradicts ? 1 : 0;
+  }
+  return support;
 }
 
 }  // namespace plumbline

@@ -72,6 +72,18 @@ TrackPlacement PlaceTrack(const std::vector<KeyView>& map,
                           const TrackPlacementOptions& options,
                           const std::function<bool()>& stop = nullptr);
 
+/// What the windows of a track say of its place.
+struct PlaceSupport {
+  int agreeing = 0;
+  int contradicting = 0;
+};
+
+/// Judges each window of a track (JudgeWindow) where `pose`, of the track's
+/// frame in the map's, puts it.
+PlaceSupport JudgePlace(const std::vector<KeyView>& map,
+                        const std::vector<KeyView>& track, const Pose2& pose,
+                        const TrackPlacementOptions& options);
+
 }  // namespace plumbline
 
 #endif  // PLUMBLINE_FRONTEND_TRACK_PLACEMENT_H_

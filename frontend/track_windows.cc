@@ -1,6 +1,9 @@
+#include <plumbline/factors/angle.h>
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/track_windows.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,6 +22,23 @@ constexpr double kLeastKnown = 0.4;
 // Position and direction of a window, m and rad, in the fit of the track.
 constexpr double kWindowDistance = 0.1;
 constexpr double kWindowTurn = DegToRad(1.0);
+// Least weight of a window's position along its walls, as a share of that
+// across them.
+constexpr double kLeastAlong = 0.01;
+constexpr int kFitSteps = 3;
+
+// The weight of a window's position in the fit of the track, map's frame: along
+// a bare corridor it says nothing.
+Eigen::Matrix2d PositionWeight(const WindowJudgement& judgement) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(
+      judgement.information);
+  Eigen::Matrix2d weight = Eigen::Matrix2d::Identity();
+  if (solver.eigenvalues()[1] > 0.0) {
+    weight = judgement.information / solver.eigenvalues()[1] +
+             kLeastAlong * Eigen::Matrix2d::Identity();
+  }
+  return weight / (kWindowDistance * kWindowDistance);
+}
 
 }  // namespace
 
@@ -155,8 +175,36 @@ Pose2 FitTrack(const std::vector<TrackWindow>& windows,
   Eigen::Matrix2d rotation;
   rotation << std::cos(angle), -std::sin(angle), std::sin(angle),
       std::cos(angle);
-  const Eigen::Vector2d shift = mean_map - rotation * mean_track;
-  return Pose2(shift.x(), shift.y(), angle);
+  Pose2 fit;
+  fit << mean_map - rotation * mean_track, angle;
+  std::vector<Eigen::Matrix2d> weights;
+  for (const WindowJudgement& judgement : judgements) {
+    weights.push_back(PositionWeight(judgement));
+  }
+  for (int step = 0; step < kFitSteps; ++step) {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    const PoseTransform transform(fit);
+    for (std::size_t w = 0; w < windows.size(); ++w) {
+      if (judgements[w].verdict != WindowVerdict::kAgrees) continue;
+      const Eigen::Vector2d at = transform.Point(windows[w].middle.head<2>());
+      const Eigen::Vector2d lever = at - fit.head<2>();
+      Eigen::Matrix<double, 2, 3> jacobian;
+      jacobian << Eigen::Matrix2d::Identity(),
+          Eigen::Vector2d(-lever.y(), lever.x());
+      normal += jacobian.transpose() * weights[w] * jacobian;
+      gradient += jacobian.transpose() * weights[w] *
+                  (judgements[w].pose.head<2>() - at);
+      constexpr double kTurnWeight = 1.0 / (kWindowTurn * kWindowTurn);
+      normal(2, 2) += kTurnWeight;
+      gradient[2] +=
+          kTurnWeight *
+          NormalizeAngle(judgements[w].pose[2] - windows[w].middle[2] - fit[2]);
+    }
+    fit += normal.ldlt().solve(gradient);
+    fit[2] = NormalizeAngle(fit[2]);
+  }
+  return fit;
 }
 
 }  // namespace plumbline

@@ -60,7 +60,8 @@ WindowJudgement JudgeWindow(const std::vector<KeyView>& map,
                             const TrackPlacementOptions& options);
 
 /// Pose of the track's frame in the map's that suits the windows which agree
-/// best: least squares of positions and directions. At least one must agree.
+/// best: least squares of directions, and of positions with what the returns
+/// say of them across walls and along them. At least one must agree.
 Pose2 FitTrack(const std::vector<TrackWindow>& windows,
                const std::vector<WindowJudgement>& judgements);
 

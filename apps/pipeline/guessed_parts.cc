@@ -9,6 +9,7 @@
 #include <iterator>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -26,8 +27,19 @@ constexpr int kMostPlacements = 24;
 // robots and were wrong had up to 7, and 0.4.
 constexpr int kLeastAgreeing = 6;
 constexpr double kMostContradicting = 0.25;
+// A part whose place was found by a few of its scans lies elsewhere when this
+// many times as many windows agree there as where it was found.
+constexpr int kMoreToMove = 2;
+// So many windows that contradict, more than agree, refute that.
+constexpr int kLeastRefuting = 2;
+// It lies where it was found when it is no farther from there, m and rad.
+constexpr double kSamePlace = 1.5;
+constexpr double kSamePlaceTurn = DegToRad(5.0);
 // Longest piece of wall, m, that contradicts.
 constexpr double kLongestContradicting = 2.5;
+// Length of all these pieces, m, for each window that agrees: at right places
+// of carried robots up to 0.19, at a wrong one 0.35.
+constexpr double kContradictingPerWindow = 0.25;
 // What the returns say of the place in the direction that they say least of, as
 // a share of what they say across it: a corridor with few doors is enough, as
 // other corridors of the building would be rivals.
@@ -38,14 +50,26 @@ constexpr double kMoreMisfit = 3.0;
 // More than any number of windows.
 constexpr int kNever = 1000000;
 
+// Whether a track begins here whose place is a guess, or was found by a few of
+// its scans among all that was seen.
+bool IsUnsure(const RefinedScan& refined, int scan, const std::set<int>& sure) {
+  return refined.tie == TrackTie::kLoose ||
+         (refined.tie == TrackTie::kMatched && refined.since >= 0 &&
+          sure.count(scan) == 0);
+}
+
 // Joins the parts of one log.
 class PartPlacing {
  public:
   PartPlacing(const std::vector<Scan>& scans,
               const TrackPlacementOptions& options,
               const std::function<bool()>& stop, LogSolverResult* result,
-              std::vector<Pose2>* poses)
-      : options_(options), stop_(stop), result_(*result), poses_(*poses) {
+              std::vector<Pose2>* poses, std::set<int>* sure)
+      : options_(options),
+        stop_(stop),
+        result_(*result),
+        poses_(*poses),
+        sure_(*sure) {
     std::vector<int> keys;
     for (const KeyScanRecord& record : result_.records) {
       keys.push_back(record.scan);
@@ -55,7 +79,6 @@ class PartPlacing {
   }
 
   bool Run() {
-    bool any = false;
     bool grows = true;
     int placements = 0;
     // Views of the rest when a part was looked for, by part.
@@ -79,11 +102,11 @@ class PartPlacing {
         before = parts[0].size();
         ++placements;
         grows = Join(parts[0], parts[p]);
-        any = any || grows;
       }
     }
-    if (any) Finish();
-    return any;
+    if (any_moved_) Finish();
+    TellOfRefuted();
+    return any_moved_;
   }
 
  private:
@@ -94,23 +117,29 @@ class PartPlacing {
     return result_.refined[static_cast<std::size_t>(record(k).scan)];
   }
 
-  // Records that hang together by more than guesses.
+  // Records that hang together by more than a guess or a few scans.
   void NumberParts() {
-    int parts = 0;
     for (std::size_t k = 0; k < result_.records.size(); ++k) {
-      const bool is_guess = refined(k).tie == TrackTie::kLoose;
-      if (k == 0 || is_guess) {
-        // What a guess hangs on.
-        hangs_on_.push_back(k == 0 ? 0 : part_.back());
-        part_.push_back(parts++);
-      } else if (record(k).from >= 0) {
-        part_.push_back(part_[static_cast<std::size_t>(record(k).from)]);
-      } else {
-        part_.push_back(part_.back());
+      const int from = record(k).from;
+      const int before = from >= 0 ? part_[static_cast<std::size_t>(from)]
+                         : k > 0   ? part_.back()
+                                   : 0;
+      const RefinedScan& scan = refined(k);
+      const bool is_cut = k == 0 || IsUnsure(scan, record(k).scan, sure_);
+      if (!is_cut) {
+        part_.push_back(before);
+        continue;
       }
+      const auto part = static_cast<int>(hangs_on_.size());
+      const bool is_guess = k > 0 && scan.tie == TrackTie::kLoose;
+      part_.push_back(part);
+      hangs_on_.push_back(is_guess ? part_[k - 1] : before);
+      is_guess_.push_back(is_guess);
+      claim_.push_back(
+          k == 0 || is_guess ? part : claim_[static_cast<std::size_t>(before)]);
     }
     first_part_ = part_;
-    shifts_.assign(static_cast<std::size_t>(parts), Pose2::Zero());
+    shifts_.assign(hangs_on_.size(), Pose2::Zero());
   }
 
   std::vector<std::vector<std::size_t>> Parts() const {
@@ -132,7 +161,20 @@ class PartPlacing {
             const std::vector<std::size_t>& part) {
     const TrackPlacement placement =
         PlaceTrack(ViewsOf(rest), ViewsOf(part), std::nullopt, options_, stop_);
-    if (!placement.found) return false;
+    if (!placement.found || placement.contradicting_length >
+                                kContradictingPerWindow * placement.agreeing) {
+      return false;
+    }
+    if (ClaimOf(rest) == ClaimOf(part)) {
+      if (IsSamePlace(part, placement.pose)) {
+        if (IsTiedTo(rest, part)) return Merge(rest, part, Pose2::Zero());
+      } else {
+        const PlaceSupport here =
+            JudgePlace(ViewsOf(rest), ViewsOf(part), Pose2::Zero(), options_);
+        if (placement.agreeing < kMoreToMove * here.agreeing) return false;
+      }
+    }
+    any_moved_ = true;
     for (const std::size_t k : part) {
       views_[k].pose = Compose(placement.pose, views_[k].pose);
     }
@@ -143,15 +185,55 @@ class PartPlacing {
     const auto at_part = static_cast<std::size_t>(placement.to);
     Tie(earlier, is_later ? at_rest : at_part, later,
         is_later ? at_part : at_rest);
+    return Merge(rest, part, placement.pose);
+  }
+
+  // The part becomes one of the rest's, moved by `shift`.
+  bool Merge(const std::vector<std::size_t>& rest,
+             const std::vector<std::size_t>& part, const Pose2& shift) {
     const int moved = part_[part.front()];
     const int into = part_[rest.front()];
     for (std::size_t p = 0; p < shifts_.size(); ++p) {
       if (OwnerOf(p) != moved) continue;
-      shifts_[p] = Compose(placement.pose, shifts_[p]);
+      shifts_[p] = Compose(shift, shifts_[p]);
     }
     for (int& number : part_) {
       if (number == moved) number = into;
     }
+    return true;
+  }
+
+  // The first of those parts whose places were found in each other.
+  int ClaimOf(const std::vector<std::size_t>& part) const {
+    return claim_[static_cast<std::size_t>(first_part_[part.front()])];
+  }
+
+  // Whether a part stays where it is when it is moved by this.
+  bool IsSamePlace(const std::vector<std::size_t>& part,
+                   const Pose2& shift) const {
+    const Pose2& middle = views_[part[part.size() / 2]].pose;
+    const Pose2 moved = Between(middle, Compose(shift, middle));
+    return moved.head<2>().norm() <= kSamePlace &&
+           std::abs(moved[2]) <= kSamePlaceTurn;
+  }
+
+  // Whether the later one of both was found in the earlier one where they are
+  // now, which is sure then.
+  bool IsTiedTo(const std::vector<std::size_t>& rest,
+                const std::vector<std::size_t>& part) {
+    const bool is_later = part.front() > rest.front();
+    const std::vector<std::size_t>& later = is_later ? part : rest;
+    const std::vector<std::size_t>& earlier = is_later ? rest : part;
+    const KeyScanRecord& tied = record(later.front());
+    if (tied.from < 0 || tied.is_loose) return false;
+    const auto from = static_cast<std::size_t>(tied.from);
+    // Not where one of both was moved since.
+    if (part_[from] != part_[earlier.front()] ||
+        shifts_[static_cast<std::size_t>(first_part_[from])] !=
+            shifts_[static_cast<std::size_t>(first_part_[later.front()])]) {
+      return false;
+    }
+    sure_.insert(tied.scan);
     return true;
   }
 
@@ -183,6 +265,7 @@ class PartPlacing {
     scan.tie = TrackTie::kMatched;
     scan.since = record(from).scan;
     scan.since_key = tie;
+    sure_.insert(tied.scan);
     TellOf(tied.scan);
   }
 
@@ -200,27 +283,91 @@ class PartPlacing {
     return way;
   }
 
-  // Of the guess that a track began with at this scan.
+  // Of the track that began at this scan, or of the guess that it was in.
   void TellOf(int scan) {
-    LooseTrack* guess = nullptr;
+    LooseTrack* told = nullptr;
     for (LooseTrack& loose : result_.loose) {
-      if (!loose.found && loose.begin < scan &&
-          (guess == nullptr || loose.begin > guess->begin)) {
-        guess = &loose;
+      if (loose.found && loose.end == scan) told = &loose;
+    }
+    if (told == nullptr) {
+      for (LooseTrack& loose : result_.loose) {
+        if (!loose.found && loose.begin < scan &&
+            (told == nullptr || loose.begin > told->begin)) {
+          told = &loose;
+        }
       }
     }
-    if (guess == nullptr) return;
-    guess->found = true;
-    guess->end = scan;
-    guess->why = guess->why.substr(0, guess->why.find(';')) +
-                 "; found again by all that it saw afterwards";
+    if (told == nullptr) return;
+    told->found = true;
+    told->end = scan;
+    told->why = told->why.substr(0, told->why.find(';')) +
+                "; found again by all that it saw afterwards";
   }
 
-  // Guesses go along with what they hang on, and the first record stays.
+  // Of parts that were found by a few of their scans, where all others speak
+  // against it.
+  void TellOfRefuted() {
+    const std::vector<std::vector<std::size_t>> parts = Parts();
+    const std::vector<std::size_t>& rest = *std::max_element(
+        parts.begin(), parts.end(),
+        [](const auto& a, const auto& b) { return a.size() < b.size(); });
+    const int claim = ClaimOf(rest);
+    for (const std::vector<std::size_t>& part : parts) {
+      if (part.empty() || part == rest || part.front() == 0 ||
+          ClaimOf(part) != claim || (stop_ && stop_())) {
+        continue;
+      }
+      const Pose2& shift =
+          shifts_[static_cast<std::size_t>(part_[part.front()])];
+      const PlaceSupport support =
+          JudgePlace(ViewsOf(rest), ViewsOf(part), shift, options_);
+      if (support.contradicting < kLeastRefuting ||
+          support.contradicting <= support.agreeing) {
+        continue;
+      }
+      const int scan = record(part.front()).scan;
+      for (LooseTrack& loose : result_.loose) {
+        if (!loose.found || loose.end != scan) continue;
+        loose.found = false;
+        loose.end = record(part.back()).scan;
+        loose.why += ", where most of what it saw afterwards contradicts that";
+      }
+    }
+  }
+
+  // What was found nowhere goes along with what it was found in before, or what
+  // was found in it, or else with what it is a guess from; the first record
+  // stays.
   void Finish() {
-    for (std::size_t p = 1; p < shifts_.size(); ++p) {
-      const bool hangs = OwnerOf(p) == static_cast<int>(p) && !IsRest(p);
-      if (hangs) shifts_[p] = shifts_[static_cast<std::size_t>(hangs_on_[p])];
+    const std::size_t count = shifts_.size();
+    std::vector<bool> is_placed(count);
+    const std::vector<std::vector<std::size_t>> parts = Parts();
+    const auto rest =
+        static_cast<int>(std::max_element(parts.begin(), parts.end(),
+                                          [](const auto& a, const auto& b) {
+                                            return a.size() < b.size();
+                                          }) -
+                         parts.begin());
+    for (std::size_t p = 0; p < count; ++p) is_placed[p] = OwnerOf(p) == rest;
+    const auto along = [&](std::size_t p, std::size_t with) {
+      if (is_placed[p] || !is_placed[with]) return false;
+      shifts_[p] = shifts_[with];
+      is_placed[p] = true;
+      return true;
+    };
+    for (bool any = true; any;) {
+      any = false;
+      for (std::size_t k = 0; k < part_.size(); ++k) {
+        const KeyScanRecord& tied = record(k);
+        if (tied.from < 0 || tied.is_loose) continue;
+        const auto p = static_cast<std::size_t>(first_part_[k]);
+        const auto with = static_cast<std::size_t>(
+            first_part_[static_cast<std::size_t>(tied.from)]);
+        any = along(p, with) || along(with, p) || any;
+      }
+    }
+    for (std::size_t p = 1; p < count; ++p) {
+      along(p, static_cast<std::size_t>(hangs_on_[p]));
     }
     const Pose2 back = Inverse(shifts_.front());
     for (std::size_t k = 0; k < poses_.size(); ++k) {
@@ -229,36 +376,34 @@ class PartPlacing {
     }
   }
 
-  // Whether others were found in it.
-  bool IsRest(std::size_t part) const {
-    for (std::size_t p = 0; p < shifts_.size(); ++p) {
-      if (p != part && OwnerOf(p) == static_cast<int>(part)) return true;
-    }
-    return false;
-  }
-
   const TrackPlacementOptions& options_;
   const std::function<bool()>& stop_;
   LogSolverResult& result_;
   std::vector<Pose2>& poses_;
+  // Scans whose ties are known to be right.
+  std::set<int>& sure_;
+  bool any_moved_ = false;
   // By record; the parts' numbers now and in the beginning.
   std::vector<KeyView> views_;
   std::vector<int> part_;
   std::vector<int> first_part_;
-  // By part as they were in the beginning: what it hangs on by a guess, and by
-  // what it was moved.
+  // By part as they were in the beginning: what it hangs on, whether by a
+  // guess, the first of the parts that were found in each other, and by what
+  // it was moved.
   std::vector<int> hangs_on_;
+  std::vector<bool> is_guess_;
+  std::vector<int> claim_;
   std::vector<Pose2> shifts_;
 };
 
 }  // namespace
 
-bool HasGuessedParts(const LogSolverResult& result) {
+bool HasUnsureParts(const LogSolverResult& result, const std::set<int>& sure) {
   return std::any_of(
       result.records.begin(), result.records.end(),
       [&](const KeyScanRecord& record) {
-        return result.refined[static_cast<std::size_t>(record.scan)].tie ==
-               TrackTie::kLoose;
+        return IsUnsure(result.refined[static_cast<std::size_t>(record.scan)],
+                        record.scan, sure);
       });
 }
 
@@ -276,11 +421,12 @@ TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options) {
   return options;
 }
 
-bool PlaceGuessedParts(const std::vector<Scan>& scans,
-                       const TrackPlacementOptions& options,
-                       const std::function<bool()>& stop,
-                       LogSolverResult* result, std::vector<Pose2>* poses) {
-  return PartPlacing(scans, options, stop, result, poses).Run();
+bool PlaceUnsureParts(const std::vector<Scan>& scans,
+                      const TrackPlacementOptions& options,
+                      const std::function<bool()>& stop,
+                      LogSolverResult* result, std::vector<Pose2>* poses,
+                      std::set<int>* sure) {
+  return PartPlacing(scans, options, stop, result, poses, sure).Run();
 }
 
 }  // namespace plumbline

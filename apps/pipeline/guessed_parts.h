@@ -7,12 +7,15 @@
 #include <plumbline/pipeline/log_solver.h>
 
 #include <functional>
+#include <set>
 #include <vector>
 
 namespace plumbline {
 
-/// Whether the place of some part of the log is a guess (TrackTie::kLoose).
-bool HasGuessedParts(const LogSolverResult& result);
+/// Whether the place of some part of the log is a guess (TrackTie::kLoose) or
+/// was found by a few of its scans (TrackTie::kMatched with what was seen long
+/// before), but for tracks that begin with the scans `sure`.
+bool HasUnsureParts(const LogSolverResult& result, const std::set<int>& sure);
 
 /// Options of PlaceTrack for two parts of one log. That both are of one
 /// building is known, or as good as: doors that stand elsewhere, and the mirror
@@ -20,21 +23,25 @@ bool HasGuessedParts(const LogSolverResult& result);
 /// no other place of the building comes near.
 TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options);
 
-/// Looks for the parts whose place is a guess among what the largest part saw,
-/// largest first, when the poses of either are straight: drift over a thousand
-/// metres makes parts contradict each other that are right (JoinParts has no
-/// other poses). The largest part grows by what is found.
+/// Looks for these parts among what the largest part saw, largest first, when
+/// the poses of either are straight: drift over a thousand metres makes parts
+/// contradict each other that are right (JoinParts has no other poses). The
+/// largest part grows by what is found. What was found by a few scans stays
+/// where it was unless much more of it agrees elsewhere.
 ///
 /// `poses`: of the records' scans, in a frame in which the first one stays
-/// where it is; parts that were found are moved in them, with what hangs on
-/// them by a guess. In `result` their ties become matched ones, and
+/// where it is; parts that were found elsewhere are moved in them, with what
+/// hangs on them. In `result` their ties become matched ones, and
 /// LogSolverResult::loose tells that they were found. `options` are those of
-/// WithinOneBuilding, for the noise of the laser. Returns whether any was
-/// found; when `stop` (may be null) has returned true nothing more is.
-bool PlaceGuessedParts(const std::vector<Scan>& scans,
-                       const TrackPlacementOptions& options,
-                       const std::function<bool()>& stop,
-                       LogSolverResult* result, std::vector<Pose2>* poses);
+/// WithinOneBuilding, for the noise of the laser. `sure`: scans that begin
+/// tracks whose place is known, to which those are added that are found or
+/// confirmed. Returns whether any was moved or tied; when `stop` (may be null)
+/// has returned true nothing more is.
+bool PlaceUnsureParts(const std::vector<Scan>& scans,
+                      const TrackPlacementOptions& options,
+                      const std::function<bool()>& stop,
+                      LogSolverResult* result, std::vector<Pose2>* poses,
+                      std::set<int>* sure);
 
 }  // namespace plumbline
 

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <future>
+#include <set>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -22,6 +23,9 @@ namespace {
 // noisy laser had the first one put walls beside its walls, or visits apart.
 constexpr double kLeastSecondShare = 1.0 / 3.0;
 constexpr double kEnoughExplained = 0.5;
+
+// Parts of a log are looked for so often at most.
+constexpr int kMostRounds = 3;
 
 // Of walls that must not straighten a building: what their votes weigh, and the
 // least turn at which one is two, rad. Structure would straighten it, too, were
@@ -64,25 +68,33 @@ void SecondMap::DropGathered() {
 void SecondMap::AdjustPoses(bool find_parts) {
   KeepFirst();
   AdjustPosesOfRun();
-  if (find_parts && FindParts()) AdjustPosesOfRun();
+  // What was found makes the poses straighter, and more is found in them.
+  std::set<int> sure;
+  for (int round = 0; find_parts && round < kMostRounds; ++round) {
+    if (!FindParts(&sure)) break;
+    AdjustPosesOfRun();
+  }
   if (run_.IsStopped()) ReturnToFirst();
 }
 
-bool SecondMap::FindParts() {
-  if (run_.IsStopped() || !HasGuessedParts(run_.result)) return false;
+bool SecondMap::FindParts(std::set<int>* sure) {
+  if (run_.IsStopped() || !HasUnsureParts(run_.result, *sure)) return false;
   TrackPlacementOptions placement;
   placement.points = options_.odometry.points;
   placement.matcher = options_.odometry.matcher;
   placement.ScaleToNoise(run_.result.noise_scale);
   std::vector<Pose2> keys = adjustment_->KeyPoses();
   LogSolverResult& result = run_.result;
-  first_refined_ = result.refined;
-  first_records_ = result.records;
-  first_loose_ = result.loose;
-  if (!PlaceGuessedParts(
+  const bool is_first = first_records_.empty();
+  if (is_first) {
+    first_refined_ = result.refined;
+    first_records_ = result.records;
+    first_loose_ = result.loose;
+  }
+  if (!PlaceUnsureParts(
           run_.scans, WithinOneBuilding(placement),
-          [this] { return run_.IsStopped(); }, &run_.result, &keys)) {
-    ForgetParts();
+          [this] { return run_.IsStopped(); }, &run_.result, &keys, sure)) {
+    if (is_first) ForgetParts();
     return false;
   }
   run_.keys = std::move(keys);

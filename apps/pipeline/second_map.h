@@ -12,6 +12,7 @@
 #include <atomic>
 #include <future>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -47,10 +48,10 @@ class SecondMap {
 
   /// Adjusts the poses alone, from the key poses of the run or from odometry,
   /// whichever agrees better with what was seen. Sets the places and the
-  /// trajectory of the run. Parts of the log whose place is a guess are then
-  /// looked for in the rest (PlaceGuessedParts), if `find_parts`, and all is
-  /// adjusted once more when some were found. Throws Error when a solve fails;
-  /// likewise below.
+  /// trajectory of the run. Parts of the log whose place is not sure are then
+  /// looked for in the rest (PlaceUnsureParts), if `find_parts`, and all is
+  /// adjusted once more when some were found, a few times. Throws Error when a
+  /// solve fails; likewise below.
   void AdjustPoses(bool find_parts = false);
   /// Adds walls to adjusted poses.
   void MakeWalls();
@@ -82,9 +83,9 @@ class SecondMap {
   void ReturnToFirst();
   // The poses alone, from those of the run or by odometry.
   void AdjustPosesOfRun();
-  // Whether parts that hung on a guess were found; their poses in the run are
-  // moved.
-  bool FindParts();
+  // Whether parts whose place was not sure were found; their poses in the run
+  // are moved. `sure`: as in PlaceUnsureParts.
+  bool FindParts(std::set<int>* sure);
   void ForgetParts();
   // The poses alone by all scans, from these of the key scans.
   void AdjustFrom(const std::vector<Pose2>& start,

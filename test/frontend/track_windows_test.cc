@@ -2,6 +2,7 @@
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/track_windows.h>
 
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -112,6 +113,30 @@ TEST(TrackWindowsTest, ATrackIsFittedToItsWindows) {
   judgements.resize(1);
   EXPECT_NEAR(NormalizeAngle(FitTrack(windows, judgements)[2] - frame[2]), 0.0,
               1e-9);
+}
+
+// Along a bare corridor a window says nothing, wherever it slid to.
+TEST(TrackWindowsTest, ASlidWindowDoesNotMoveTheTrack) {
+  const Pose2 frame(7.0, -3.0, 0.5);
+  std::vector<TrackWindow> windows(4);
+  std::vector<WindowJudgement> judgements(4);
+  Eigen::Rotation2Dd turn(frame[2]);
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    windows[w].middle = Pose2(5.0 * static_cast<double>(w), 0.0, 0.0);
+    judgements[w].verdict = WindowVerdict::kAgrees;
+    judgements[w].pose = Compose(frame, windows[w].middle);
+    judgements[w].information = 100.0 * Eigen::Matrix2d::Identity();
+  }
+  judgements[2].information = turn * Eigen::Vector2d(0.1, 100.0).asDiagonal() *
+                              turn.inverse().toRotationMatrix();
+  judgements[2].pose = Compose(judgements[2].pose, Pose2(0.8, 0.0, 0.0));
+  const Pose2 fitted = FitTrack(windows, judgements);
+  EXPECT_LT((fitted - frame).head<2>().norm(), 0.01);
+  EXPECT_NEAR(fitted[2], frame[2], DegToRad(0.05));
+  // Across it it does.
+  judgements[2].pose =
+      Compose(Compose(frame, windows[2].middle), Pose2(0.0, 0.8, 0.0));
+  EXPECT_GT((FitTrack(windows, judgements) - frame).head<2>().norm(), 0.1);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <set>
 #include <vector>
 
 #include "frontend/long_hall.h"
@@ -22,6 +23,7 @@ struct GuessedLog {
   LogSolverResult result;
   std::vector<Pose2> truth;
   std::vector<Pose2> poses;
+  std::set<int> sure;
 
   // Drives along the hall at `y` from x to x, with poses that are off by
   // `shift`.
@@ -60,9 +62,27 @@ struct GuessedLog {
     if (first > 0) result.loose.back().end = static_cast<int>(scans.size()) - 1;
   }
 
+  // The part that begins with this scan was found by a few of its scans, where
+  // its poses are.
+  void MakeFound(std::size_t scan, std::size_t since) {
+    RefinedScan& refined = result.refined[scan];
+    refined.tie = TrackTie::kMatched;
+    refined.since = static_cast<int>(since);
+    KeyScanRecord& record = result.records[scan];
+    record.is_loose = false;
+    record.from = static_cast<int>(since);
+    record.motion.mean = Between(poses[since], poses[scan]);
+    for (LooseTrack& loose : result.loose) {
+      if (loose.begin + 1 != static_cast<int>(scan)) continue;
+      loose.found = true;
+      loose.end = static_cast<int>(scan);
+      loose.why = "scans are missing; found again on what it saw earlier";
+    }
+  }
+
   bool Place(const std::function<bool()>& stop = nullptr) {
-    return PlaceGuessedParts(scans, WithinOneBuilding(TrackPlacementOptions()),
-                             stop, &result, &poses);
+    return PlaceUnsureParts(scans, WithinOneBuilding(TrackPlacementOptions()),
+                            stop, &result, &poses, &sure);
   }
 
   void ExpectTrue(std::size_t begin, std::size_t end) const {
@@ -81,7 +101,7 @@ TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
   log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
   const std::size_t second = log.scans.size();
   log.Drive(LongHall(), 17.0, -17.0, -0.2, kLost);
-  ASSERT_TRUE(HasGuessedParts(log.result));
+  ASSERT_TRUE(HasUnsureParts(log.result, log.sure));
   ASSERT_TRUE(log.Place());
   log.ExpectTrue(0, log.scans.size());
   EXPECT_EQ(log.poses.front(), log.truth.front());
@@ -98,7 +118,7 @@ TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
   EXPECT_EQ(log.result.loose[0].end, static_cast<int>(second));
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again by all that it saw afterwards");
-  EXPECT_FALSE(HasGuessedParts(log.result));
+  EXPECT_FALSE(HasUnsureParts(log.result, log.sure));
 }
 
 // The larger part comes second: the map's frame is that of the first scan all
@@ -113,6 +133,88 @@ TEST(GuessedPartsTest, TheFirstScanStays) {
   EXPECT_LT(PositionError(log.poses.front(), log.truth.front()), 1e-9);
   EXPECT_LT(HeadingError(log.poses.front(), log.truth.front()), 1e-9);
   EXPECT_EQ(log.result.records[second].from, static_cast<int>(second) - 1);
+}
+
+// A few scans look like those of another place; all of them do not.
+TEST(GuessedPartsTest, APartThatWasFoundAtAWrongPlaceIsMoved) {
+  GuessedLog log;
+  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+  const std::size_t second = log.scans.size();
+  log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(8.0, 0.1, 0.0));
+  log.MakeFound(second, 40);
+  ASSERT_TRUE(HasUnsureParts(log.result, log.sure));
+  ASSERT_TRUE(log.Place());
+  log.ExpectTrue(0, log.scans.size());
+  EXPECT_EQ(log.result.loose[0].why,
+            "scans are missing; found again by all that it saw afterwards");
+  EXPECT_TRUE(log.result.loose[0].found);
+  EXPECT_FALSE(HasUnsureParts(log.result, log.sure));
+}
+
+TEST(GuessedPartsTest, APartThatWasFoundAtItsPlaceStays) {
+  GuessedLog log;
+  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+  const std::size_t second = log.scans.size();
+  log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(0.3, 0.1, DegToRad(1.0)));
+  log.MakeFound(second, 40);
+  const std::vector<Pose2> before = log.poses;
+  EXPECT_FALSE(log.Place());
+  EXPECT_EQ(log.poses, before);
+  EXPECT_EQ(log.result.records[second].from, 40);
+  EXPECT_EQ(log.sure, std::set<int>{static_cast<int>(second)});
+  EXPECT_TRUE(log.result.loose[0].found);
+  EXPECT_EQ(log.result.loose[0].why,
+            "scans are missing; found again on what it saw earlier");
+}
+
+// It is nowhere else, but not there either, and that is told.
+TEST(GuessedPartsTest, WhatContradictsItsPlaceIsTold) {
+  std::vector<WallEnds> mirrored = LongHall();
+  for (WallEnds& wall : mirrored) {
+    wall.a.y() *= -1.0;
+    wall.b.y() *= -1.0;
+  }
+  GuessedLog log;
+  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+  const std::size_t second = log.scans.size();
+  log.Drive(mirrored, 17.0, -17.0, -0.2, Pose2::Zero());
+  log.MakeFound(second, 40);
+  const std::vector<Pose2> before = log.poses;
+  EXPECT_FALSE(log.Place());
+  EXPECT_EQ(log.poses, before);
+  ASSERT_EQ(log.result.loose.size(), 1u);
+  EXPECT_FALSE(log.result.loose[0].found);
+  EXPECT_EQ(log.result.loose[0].end, static_cast<int>(log.scans.size()) - 1);
+  EXPECT_EQ(log.result.loose[0].why,
+            "scans are missing; found again on what it saw earlier, where most "
+            "of what it saw afterwards contradicts that");
+}
+
+// What was found in a part, and is too short to be looked for, goes along with
+// it; so does the first part where it is the short one.
+TEST(GuessedPartsTest, WhatWasFoundInAPartGoesAlong) {
+  GuessedLog log;
+  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+  const std::size_t second = log.scans.size();
+  log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(8.0, 0.1, 0.0));
+  log.MakeFound(second, 40);
+  const std::size_t third = log.scans.size();
+  log.Drive(LongHall(), -17.0, -14.0, 0.0, Pose2(8.0, 0.1, 0.0));
+  log.MakeFound(third, third - 5);
+  ASSERT_TRUE(log.Place());
+  log.ExpectTrue(0, log.scans.size());
+  EXPECT_EQ(log.result.records[third].from, static_cast<int>(third) - 5);
+
+  GuessedLog begun;
+  begun.Drive(LongHall(), -17.0, -14.0, 0.0, Pose2::Zero());
+  const std::size_t long_one = begun.scans.size();
+  begun.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+  begun.MakeFound(long_one, 3);
+  const std::size_t last = begun.scans.size();
+  begun.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(8.0, 0.1, 0.0));
+  begun.MakeFound(last, 40);
+  ASSERT_TRUE(begun.Place());
+  begun.ExpectTrue(0, begun.scans.size());
 }
 
 // What is too short to be looked for stays where it hangs.
@@ -146,7 +248,7 @@ TEST(GuessedPartsTest, AnotherHallIsNotFound) {
     const std::vector<Pose2> before = log.poses;
     EXPECT_FALSE(log.Place([&] { return is_stopped; }));
     EXPECT_EQ(log.poses, before);
-    EXPECT_TRUE(HasGuessedParts(log.result));
+    EXPECT_TRUE(HasUnsureParts(log.result, log.sure));
     EXPECT_FALSE(log.result.loose[0].found);
   }
 }
@@ -154,7 +256,7 @@ TEST(GuessedPartsTest, AnotherHallIsNotFound) {
 TEST(GuessedPartsTest, ALogWithoutGuessesIsLeftAlone) {
   GuessedLog log;
   log.Drive(LongHall(), -18.0, -10.0, 0.2, Pose2::Zero());
-  EXPECT_FALSE(HasGuessedParts(log.result));
+  EXPECT_FALSE(HasUnsureParts(log.result, log.sure));
   EXPECT_FALSE(log.Place());
   EXPECT_FALSE(GuessedLog().Place());
 }

@@ -1,0 +1,85 @@
+#include <gtest/gtest.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/frontend/key_views.h>
+#include <plumbline/frontend/track_placement.h>
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "frontend/synthetic_world.h"
+
+namespace plumbline {
+namespace {
+
+using testing::WallEnds;
+
+// Two rooms of 8 m by 6 m with boxes in them, which a bare corridor of 40 m
+// joins.
+std::vector<WallEnds> RoomsAndCorridor() {
+  std::vector<WallEnds> walls;
+  for (const double side : {-1.0, 1.0}) {
+    const Pose2 frame(24.0 * side, 0.0, side > 0.0 ? 0.0 : kPi);
+    std::vector<WallEnds> room = {
+        {{4.0, -3.0}, {4.0, 3.0}},    {{4.0, 3.0}, {-4.0, 3.0}},
+        {{-4.0, -3.0}, {4.0, -3.0}},  {{-4.0, 3.0}, {-4.0, 1.0}},
+        {{-4.0, -1.0}, {-4.0, -3.0}},
+    };
+    const double size = side > 0.0 ? 1.2 : 2.0;
+    for (const Pose2& box :
+         {Pose2(1.0, 1.8 * side, 0.3), Pose2(2.2 - size, -1.7, 0.5 * side)}) {
+      for (const WallEnds& edge : testing::Moved(testing::Room(size, 0.6), box))
+        room.push_back(edge);
+    }
+    for (const WallEnds& wall : testing::Moved(room, frame))
+      walls.push_back(wall);
+    walls.push_back({{-20.0, side}, {20.0, side}});
+  }
+  return walls;
+}
+
+// From room to room, seen from `y`; poses are those of the truth.
+std::vector<KeyView> Drive(std::uint64_t seed, double y) {
+  testing::Noise noise(seed);
+  testing::Laser laser = testing::FullCircle();
+  laser.sigma = 0.04;
+  laser.maximum_range = 8.0;
+  std::vector<Scan> scans;
+  std::vector<int> keys;
+  std::vector<Pose2> poses;
+  for (double x = -26.0; x < 26.0; x += 0.3) {
+    keys.push_back(static_cast<int>(keys.size()));
+    poses.emplace_back(x, y, 0.0);
+    scans.push_back(
+        testing::MakeScan(RoomsAndCorridor(), poses.back(), laser, &noise));
+  }
+  return MakeKeyViews(scans, keys, poses, {});
+}
+
+// What slides along it, as far as half a metre where ranges are noisy, does not
+// bend the track.
+TEST(PlaceTrackTest, ABareCorridorSaysNothingOfItsLength) {
+  TrackPlacementOptions options;
+  options.min_certain_information_share = options.min_information_share;
+  const TrackPlacement placement =
+      PlaceTrack(Drive(1, 0.1), Drive(2, -0.1), std::nullopt, options);
+  ASSERT_TRUE(placement.found) << placement.why_not;
+  EXPECT_LT(placement.pose.norm(), 0.05);
+  EXPECT_EQ(placement.agreeing, placement.windows);
+  EXPECT_LT(placement.misfit, 0.1);
+}
+
+TEST(PlaceTrackTest, JudgesAPlace) {
+  const std::vector<KeyView> map = Drive(1, 0.1);
+  const std::vector<KeyView> track = Drive(2, -0.1);
+  const PlaceSupport right = JudgePlace(map, track, Pose2::Zero(), {});
+  EXPECT_EQ(right.agreeing, 10);
+  EXPECT_EQ(right.contradicting, 0);
+  const PlaceSupport wrong =
+      JudgePlace(map, track, Pose2(0.0, 0.0, 0.5 * kPi), {});
+  EXPECT_EQ(wrong.agreeing, 0);
+  EXPECT_GE(wrong.contradicting, 1);
+}
+
+}  // namespace
+}  // namespace plumbline

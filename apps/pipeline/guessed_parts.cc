@@ -27,6 +27,8 @@ constexpr int kMostPlacements = 24;
 // robots and were wrong had up to 7, and 0.4.
 constexpr int kLeastAgreeing = 6;
 constexpr double kMostContradicting = 0.25;
+// Scans that are missing for so long, s, may be those of another place.
+constexpr double kLongGap = 10.0;
 // A part whose place was found by a few of its scans lies elsewhere when this
 // many times as many windows agree there as where it was found.
 constexpr int kMoreToMove = 2;
@@ -50,12 +52,29 @@ constexpr double kMoreMisfit = 3.0;
 // More than any number of windows.
 constexpr int kNever = 1000000;
 
-// Whether a track begins here whose place is a guess, or was found by a few of
-// its scans among all that was seen.
-bool IsUnsure(const RefinedScan& refined, int scan, const std::set<int>& sure) {
-  return refined.tie == TrackTie::kLoose ||
-         (refined.tie == TrackTie::kMatched && refined.since >= 0 &&
-          sure.count(scan) == 0);
+// Whether scans are missing for so long before this record that the robot may
+// have been carried, though it seemed to go on.
+bool IsAfterLongGap(const std::vector<Scan>& scans,
+                    const std::vector<KeyScanRecord>& records, std::size_t k) {
+  if (k == 0) return false;
+  const auto end = static_cast<std::size_t>(records[k].scan);
+  auto at = static_cast<std::size_t>(records[k - 1].scan);
+  for (; at < end; ++at) {
+    if (scans[at + 1].timestamp - scans[at].timestamp > kLongGap) return true;
+  }
+  return false;
+}
+
+// Whether a track begins with this record whose place is a guess, or was found
+// by a few of its scans.
+bool IsUnsure(const std::vector<Scan>& scans, const LogSolverResult& result,
+              std::size_t k, const std::set<int>& sure) {
+  const int scan = result.records[k].scan;
+  const TrackTie tie = result.refined[static_cast<std::size_t>(scan)].tie;
+  if (tie == TrackTie::kLoose) return true;
+  return (tie == TrackTie::kMatched ||
+          IsAfterLongGap(scans, result.records, k)) &&
+         sure.count(scan) == 0;
 }
 
 // Joins the parts of one log.
@@ -65,7 +84,8 @@ class PartPlacing {
               const TrackPlacementOptions& options,
               const std::function<bool()>& stop, LogSolverResult* result,
               std::vector<Pose2>* poses, std::set<int>* sure)
-      : options_(options),
+      : scans_(scans),
+        options_(options),
         stop_(stop),
         result_(*result),
         poses_(*poses),
@@ -125,7 +145,7 @@ class PartPlacing {
                          : k > 0   ? part_.back()
                                    : 0;
       const RefinedScan& scan = refined(k);
-      const bool is_cut = k == 0 || IsUnsure(scan, record(k).scan, sure_);
+      const bool is_cut = k == 0 || IsUnsure(scans_, result_, k, sure_);
       if (!is_cut) {
         part_.push_back(before);
         continue;
@@ -156,22 +176,30 @@ class PartPlacing {
     return views;
   }
 
-  // Moves a part to where it lies in the rest, if it is found there.
+  // Moves a part to where it lies in the rest, if it is found there. It is not
+  // looked for where it was found before and nothing contradicts that.
   bool Join(const std::vector<std::size_t>& rest,
             const std::vector<std::size_t>& part) {
+    const bool has_claim = ClaimOf(rest) == ClaimOf(part);
+    PlaceSupport here;
+    if (has_claim) {
+      here = JudgePlace(ViewsOf(rest), ViewsOf(part), Pose2::Zero(), options_);
+      if (here.agreeing >= kLeastAgreeing && here.contradicting == 0 &&
+          IsTiedTo(rest, part)) {
+        return Merge(rest, part, Pose2::Zero());
+      }
+    }
     const TrackPlacement placement =
         PlaceTrack(ViewsOf(rest), ViewsOf(part), std::nullopt, options_, stop_);
     if (!placement.found || placement.contradicting_length >
                                 kContradictingPerWindow * placement.agreeing) {
       return false;
     }
-    if (ClaimOf(rest) == ClaimOf(part)) {
-      if (IsSamePlace(part, placement.pose)) {
-        if (IsTiedTo(rest, part)) return Merge(rest, part, Pose2::Zero());
-      } else {
-        const PlaceSupport here =
-            JudgePlace(ViewsOf(rest), ViewsOf(part), Pose2::Zero(), options_);
+    if (has_claim) {
+      if (!IsSamePlace(part, placement.pose)) {
         if (placement.agreeing < kMoreToMove * here.agreeing) return false;
+      } else if (IsTiedTo(rest, part)) {
+        return Merge(rest, part, Pose2::Zero());
       }
     }
     any_moved_ = true;
@@ -225,8 +253,10 @@ class PartPlacing {
     const std::vector<std::size_t>& later = is_later ? part : rest;
     const std::vector<std::size_t>& earlier = is_later ? rest : part;
     const KeyScanRecord& tied = record(later.front());
-    if (tied.from < 0 || tied.is_loose) return false;
-    const auto from = static_cast<std::size_t>(tied.from);
+    if (tied.is_loose) return false;
+    const std::size_t from = tied.from >= 0
+                                 ? static_cast<std::size_t>(tied.from)
+                                 : later.front() - 1;
     // Not where one of both was moved since.
     if (part_[from] != part_[earlier.front()] ||
         shifts_[static_cast<std::size_t>(first_part_[from])] !=
@@ -265,8 +295,10 @@ class PartPlacing {
     scan.tie = TrackTie::kMatched;
     scan.since = record(from).scan;
     scan.since_key = tie;
+    scan.missed = Pose2::Zero();
+    scan.missed_since = -1;
     sure_.insert(tied.scan);
-    TellOf(tied.scan);
+    TellOf(first);
   }
 
   double WayBetween(std::size_t a, std::size_t b,
@@ -283,25 +315,36 @@ class PartPlacing {
     return way;
   }
 
-  // Of the track that began at this scan, or of the guess that it was in.
-  void TellOf(int scan) {
+  // Of the track that begins with this record: that it was found, or else that
+  // what it saw up to scan `end` contradicts where it was found.
+  void TellOf(std::size_t first, std::optional<int> end = std::nullopt) {
+    const int scan = record(first).scan;
     LooseTrack* told = nullptr;
     for (LooseTrack& loose : result_.loose) {
-      if (loose.found && loose.end == scan) told = &loose;
-    }
-    if (told == nullptr) {
-      for (LooseTrack& loose : result_.loose) {
-        if (!loose.found && loose.begin < scan &&
-            (told == nullptr || loose.begin > told->begin)) {
-          told = &loose;
-        }
+      if (loose.found ? loose.end == scan
+                      : loose.begin < scan && scan <= loose.end) {
+        told = &loose;
       }
     }
-    if (told == nullptr) return;
-    told->found = true;
-    told->end = scan;
-    told->why = told->why.substr(0, told->why.find(';')) +
-                "; found again by all that it saw afterwards";
+    if (told == nullptr) {
+      // It seemed to go on, or was found near by, and nothing was told.
+      const auto at = std::find_if(
+          result_.loose.begin(), result_.loose.end(),
+          [&](const LooseTrack& loose) { return loose.begin >= scan; });
+      told = &*result_.loose.insert(at, LooseTrack());
+      told->begin = record(first - 1).scan;
+      told->why = IsAfterLongGap(scans_, result_.records, first)
+                      ? "scans are missing; the next one seemed to follow"
+                      : "the next scan does not fit; found again near by";
+    }
+    told->found = !end;
+    told->end = end.value_or(scan);
+    if (end) {
+      told->why += ", where most of what it saw afterwards contradicts that";
+    } else {
+      told->why = told->why.substr(0, told->why.find(';')) +
+                  "; found again by all that it saw afterwards";
+    }
   }
 
   // Of parts that were found by a few of their scans, where all others speak
@@ -325,13 +368,7 @@ class PartPlacing {
           support.contradicting <= support.agreeing) {
         continue;
       }
-      const int scan = record(part.front()).scan;
-      for (LooseTrack& loose : result_.loose) {
-        if (!loose.found || loose.end != scan) continue;
-        loose.found = false;
-        loose.end = record(part.back()).scan;
-        loose.why += ", where most of what it saw afterwards contradicts that";
-      }
+      TellOf(part.front(), record(part.back()).scan);
     }
   }
 
@@ -359,10 +396,11 @@ class PartPlacing {
       any = false;
       for (std::size_t k = 0; k < part_.size(); ++k) {
         const KeyScanRecord& tied = record(k);
-        if (tied.from < 0 || tied.is_loose) continue;
+        if (k == 0 || tied.is_loose) continue;
+        const std::size_t from =
+            tied.from >= 0 ? static_cast<std::size_t>(tied.from) : k - 1;
         const auto p = static_cast<std::size_t>(first_part_[k]);
-        const auto with = static_cast<std::size_t>(
-            first_part_[static_cast<std::size_t>(tied.from)]);
+        const auto with = static_cast<std::size_t>(first_part_[from]);
         any = along(p, with) || along(with, p) || any;
       }
     }
@@ -376,6 +414,7 @@ class PartPlacing {
     }
   }
 
+  const std::vector<Scan>& scans_;
   const TrackPlacementOptions& options_;
   const std::function<bool()>& stop_;
   LogSolverResult& result_;
@@ -398,13 +437,12 @@ class PartPlacing {
 
 }  // namespace
 
-bool HasUnsureParts(const LogSolverResult& result, const std::set<int>& sure) {
-  return std::any_of(
-      result.records.begin(), result.records.end(),
-      [&](const KeyScanRecord& record) {
-        return IsUnsure(result.refined[static_cast<std::size_t>(record.scan)],
-                        record.scan, sure);
-      });
+bool HasUnsureParts(const std::vector<Scan>& scans,
+                    const LogSolverResult& result, const std::set<int>& sure) {
+  for (std::size_t k = 0; k < result.records.size(); ++k) {
+    if (IsUnsure(scans, result, k, sure)) return true;
+  }
+  return false;
 }
 
 TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options) {

@@ -12,10 +12,11 @@
 
 namespace plumbline {
 
-/// Whether the place of some part of the log is a guess (TrackTie::kLoose) or
-/// was found by a few of its scans (TrackTie::kMatched with what was seen long
-/// before), but for tracks that begin with the scans `sure`.
-bool HasUnsureParts(const LogSolverResult& result, const std::set<int>& sure);
+/// Whether the place of some part of the log is a guess (TrackTie::kLoose), was
+/// found by a few of its scans (TrackTie::kMatched) or follows scans that are
+/// missing for over 10 s, but for tracks that begin with the scans `sure`.
+bool HasUnsureParts(const std::vector<Scan>& scans,
+                    const LogSolverResult& result, const std::set<int>& sure);
 
 /// Options of PlaceTrack for two parts of one log. That both are of one
 /// building is known, or as good as: doors that stand elsewhere, and the mirror

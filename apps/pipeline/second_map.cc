@@ -78,7 +78,8 @@ void SecondMap::AdjustPoses(bool find_parts) {
 }
 
 bool SecondMap::FindParts(std::set<int>* sure) {
-  if (run_.IsStopped() || !HasUnsureParts(run_.result, *sure)) return false;
+  if (run_.IsStopped() || !HasUnsureParts(run_.scans, run_.result, *sure))
+    return false;
   TrackPlacementOptions placement;
   placement.points = options_.odometry.points;
   placement.matcher = options_.odometry.matcher;

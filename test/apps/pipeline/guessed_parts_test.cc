@@ -101,7 +101,7 @@ TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
   log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
   const std::size_t second = log.scans.size();
   log.Drive(LongHall(), 17.0, -17.0, -0.2, kLost);
-  ASSERT_TRUE(HasUnsureParts(log.result, log.sure));
+  ASSERT_TRUE(HasUnsureParts(log.scans, log.result, log.sure));
   ASSERT_TRUE(log.Place());
   log.ExpectTrue(0, log.scans.size());
   EXPECT_EQ(log.poses.front(), log.truth.front());
@@ -118,7 +118,7 @@ TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
   EXPECT_EQ(log.result.loose[0].end, static_cast<int>(second));
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again by all that it saw afterwards");
-  EXPECT_FALSE(HasUnsureParts(log.result, log.sure));
+  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.sure));
 }
 
 // The larger part comes second: the map's frame is that of the first scan all
@@ -142,13 +142,13 @@ TEST(GuessedPartsTest, APartThatWasFoundAtAWrongPlaceIsMoved) {
   const std::size_t second = log.scans.size();
   log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(8.0, 0.1, 0.0));
   log.MakeFound(second, 40);
-  ASSERT_TRUE(HasUnsureParts(log.result, log.sure));
+  ASSERT_TRUE(HasUnsureParts(log.scans, log.result, log.sure));
   ASSERT_TRUE(log.Place());
   log.ExpectTrue(0, log.scans.size());
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again by all that it saw afterwards");
   EXPECT_TRUE(log.result.loose[0].found);
-  EXPECT_FALSE(HasUnsureParts(log.result, log.sure));
+  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.sure));
 }
 
 TEST(GuessedPartsTest, APartThatWasFoundAtItsPlaceStays) {
@@ -165,6 +165,68 @@ TEST(GuessedPartsTest, APartThatWasFoundAtItsPlaceStays) {
   EXPECT_TRUE(log.result.loose[0].found);
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again on what it saw earlier");
+}
+
+// Of what was found near by nothing was told; what was not there is.
+TEST(GuessedPartsTest, APartThatWasFoundNearByIsHeldAgainstTheRest) {
+  for (const bool is_right : {false, true}) {
+    SCOPED_TRACE(is_right);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    const std::size_t second = log.scans.size();
+    log.Drive(LongHall(), 17.0, -17.0, -0.2,
+              is_right ? Pose2(0.2, 0.0, 0.0) : Pose2(4.0, 0.1, 0.0));
+    log.MakeFound(second, second - 1);
+    log.result.records[second].from = -1;
+    log.result.refined[second].since = -1;
+    log.result.refined[second].missed = Pose2(1.0, 0.0, 0.0);
+    log.result.refined[second].missed_since = 7;
+    log.result.loose.clear();
+    EXPECT_EQ(log.Place(), !is_right);
+    EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.sure));
+    if (is_right) {
+      EXPECT_TRUE(log.result.loose.empty());
+      EXPECT_EQ(log.result.refined[second].missed_since, 7);
+      continue;
+    }
+    log.ExpectTrue(0, log.scans.size());
+    EXPECT_EQ(log.result.refined[second].missed_since, -1);
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    const LooseTrack& loose = log.result.loose[0];
+    EXPECT_TRUE(loose.found);
+    EXPECT_EQ(loose.begin, static_cast<int>(second) - 1);
+    EXPECT_EQ(loose.end, static_cast<int>(second));
+    EXPECT_EQ(loose.why,
+              "the next scan does not fit; found again by all that it saw "
+              "afterwards");
+  }
+}
+
+// After scans that are missing the next one may seem to follow, in a corridor
+// that looks like this one.
+TEST(GuessedPartsTest, WhatSeemsToGoOnAfterALongGapIsHeldAgainstTheRest) {
+  for (const bool is_long : {false, true}) {
+    SCOPED_TRACE(is_long);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    const std::size_t second = log.scans.size();
+    log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(4.0, 0.1, 0.0));
+    log.result.refined[second].tie = TrackTie::kNone;
+    log.result.records[second].is_loose = false;
+    log.result.loose.clear();
+    for (std::size_t k = 0; k < log.scans.size(); ++k) {
+      log.scans[k].timestamp =
+          0.2 * static_cast<double>(k) + (is_long && k >= second ? 60.0 : 0.0);
+    }
+    EXPECT_EQ(HasUnsureParts(log.scans, log.result, log.sure), is_long);
+    EXPECT_EQ(log.Place(), is_long);
+    if (!is_long) continue;
+    log.ExpectTrue(0, log.scans.size());
+    EXPECT_EQ(log.result.refined[second].tie, TrackTie::kMatched);
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    EXPECT_EQ(log.result.loose[0].why,
+              "scans are missing; found again by all that it saw afterwards");
+  }
 }
 
 // It is nowhere else, but not there either, and that is told.
@@ -248,7 +310,7 @@ TEST(GuessedPartsTest, AnotherHallIsNotFound) {
     const std::vector<Pose2> before = log.poses;
     EXPECT_FALSE(log.Place([&] { return is_stopped; }));
     EXPECT_EQ(log.poses, before);
-    EXPECT_TRUE(HasUnsureParts(log.result, log.sure));
+    EXPECT_TRUE(HasUnsureParts(log.scans, log.result, log.sure));
     EXPECT_FALSE(log.result.loose[0].found);
   }
 }
@@ -256,7 +318,7 @@ TEST(GuessedPartsTest, AnotherHallIsNotFound) {
 TEST(GuessedPartsTest, ALogWithoutGuessesIsLeftAlone) {
   GuessedLog log;
   log.Drive(LongHall(), -18.0, -10.0, 0.2, Pose2::Zero());
-  EXPECT_FALSE(HasUnsureParts(log.result, log.sure));
+  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.sure));
   EXPECT_FALSE(log.Place());
   EXPECT_FALSE(GuessedLog().Place());
 }

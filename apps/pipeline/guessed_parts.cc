@@ -39,8 +39,8 @@ constexpr double kSamePlace = 1.5;
 constexpr double kSamePlaceTurn = DegToRad(5.0);
 // Longest piece of wall, m, that contradicts.
 constexpr double kLongestContradicting = 2.5;
-// Length of all these pieces, m, for each window that agrees: at right places of
-// carried robots up to 0.26, at wrong ones 0.33 and 0.35.
+// Length of all these pieces, m, for each window that agrees: at right places
+// of carried robots up to 0.26, at wrong ones 0.33 and 0.35.
 constexpr double kContradictingPerWindow = 0.3;
 // What the returns say of the place in the direction that they say least of, as
 // a share of what they say across it: a corridor with few doors is enough, as

@@ -25,10 +25,6 @@ std::vector<FeatureId> SeenFeatures(const KeyScanRecord& record) {
   return ids;
 }
 
-bool FollowsTheOneBefore(const KeyScanRecord& record) {
-  return record.from < 0 && !record.is_loose;
-}
-
 }  // namespace
 
 void GraphBuilder::Place(const KeyScan& scan) {

@@ -73,6 +73,12 @@ struct KeyScanRecord {
   std::vector<PointMatch> points;
 };
 
+/// Whether `motion` is measured from the record before: not where the robot was
+/// lost, or another log begins.
+inline bool FollowsTheOneBefore(const KeyScanRecord& record) {
+  return record.from < 0 && !record.is_loose;
+}
+
 /// Grows a graph from key scans: the part of the front-end that depends on the
 /// kind of raw features. Only the last robot pose is kept; what the poses
 /// before it knew is in the measurements between features (core/method.md,

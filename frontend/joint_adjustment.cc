@@ -213,8 +213,7 @@ JointAdjustment::JointAdjustment(Graph* graph, SolverSession* session,
                           std::to_string(begins_.size()));
   }
   for (std::size_t p = 0; p < places_.size(); ++p) {
-    const KeyScanRecord& record = records_[begins_[p]];
-    places_[p].follows_previous = record.from < 0 && !record.is_loose;
+    places_[p].follows_previous = FollowsTheOneBefore(records_[begins_[p]]);
     if (p > 0) {
       places_[p].since_previous =
           MotionTo(records_, ArrivalAt(records_, begins_, p)).mean;
@@ -662,7 +661,7 @@ std::vector<Pose2> KeyPosesOfPlaces(const Graph& graph,
       keys[k] = relative;
     }
     Pose2 missing = Pose2::Zero();
-    if (has_next && records[end].from < 0 && !records[end].is_loose) {
+    if (has_next && FollowsTheOneBefore(records[end])) {
       missing =
           Between(Compose(place, Compose(relative, records[end].motion.mean)),
                   PoseOf(graph.GetFeature(places[p + 1])));

@@ -18,10 +18,8 @@
 namespace plumbline {
 namespace {
 
-// A longer step between key scans is a jump, not a way, m; one of odometry is
-// one that began anew, as that of another log does.
+// A longer step between key scans is a jump, not a way, m.
 constexpr double kLongestStep = 1.5;
-constexpr double kLongestOdometryStep = 3.0;
 
 // Shifts that are tried along the weakest direction, m.
 constexpr std::array<double, 3> kShifts = {0.25, 0.5, 1.0};
@@ -540,23 +538,16 @@ class Network {
 };
 
 // Places along the way; nothing is known of them yet.
-Places SpreadPlaces(const std::vector<Scan>& scans,
-                    const std::vector<int>& keys,
-                    const std::vector<Pose2>& poses,
+Places SpreadPlaces(const std::vector<Pose2>& poses,
+                    const std::vector<bool>& follows,
                     const OpenWayOptions& options) {
-  const auto odometry_step = [&](std::size_t k) {
-    return (scans[static_cast<std::size_t>(keys[k])].odometry -
-            scans[static_cast<std::size_t>(keys[k - 1])].odometry)
-        .head<2>()
-        .norm();
-  };
   Places places;
   places.way = WayLengths(poses, kLongestStep);
   bool jumped = true;
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const bool jumps =
-        k > 0 && ((poses[k] - poses[k - 1]).head<2>().norm() >= kLongestStep ||
-                  odometry_step(k) >= kLongestOdometryStep);
+        k > 0 && (!follows[k] ||
+                  (poses[k] - poses[k - 1]).head<2>().norm() >= kLongestStep);
     jumped = jumped || jumps;
     if (!jumps && !places.keys.empty() &&
         places.way[k] - places.way[places.keys.back()] < options.spacing) {
@@ -582,22 +573,25 @@ double UncertainLengths::LargestSigma() const {
 std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
                                   const std::vector<int>& keys,
                                   const std::vector<Pose2>& poses,
+                                  const std::vector<bool>& follows,
                                   const OpenWayOptions& options,
                                   const std::function<bool()>& stop) {
-  return FindUncertainLengths(scans, keys, poses, options, stop).ways;
+  return FindUncertainLengths(scans, keys, poses, follows, options, stop).ways;
 }
 
 UncertainLengths FindUncertainLengths(const std::vector<Scan>& scans,
                                       const std::vector<int>& keys,
                                       const std::vector<Pose2>& poses,
+                                      const std::vector<bool>& follows,
                                       const OpenWayOptions& options,
                                       const std::function<bool()>& stop) {
-  if (keys.size() != poses.size()) {
+  if (keys.size() != poses.size() || keys.size() != follows.size()) {
     throw PLUMBLINE_ERROR(
-        std::to_string(poses.size()) + " poses",
+        std::to_string(poses.size()) + " poses and " +
+            std::to_string(follows.size()) + " steps",
         "one for each of " + std::to_string(keys.size()) + " key scans");
   }
-  Places places = SpreadPlaces(scans, keys, poses, options);
+  Places places = SpreadPlaces(poses, follows, options);
   const std::size_t count = places.keys.size();
   if (count < 2) return {};
   std::vector<int> place_of(poses.size(), -1);

@@ -88,12 +88,15 @@ struct UncertainLengths {
 /// explain counts as well.
 ///
 /// `keys`: indices into `scans`, ascending; `poses`: of the robot at these, map
-/// frame. `stop` (may be null) is asked now and then; once it has returned true
-/// the result is empty. Throws Error when numbers differ. Cost: linear in the
-/// way but for one sparse factorization.
+/// frame; `follows`: for each, whether odometry leads there from the one
+/// before, which it does not where the robot was lost or another log begins
+/// (the first one's is not asked). `stop` (may be null) is asked now and then;
+/// once it has returned true the result is empty. Throws Error when numbers
+/// differ. Cost: linear in the way but for one sparse factorization.
 std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
                                   const std::vector<int>& keys,
                                   const std::vector<Pose2>& poses,
+                                  const std::vector<bool>& follows,
                                   const OpenWayOptions& options,
                                   const std::function<bool()>& stop = nullptr);
 
@@ -105,8 +108,8 @@ std::vector<OpenWay> FindOpenWays(const std::vector<Scan>& scans,
 /// the map may bend between them is another matter and does not.
 UncertainLengths FindUncertainLengths(
     const std::vector<Scan>& scans, const std::vector<int>& keys,
-    const std::vector<Pose2>& poses, const OpenWayOptions& options,
-    const std::function<bool()>& stop = nullptr);
+    const std::vector<Pose2>& poses, const std::vector<bool>& follows,
+    const OpenWayOptions& options, const std::function<bool()>& stop = nullptr);
 
 }  // namespace plumbline
 

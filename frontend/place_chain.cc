@@ -16,7 +16,7 @@ std::vector<std::size_t> PlaceBegins(const std::vector<KeyScanRecord>& records,
   for (std::size_t k = 0; k < records.size(); ++k) {
     if (begins.empty() ||
         k - begins.back() == static_cast<std::size_t>(stride) ||
-        records[k].from >= 0 || records[k].is_loose) {
+        !FollowsTheOneBefore(records[k])) {
       begins.push_back(k);
     }
   }

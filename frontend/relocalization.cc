@@ -193,8 +193,7 @@ std::vector<Pose2> InterpolateScans(const std::vector<RefinedScan>& refined,
       way[i - begin] = whole;
     }
     // The robot was lost in between: nothing tells what is missing.
-    const bool goes_on =
-        !last && records[k + 1].from < 0 && !records[k + 1].is_loose;
+    const bool goes_on = !last && FollowsTheOneBefore(records[k + 1]);
     if (goes_on) {
       const Pose2 step = Between(refined[end - 1].pose, refined[end].pose);
       whole += step.head<2>().norm() + 0.5 * std::abs(step[2]);

@@ -133,6 +133,11 @@ class PartPlacing {
   const KeyScanRecord& record(std::size_t k) const {
     return result_.records[k];
   }
+  // The one that its motion counts from; k > 0.
+  std::size_t RecordBefore(std::size_t k) const {
+    return record(k).from >= 0 ? static_cast<std::size_t>(record(k).from)
+                               : k - 1;
+  }
   RefinedScan& refined(std::size_t k) {
     return result_.refined[static_cast<std::size_t>(record(k).scan)];
   }
@@ -140,10 +145,7 @@ class PartPlacing {
   // Records that hang together by more than a guess or a few scans.
   void NumberParts() {
     for (std::size_t k = 0; k < result_.records.size(); ++k) {
-      const int from = record(k).from;
-      const int before = from >= 0 ? part_[static_cast<std::size_t>(from)]
-                         : k > 0   ? part_.back()
-                                   : 0;
+      const int before = k > 0 ? part_[RecordBefore(k)] : 0;
       const RefinedScan& scan = refined(k);
       const bool is_cut = k == 0 || IsUnsure(scans_, result_, k, sure_);
       if (!is_cut) {
@@ -180,17 +182,19 @@ class PartPlacing {
   // looked for where it was found before and nothing contradicts that.
   bool Join(const std::vector<std::size_t>& rest,
             const std::vector<std::size_t>& part) {
+    const std::vector<KeyView> map = ViewsOf(rest);
+    const std::vector<KeyView> track = ViewsOf(part);
     const bool has_claim = ClaimOf(rest) == ClaimOf(part);
     PlaceSupport here;
     if (has_claim) {
-      here = JudgePlace(ViewsOf(rest), ViewsOf(part), Pose2::Zero(), options_);
+      here = JudgePlace(map, track, Pose2::Zero(), options_);
       if (here.agreeing >= kLeastAgreeing && here.contradicting == 0 &&
           IsTiedTo(rest, part)) {
         return Merge(rest, part, Pose2::Zero());
       }
     }
     const TrackPlacement placement =
-        PlaceTrack(ViewsOf(rest), ViewsOf(part), std::nullopt, options_, stop_);
+        PlaceTrack(map, track, std::nullopt, options_, stop_);
     if (!placement.found || placement.contradicting_length >
                                 kContradictingPerWindow * placement.agreeing) {
       return false;
@@ -254,9 +258,7 @@ class PartPlacing {
     const std::vector<std::size_t>& earlier = is_later ? rest : part;
     const KeyScanRecord& tied = record(later.front());
     if (tied.is_loose) return false;
-    const std::size_t from = tied.from >= 0
-                                 ? static_cast<std::size_t>(tied.from)
-                                 : later.front() - 1;
+    const std::size_t from = RecordBefore(later.front());
     // Not where one of both was moved since.
     if (part_[from] != part_[earlier.front()] ||
         shifts_[static_cast<std::size_t>(first_part_[from])] !=
@@ -395,12 +397,10 @@ class PartPlacing {
     for (bool any = true; any;) {
       any = false;
       for (std::size_t k = 0; k < part_.size(); ++k) {
-        const KeyScanRecord& tied = record(k);
-        if (k == 0 || tied.is_loose) continue;
-        const std::size_t from =
-            tied.from >= 0 ? static_cast<std::size_t>(tied.from) : k - 1;
+        if (k == 0 || record(k).is_loose) continue;
         const auto p = static_cast<std::size_t>(first_part_[k]);
-        const auto with = static_cast<std::size_t>(first_part_[from]);
+        const auto with =
+            static_cast<std::size_t>(first_part_[RecordBefore(k)]);
         any = along(p, with) || along(with, p) || any;
       }
     }

@@ -174,6 +174,7 @@ MapReview::MapReview(const std::vector<Scan>& scans,
       stop_(std::move(stop)) {
   for (const KeyScanRecord& record : records) {
     keys_.push_back(record.scan);
+    follows_.push_back(FollowsTheOneBefore(record));
     poses_.push_back(trajectory[static_cast<std::size_t>(record.scan)]);
   }
 }
@@ -193,7 +194,7 @@ UncertainLengths MapReview::Lengths() const {
   options.points.short_range = 0.0;
   options.matcher = check_.matcher;
   options.num_threads = check_.num_threads;
-  return FindUncertainLengths(scans_, keys_, poses_, options, stop_);
+  return FindUncertainLengths(scans_, keys_, poses_, follows_, options, stop_);
 }
 
 double MapReview::LargestOpenSigma() const { return Lengths().LargestSigma(); }

@@ -67,8 +67,10 @@ class MapReview {
   const MapCheckOptions& check_;
   const WayCheckOptions& way_check_;
   std::function<bool()> stop_;
-  // The scans of the records, and where they are.
+  // The scans of the records, whether they follow the ones before, and where
+  // they are.
   std::vector<int> keys_;
+  std::vector<bool> follows_;
   std::vector<Pose2> poses_;
 };
 

@@ -23,6 +23,7 @@ struct SeenDrive {
   std::vector<Scan> scans;
   std::vector<int> keys;
   std::vector<Pose2> poses;
+  std::vector<bool> follows;
 };
 
 // `sigma`: error of odometry after a metre, m.
@@ -45,6 +46,7 @@ SeenDrive DriveAlong(const std::vector<WallEnds>& walls,
     }
     drive.scans.back().odometry = odometry;
   }
+  drive.follows.assign(poses.size(), true);
   return drive;
 }
 
@@ -82,7 +84,7 @@ TEST(FindOpenWaysTest, ACorridorWithNothingInSightHangsOnOdometry) {
   const SeenDrive drive =
       DriveAlong(RoomAndCorridor(), Straight(-8.0, 70.0), 0.05);
   const std::vector<OpenWay> ways =
-      FindOpenWays(drive.scans, drive.keys, drive.poses, {});
+      FindOpenWays(drive.scans, drive.keys, drive.poses, drive.follows, {});
   ASSERT_EQ(ways.size(), 1u);
   // The room is in sight for 8 m or so.
   EXPECT_GT(ways[0].length, 50.0);
@@ -95,7 +97,7 @@ TEST(FindOpenWaysTest, ACorridorWithNothingInSightHangsOnOdometry) {
   OpenWayOptions one;
   one.num_threads = 1;
   const std::vector<OpenWay> again =
-      FindOpenWays(drive.scans, drive.keys, drive.poses, one);
+      FindOpenWays(drive.scans, drive.keys, drive.poses, drive.follows, one);
   ASSERT_EQ(again.size(), 1u);
   EXPECT_EQ(again[0].begin, ways[0].begin);
   EXPECT_EQ(again[0].end, ways[0].end);
@@ -105,23 +107,33 @@ TEST(FindOpenWaysTest, ACorridorWithNothingInSightHangsOnOdometry) {
 TEST(FindOpenWaysTest, ACorridorWithNichesDoesNot) {
   const SeenDrive drive =
       DriveAlong(WithNiches(RoomAndCorridor()), Straight(-8.0, 70.0), 0.05);
-  EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}).empty());
+  EXPECT_TRUE(
+      FindOpenWays(drive.scans, drive.keys, drive.poses, drive.follows, {})
+          .empty());
 }
 
-// As where another log begins, next to where the last one ended.
+// As where another log begins next to where the last one ended.
 TEST(FindOpenWaysTest, OdometryThatBeginsAnewSaysNothingOfTheRest) {
   SeenDrive drive =
       DriveAlong(WithNiches(RoomAndCorridor()), Straight(-8.0, 70.0), 0.05);
   for (std::size_t k = 10; k < drive.scans.size(); ++k) {
     drive.scans[k].odometry[0] += 100.0;
   }
-  EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}).empty());
+  const auto find = [&drive] {
+    return FindOpenWays(drive.scans, drive.keys, drive.poses, drive.follows,
+                        {});
+  };
+  EXPECT_FALSE(find().empty());
+  drive.follows[10] = false;
+  EXPECT_TRUE(find().empty());
 }
 
 TEST(FindOpenWaysTest, AShortCorridorDoesNot) {
   const SeenDrive drive =
       DriveAlong(RoomAndCorridor(), Straight(-8.0, 5.0), 0.01);
-  EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}).empty());
+  EXPECT_TRUE(
+      FindOpenWays(drive.scans, drive.keys, drive.poses, drive.follows, {})
+          .empty());
 }
 
 // Nothing in sight shows it, but odometry does.
@@ -131,12 +143,13 @@ TEST(FindOpenWaysTest, AMapThatIsShorterThanOdometryIsLessCertain) {
   OpenWayOptions options;
   options.told_sigma = 0.3;
   EXPECT_TRUE(
-      FindOpenWays(drive.scans, drive.keys, drive.poses, options).empty());
+      FindOpenWays(drive.scans, drive.keys, drive.poses, drive.follows, options)
+          .empty());
   std::vector<Pose2> shorter = drive.poses;
   // By 0.5 m, from where the room is out of sight.
   for (Pose2& pose : shorter) pose[0] -= 0.1 * std::max(0.0, pose[0] - 3.0);
   const std::vector<OpenWay> ways =
-      FindOpenWays(drive.scans, drive.keys, shorter, options);
+      FindOpenWays(drive.scans, drive.keys, shorter, drive.follows, options);
   ASSERT_EQ(ways.size(), 1u);
   EXPECT_GT(ways[0].sigma, 0.4);
 }
@@ -165,7 +178,7 @@ TEST(FindOpenWaysTest, ARoundCorridorHangsOnOdometry) {
   }
   const SeenDrive drive = DriveAlong(walls, poses, 0.05);
   const std::vector<OpenWay> ways =
-      FindOpenWays(drive.scans, drive.keys, drive.poses, {});
+      FindOpenWays(drive.scans, drive.keys, drive.poses, drive.follows, {});
   ASSERT_FALSE(ways.empty());
   double longest = 0.0;
   for (const OpenWay& way : ways) longest = std::max(longest, way.length);
@@ -193,7 +206,8 @@ TEST(FindUncertainLengthsTest, ShortWaysAddUp) {
     OpenWayOptions options;
     // Each way by itself is known well enough.
     options.told_sigma = 1.0;
-    return FindUncertainLengths(drive.scans, drive.keys, drive.poses, options);
+    return FindUncertainLengths(drive.scans, drive.keys, drive.poses,
+                                drive.follows, options);
   };
   const UncertainLengths poor = lengths(8.0, 0.1, 3.0);
   EXPECT_TRUE(poor.ways.empty());
@@ -213,15 +227,16 @@ TEST(FindOpenWaysTest, EndsWhenItIsTold) {
   const SeenDrive drive =
       DriveAlong(RoomAndCorridor(), Straight(-8.0, 70.0), 0.05);
   int asked = 0;
-  EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, {}, [&asked] {
-                return ++asked > 0;
-              }).empty());
+  EXPECT_TRUE(FindOpenWays(drive.scans, drive.keys, drive.poses, drive.follows,
+                           {}, [&asked] { return ++asked > 0; })
+                  .empty());
   EXPECT_EQ(asked, 1);
 }
 
 TEST(FindOpenWaysTest, NumbersMustAgree) {
-  EXPECT_THROW(FindOpenWays({}, {0}, {}, {}), Error);
-  EXPECT_TRUE(FindOpenWays({}, {}, {}, {}).empty());
+  EXPECT_THROW(FindOpenWays({}, {0}, {}, {}, {}), Error);
+  EXPECT_THROW(FindOpenWays({}, {}, {}, {true}, {}), Error);
+  EXPECT_TRUE(FindOpenWays({}, {}, {}, {}, {}).empty());
 }
 
 }  // namespace

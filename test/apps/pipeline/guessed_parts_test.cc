@@ -62,6 +62,15 @@ struct GuessedLog {
     if (first > 0) result.loose.back().end = static_cast<int>(scans.size()) - 1;
   }
 
+  // Along the hall, and back on another way with poses that are off; returns
+  // where the way back begins.
+  std::size_t DriveThereAndBack(const Pose2& shift) {
+    Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    const std::size_t second = scans.size();
+    Drive(LongHall(), 17.0, -17.0, -0.2, shift);
+    return second;
+  }
+
   // The part that begins with this scan was found by a few of its scans, where
   // its poses are.
   void MakeFound(std::size_t scan, std::size_t since) {
@@ -98,9 +107,7 @@ const Pose2 kLost(60.0, -30.0, 2.2);
 // The robot was carried and sees the hall once more, on another way.
 TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
   GuessedLog log;
-  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
-  const std::size_t second = log.scans.size();
-  log.Drive(LongHall(), 17.0, -17.0, -0.2, kLost);
+  const std::size_t second = log.DriveThereAndBack(kLost);
   ASSERT_TRUE(HasUnsureParts(log.scans, log.result, log.sure));
   ASSERT_TRUE(log.Place());
   log.ExpectTrue(0, log.scans.size());
@@ -138,9 +145,7 @@ TEST(GuessedPartsTest, TheFirstScanStays) {
 // A few scans look like those of another place; all of them do not.
 TEST(GuessedPartsTest, APartThatWasFoundAtAWrongPlaceIsMoved) {
   GuessedLog log;
-  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
-  const std::size_t second = log.scans.size();
-  log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(8.0, 0.1, 0.0));
+  const std::size_t second = log.DriveThereAndBack(Pose2(8.0, 0.1, 0.0));
   log.MakeFound(second, 40);
   ASSERT_TRUE(HasUnsureParts(log.scans, log.result, log.sure));
   ASSERT_TRUE(log.Place());
@@ -153,9 +158,8 @@ TEST(GuessedPartsTest, APartThatWasFoundAtAWrongPlaceIsMoved) {
 
 TEST(GuessedPartsTest, APartThatWasFoundAtItsPlaceStays) {
   GuessedLog log;
-  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
-  const std::size_t second = log.scans.size();
-  log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(0.3, 0.1, DegToRad(1.0)));
+  const std::size_t second =
+      log.DriveThereAndBack(Pose2(0.3, 0.1, DegToRad(1.0)));
   log.MakeFound(second, 40);
   const std::vector<Pose2> before = log.poses;
   EXPECT_FALSE(log.Place());
@@ -172,10 +176,8 @@ TEST(GuessedPartsTest, APartThatWasFoundNearByIsHeldAgainstTheRest) {
   for (const bool is_right : {false, true}) {
     SCOPED_TRACE(is_right);
     GuessedLog log;
-    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
-    const std::size_t second = log.scans.size();
-    log.Drive(LongHall(), 17.0, -17.0, -0.2,
-              is_right ? Pose2(0.2, 0.0, 0.0) : Pose2(4.0, 0.1, 0.0));
+    const std::size_t second = log.DriveThereAndBack(
+        is_right ? Pose2(0.2, 0.0, 0.0) : Pose2(4.0, 0.1, 0.0));
     log.MakeFound(second, second - 1);
     log.result.records[second].from = -1;
     log.result.refined[second].since = -1;
@@ -208,9 +210,7 @@ TEST(GuessedPartsTest, WhatSeemsToGoOnAfterALongGapIsHeldAgainstTheRest) {
   for (const bool is_long : {false, true}) {
     SCOPED_TRACE(is_long);
     GuessedLog log;
-    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
-    const std::size_t second = log.scans.size();
-    log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(4.0, 0.1, 0.0));
+    const std::size_t second = log.DriveThereAndBack(Pose2(4.0, 0.1, 0.0));
     log.result.refined[second].tie = TrackTie::kNone;
     log.result.records[second].is_loose = false;
     log.result.loose.clear();
@@ -256,9 +256,7 @@ TEST(GuessedPartsTest, WhatContradictsItsPlaceIsTold) {
 // it; so does the first part where it is the short one.
 TEST(GuessedPartsTest, WhatWasFoundInAPartGoesAlong) {
   GuessedLog log;
-  log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
-  const std::size_t second = log.scans.size();
-  log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2(8.0, 0.1, 0.0));
+  const std::size_t second = log.DriveThereAndBack(Pose2(8.0, 0.1, 0.0));
   log.MakeFound(second, 40);
   const std::size_t third = log.scans.size();
   log.Drive(LongHall(), -17.0, -14.0, 0.0, Pose2(8.0, 0.1, 0.0));

@@ -60,6 +60,14 @@ class SeveralLogsTest : public ::testing::Test {
     return piece;
   }
 
+  // Of the office.
+  SeveralLogsResult SolveHalves(const SeveralLogsOptions& options) const {
+    const Log office = Office();
+    const std::size_t n = office.scans.size();
+    return SolveSeveralLogs(
+        registry_, {Piece(office, 0, n / 2), Piece(office, n / 2, n)}, options);
+  }
+
   // The same drive through a building of the same kind, a little larger.
   static Log Enlarged(Log log) {
     for (Scan& scan : log.scans) {
@@ -145,20 +153,14 @@ TEST_F(SeveralLogsTest, PiecesOfADriveBecomeOneMapInAnyOrder) {
 // First maps are bent. Where that alone speaks against a place, their poses are
 // adjusted before it is looked for again.
 TEST_F(SeveralLogsTest, BentFirstMapsAreStraightened) {
-  const Log office = Office();
-  const std::size_t n = office.scans.size();
-  const auto solve = [&](const SeveralLogsOptions& options) {
-    return SolveSeveralLogs(
-        registry_, {Piece(office, 0, n / 2), Piece(office, n / 2, n)}, options);
-  };
   SeveralLogsOptions options;
-  const SeveralLogsResult bent = solve(options);
+  const SeveralLogsResult bent = SolveHalves(options);
   ASSERT_EQ(bent.maps.size(), 1u);
   const double misfit = bent.logs[1].placement.misfit;
   ASSERT_GT(misfit, 0.0);
   options.placement.max_misfit = 0.9 * misfit;
   options.placement.max_misfit_per_metre = 0.0;
-  const SeveralLogsResult straight = solve(options);
+  const SeveralLogsResult straight = SolveHalves(options);
   ASSERT_EQ(straight.maps.size(), 1u);
   EXPECT_LT(straight.logs[1].placement.misfit, 0.9 * misfit);
   EXPECT_LT(LargestError(straight.maps.front()), 0.25);
@@ -168,26 +170,20 @@ TEST_F(SeveralLogsTest, BentFirstMapsAreStraightened) {
 // does not help, they are adjusted together, and what is asked of a place is
 // asked again.
 TEST_F(SeveralLogsTest, BentFirstMapsAreStraightenedTogether) {
-  const Log office = Office();
-  const std::size_t n = office.scans.size();
-  const auto solve = [&](const SeveralLogsOptions& options) {
-    return SolveSeveralLogs(
-        registry_, {Piece(office, 0, n / 2), Piece(office, n / 2, n)}, options);
-  };
   SeveralLogsOptions options;
   options.placement.max_misfit_per_metre = 0.0;
-  const double bent = solve(options).logs[1].placement.misfit;
+  const double bent = SolveHalves(options).logs[1].placement.misfit;
   options.placement.max_misfit = 0.9 * bent;
-  const double alone = solve(options).logs[1].placement.misfit;
+  const double alone = SolveHalves(options).logs[1].placement.misfit;
   ASSERT_LT(alone, 0.9 * bent);
   options.placement.max_misfit = 0.9 * alone;
-  const SeveralLogsResult apart = solve(options);
+  const SeveralLogsResult apart = SolveHalves(options);
   ASSERT_EQ(apart.maps.size(), 2u);
   EXPECT_THAT(apart.logs[1].placement.why_not,
               ::testing::HasSubstr("not together"));
   // Of so many parts that is no chance.
   options.placement.min_plain_agreeing = apart.logs[1].placement.agreeing;
-  const SeveralLogsResult together = solve(options);
+  const SeveralLogsResult together = SolveHalves(options);
   ASSERT_EQ(together.maps.size(), 1u) << together.logs[1].placement.why_not;
   EXPECT_LT(together.logs[1].placement.misfit, 0.9 * alone);
   EXPECT_LT(LargestError(together.maps.front()), 0.25);

@@ -1,5 +1,6 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/frontend/peak_search.h>
+#include <plumbline/frontend/strided_scores.h>
 
 #include <algorithm>
 #include <array>
@@ -11,24 +12,12 @@
 #include <tuple>
 #include <utility>
 
-// Compiled once more for processors that add 16 numbers at a time, the same
-// sums: which of the two runs is decided when the program starts, earlier than
-// a sanitizer is ready.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define PLUMBLINE_FOR_WIDE_LANES \
-  __attribute__((target_clones("avx2", "default")))
-#else
-#define PLUMBLINE_FOR_WIDE_LANES
-#endif
-#define PLUMBLINE_INLINE __attribute__((always_inline)) inline
-
 namespace plumbline {
 namespace {
 
 constexpr int kLevels = 3;
 static_assert(kPeakPad == 1 << (kLevels - 1));
-constexpr double kMostScore = 255.0;
+static_assert(kPeakPad == StridedScores::kStride);
 // The error at the farthest point that a step of the rotation makes, m, and its
 // bounds, rad.
 constexpr double kRotationError = 0.15;
@@ -46,147 +35,19 @@ constexpr int kFewTurns = 8;
 // what is good enough.
 constexpr int kTurnsAtOnce = 8;
 
-// Cells whose scores a lane of 16 bits can hold the sum of.
-constexpr std::size_t kMostInLane = 32767 / static_cast<int>(kMostScore);
+// Open nodes that are put on the heap at first, and how many times as many are
+// the next time.
+constexpr std::size_t kFirstInHeap = 4096;
+constexpr std::size_t kMoreInHeap = 4;
+// Nodes that are looked at ahead of the search, as a share of the parts it has
+// looked at, and how many a thread takes at a time.
+constexpr std::int64_t kPartsPerAhead = 32;
+constexpr std::int64_t kLeastAhead = 4;
+constexpr std::int64_t kMostAhead = 1024;
+constexpr std::size_t kAheadAtOnce = 64;
 // Points of which the bounds of a node's parts are added up between two looks
 // whether one of them can still be good enough.
 constexpr std::size_t kPointsAtOnce = 16;
-
-// Nodes whose scores are added up together: few enough that what they are added
-// from stays at hand from one point to the next.
-constexpr std::size_t kNodesTogether = 4096;
-
-// Rounded down.
-int FloorDivided(int x, int by) {
-  return x >= 0 ? x / by : -((by - 1 - x) / by);
-}
-
-// Coarsest nodes of a row: [column, column + count).
-struct NodeRun {
-  int column;
-  int row;
-  int count;
-};
-
-// The coarsest scores in the order in which PeakSearch adds them up: those of
-// cells that are a node apart lie beside each other.
-class StridedScores {
- public:
-  static constexpr int kStride = kPeakPad;
-  // Nodes that are added to at a time.
-  static constexpr int kLanes = 16;
-
-  // Where the scores of a point lie that the nodes give it.
-  struct Place {
-    // Of the row and column before which (0, 0) is the point's first node.
-    std::size_t begin;
-    int row;
-    int column;
-  };
-
-  StridedScores(const std::vector<std::int16_t>& scores, int columns, int rows)
-      : columns_((columns + kStride - 1) / kStride),
-        rows_((rows + kStride - 1) / kStride),
-        pitch_(static_cast<std::size_t>(columns_ + 2 * kLanes)),
-        scores_(pitch_ * static_cast<std::size_t>(rows_ * kStride * kStride)) {
-    for (int y = 0; y < rows; ++y) {
-      const std::int16_t* from = &scores[static_cast<std::size_t>(y) * columns];
-      for (int first = 0; first < kStride; ++first) {
-        std::int16_t* to =
-            &scores_[Begin(first, y % kStride) +
-                     pitch_ * static_cast<std::size_t>(y / kStride)];
-        for (int x = first; x < columns; x += kStride) *to++ = from[x];
-      }
-    }
-  }
-
-  // Of a cell that may lie outside of the grid.
-  Place PlaceOf(int x, int y) const {
-    const int column = FloorDivided(x, kStride);
-    const int row = FloorDivided(y, kStride);
-    return {Begin(x - kStride * column, y - kStride * row), row, column};
-  }
-
-  // For each node of the runs, kLanes at a time, the sum of the scores that it
-  // gives to the points at the places; `sums` is as long as LanesOf says.
-  // False, and not all are added up, when none of them can be `least`.
-  PLUMBLINE_FOR_WIDE_LANES bool Sum(const std::vector<Place>& places,
-                                    const NodeRun* runs, std::size_t num_runs,
-                                    double least,
-                                    std::vector<std::int16_t>* lanes,
-                                    std::vector<std::int32_t>* sums) const {
-    std::size_t size = 0;
-    for (std::size_t r = 0; r < num_runs; ++r) size += LanesOf(runs[r]);
-    sums->assign(size, 0);
-    for (std::size_t begin = 0; begin < places.size(); begin += kMostInLane) {
-      const std::size_t end = std::min(places.size(), begin + kMostInLane);
-      lanes->assign(size, 0);
-      for (std::size_t i = begin; i < end; ++i) {
-        Add(places[i], runs, num_runs, lanes->data());
-      }
-      std::int32_t most = std::numeric_limits<std::int32_t>::lowest();
-      for (std::size_t k = 0; k < size; ++k) {
-        (*sums)[k] += (*lanes)[k];
-        most = std::max(most, (*sums)[k]);
-      }
-      if (most + kMostScore * static_cast<double>(places.size() - end) <
-          least) {
-        return false;
-      }
-    }
-    return true;
-  }
-
-  static std::size_t LanesOf(const NodeRun& run) {
-    return static_cast<std::size_t>((run.count + kLanes - 1) / kLanes * kLanes);
-  }
-
- private:
-  // Numbers of 16 bits, which compilers add in one instruction or two.
-  using Lanes = std::int16_t __attribute__((vector_size(32)));
-  static_assert(sizeof(Lanes) == kLanes * sizeof(std::int16_t));
-
-  // Index of the first score of the cells at (x, y) modulo kStride. Before and
-  // behind each row are kLanes of no score.
-  std::size_t Begin(int x, int y) const {
-    return static_cast<std::size_t>(y * kStride + x) * pitch_ *
-               static_cast<std::size_t>(rows_) +
-           kLanes;
-  }
-
-  PLUMBLINE_INLINE void Add(const Place& place, const NodeRun* runs,
-                            std::size_t num_runs, std::int16_t* lanes) const {
-    for (const NodeRun* run = runs; run != runs + num_runs; ++run) {
-      const int row = place.row + run->row;
-      const int column = place.column + run->column;
-      std::int16_t* const first = lanes;
-      lanes += LanesOf(*run);
-      if (static_cast<unsigned>(row) >= static_cast<unsigned>(rows_)) continue;
-      const std::int16_t* const scores =
-          scores_.data() + place.begin + pitch_ * static_cast<std::size_t>(row);
-      for (int k = 0; k < run->count; k += kLanes) {
-        const int at = column + k;
-        if (at <= -kLanes || at >= columns_) continue;
-        AddLanes(scores + at, first + k);
-      }
-    }
-  }
-
-  PLUMBLINE_INLINE static void AddLanes(const std::int16_t* scores,
-                                        std::int16_t* to) {
-    Lanes part, sum;
-    std::memcpy(&part, scores, sizeof(part));
-    std::memcpy(&sum, to, sizeof(sum));
-    sum += part;
-    std::memcpy(to, &sum, sizeof(sum));
-  }
-
-  int columns_;
-  int rows_;
-  // Of one row to the next.
-  std::size_t pitch_;
-  std::vector<std::int16_t> scores_;
-};
 
 // For blocks of the coarsest nodes, kStride each way, how good the best of them
 // can be. Scores are those of squares of kStride cells, so that they are few.
@@ -262,9 +123,10 @@ class PeakSearch {
         window_(
             static_cast<int>(std::ceil(translation_window / grid.resolution))),
         rotation_window_(rotation_window),
-        unit_(kMostScore * static_cast<double>(points.size())),
+        unit_(StridedScores::kMostScore * static_cast<double>(points.size())),
         share_(share),
-        least_(minimum_score * unit_) {
+        least_(minimum_score * unit_),
+        team_(ThreadsHere()) {
     double farthest = 1.0;
     for (const Eigen::Vector2d& point : points) {
       farthest = std::max(farthest, point.norm());
@@ -273,8 +135,14 @@ class PeakSearch {
         std::clamp(kRotationError / farthest, kLeastRotation, kMostRotation);
     rotations_ = static_cast<int>(std::ceil(rotation_window / step));
     cells_.resize(2 * rotations_ + 1);
+    offsets_.resize(cells_.size());
+    boxes_.resize(cells_.size());
     for (std::size_t k = 0; k < cells_.size(); ++k) {
       cells_[k] = CellsAt(points, Angle(static_cast<int>(k)));
+      for (const Cell& cell : cells_[k]) {
+        offsets_[k].push_back(std::ptrdiff_t{cell.y} * grid.columns + cell.x);
+        boxes_[k].Add(cell);
+      }
     }
   }
 
@@ -289,7 +157,6 @@ class PeakSearch {
     nodes_ = std::min<std::int64_t>(count / kTogether, kMaxNodes);
     opened_ = nodes_;
     if (nodes_ >= kMaxNodes) return;
-    ThreadTeam team(ThreadsHere());
     std::vector<Turn> turns(kTurnsAtOnce);
     // What some rotations lead to leaves little to open at the others.
     for (const int step : {kFewTurns, 1}) {
@@ -302,7 +169,7 @@ class PeakSearch {
         }
         const int at_once =
             std::min(kTurnsAtOnce, (size - first + step - 1) / step);
-        team.For(static_cast<std::size_t>(at_once), [&](std::size_t i) {
+        team_.For(static_cast<std::size_t>(at_once), [&](std::size_t i) {
           Turn& turn = turns[i];
           turn.rotation = first + static_cast<int>(i) * step;
           FindLeft(runs, blocks, &turn);
@@ -321,7 +188,6 @@ class PeakSearch {
     };
     open_.erase(std::partition(open_.begin(), open_.end(), is_left),
                 open_.end());
-    std::make_heap(open_.begin(), open_.end());
   }
 
   // The peaks, best first, that have the share of the best one's score.
@@ -329,15 +195,15 @@ class PeakSearch {
                               const std::function<bool()>& stop) {
     std::vector<ScoredPose> peaks;
     std::int64_t asked_at = nodes_;
-    while (!open_.empty() && static_cast<int>(peaks.size()) < max_peaks &&
-           nodes_ < kMaxNodes && parts() < max_parts_) {
+    while (static_cast<int>(peaks.size()) < max_peaks && nodes_ < kMaxNodes &&
+           parts() < max_parts_) {
       if (stop && nodes_ - asked_at >= kNodesAtOnce) {
         if (stop()) return {};
         asked_at = nodes_;
       }
-      std::pop_heap(open_.begin(), open_.end());
-      const Node node = open_.back();
-      open_.pop_back();
+      if (!LookAhead(peaks)) break;
+      const NodeAhead node = ahead_.back();
+      ahead_.pop_back();
       if (node.bound < least_) break;
       if (IsBesideAny(node, peaks)) continue;
       if (node.level == 0) {
@@ -363,6 +229,23 @@ class PeakSearch {
     int x;
     int y;
   };
+  // The least and the largest of cells.
+  struct CellBounds {
+    int least_x = std::numeric_limits<int>::max();
+    int least_y = std::numeric_limits<int>::max();
+    int most_x = std::numeric_limits<int>::lowest();
+    int most_y = std::numeric_limits<int>::lowest();
+    void Add(const Cell& cell) {
+      least_x = std::min(least_x, cell.x);
+      least_y = std::min(least_y, cell.y);
+      most_x = std::max(most_x, cell.x);
+      most_y = std::max(most_y, cell.y);
+    }
+  };
+  // Cells beside each other in a row: both parts of a node are among them.
+  static constexpr int kRowLanes = 4;
+  using RowLanes = std::int16_t
+      __attribute__((vector_size(kRowLanes * sizeof(std::int16_t))));
   // Translations by [x, x + 2^level) and [y, y + 2^level) cells at one
   // rotation; none of them scores more than `bound`.
   struct Node {
@@ -377,6 +260,11 @@ class PeakSearch {
     }
   };
 
+  // A node and the bounds of its parts.
+  struct NodeAhead : Node {
+    std::array<int, 4> parts;
+  };
+
   // What is opened at a rotation; all but that is kept for its memory.
   struct Turn {
     int rotation = 0;
@@ -386,7 +274,6 @@ class PeakSearch {
     std::vector<NodeRun> left;
     std::vector<StridedScores::Place> places;
     std::vector<std::pair<int, int>> spans;
-    std::vector<std::int16_t> lanes;
     std::vector<std::int32_t> sums;
   };
 
@@ -465,13 +352,11 @@ class PeakSearch {
       const int row = blocks[begin].row;
       std::size_t end = begin;
       while (end < blocks.size() && blocks[end].row == row) ++end;
-      const bool is_any = blocks_.scores().Sum(
-          turn->places, &blocks[begin], end - begin, std::max(least_, 1.0),
-          &turn->lanes, &turn->sums);
+      blocks_.scores().Sum(turn->places, &blocks[begin], end - begin,
+                           std::max(least_, 1.0), &turn->sums);
       turn->spans.clear();
       const std::int32_t* bounds = turn->sums.data();
       for (; begin < end; ++begin) {
-        if (!is_any) continue;
         AddSpans(blocks[begin], bounds, &turn->spans);
         bounds += StridedScores::LanesOf(blocks[begin]);
       }
@@ -510,11 +395,9 @@ class PeakSearch {
       turn->places.push_back(
           scores.PlaceOf(cell.x + FirstOf(0), cell.y + FirstOf(0)));
     }
-    // Neighbours look at the same scores.
     std::sort(turn->places.begin(), turn->places.end(),
               [](const auto& a, const auto& b) {
-                return std::tie(a.begin, a.row, a.column) <
-                       std::tie(b.begin, b.row, b.column);
+                return std::tie(a.row, a.begin) < std::tie(b.row, b.begin);
               });
   }
 
@@ -525,42 +408,29 @@ class PeakSearch {
     turn->open.clear();
     Node best{0, kLevels - 1, turn->rotation, 0, 0};
     FillPlaces(coarsest_, turn);
-    std::size_t begin = 0;
-    while (begin < runs.size()) {
-      std::size_t end = begin;
-      std::size_t size = 0;
-      while (end < runs.size() && size < kNodesTogether) {
-        size += StridedScores::LanesOf(runs[end++]);
+    coarsest_.Sum(turn->places, runs.data(), runs.size(), least_, &turn->sums);
+    const std::int32_t* bounds = turn->sums.data();
+    for (const NodeRun& run : runs) {
+      for (int k = 0; k < run.count; ++k) {
+        if (bounds[k] < least_ || bounds[k] <= 0) continue;
+        const Node node{bounds[k], kLevels - 1, turn->rotation,
+                        FirstOf(run.column + k), FirstOf(run.row)};
+        turn->open.push_back(node);
+        if (best < node) best = node;
       }
-      if (!coarsest_.Sum(turn->places, &runs[begin], end - begin, least_,
-                         &turn->lanes, &turn->sums)) {
-        begin = end;
-        continue;
-      }
-      const std::int32_t* bounds = turn->sums.data();
-      for (; begin < end; ++begin) {
-        const NodeRun& run = runs[begin];
-        for (int k = 0; k < run.count; ++k) {
-          if (bounds[k] < least_ || bounds[k] <= 0) continue;
-          const Node node{bounds[k], kLevels - 1, turn->rotation,
-                          FirstOf(run.column + k), FirstOf(run.row)};
-          turn->open.push_back(node);
-          if (best < node) best = node;
-        }
-        bounds += StridedScores::LanesOf(run);
-      }
+      bounds += StridedScores::LanesOf(run);
     }
     while (best.bound > 0 && best.level > 0) best = BestPart(best);
     turn->best = best;
   }
 
-  // Calls `visit(part)` with the four parts of a node that are in the window
-  // and may score `least` and more than nothing.
+  // Calls `visit(part)` with the four parts of a node, of these bounds, that
+  // are in the window and may score `least` and more than nothing.
   template <typename Visit>
-  void VisitParts(const Node& node, double least, const Visit& visit) const {
+  void VisitParts(const Node& node, const std::array<int, 4>& bounds,
+                  double least, const Visit& visit) const {
     const int level = node.level - 1;
     const int half = 1 << level;
-    const std::array<int, 4> bounds = BoundsOfParts(node, least);
     for (int part = 0; part < 4; ++part) {
       const int x = node.x + half * (part % 2);
       const int y = node.y + half * (part / 2);
@@ -573,63 +443,148 @@ class PeakSearch {
 
   // None where no part can score `least`.
   std::array<int, 4> BoundsOfParts(const Node& node, double least) const {
+    const CellBounds& box = boxes_[node.rotation];
+    const bool is_inside = box.least_x + node.x >= 0 &&
+                           box.least_y + node.y >= 0 &&
+                           box.most_x + node.x + kRowLanes <= grid_.columns &&
+                           box.most_y + node.y + kRowLanes <= grid_.rows;
+    if (!is_inside) return BoundsAtEdge(node, least);
+    return node.level == 2 ? BoundsInside<2>(node, least)
+                           : BoundsInside<1>(node, least);
+  }
+
+  // Of a node all of which brings all points onto the grid, and parts of
+  // `kHalf` cells each way.
+  template <int kHalf>
+  std::array<int, 4> BoundsInside(const Node& node, double least) const {
+    const std::int16_t* const scores = grid_.levels[node.level - 1].data() +
+                                       std::ptrdiff_t{node.y} * grid_.columns +
+                                       node.x;
+    const std::int16_t* const above =
+        scores + std::ptrdiff_t{kHalf} * grid_.columns;
+    const std::vector<std::ptrdiff_t>& offsets = offsets_[node.rotation];
+    // A point gives a node what it gives the best part of it.
+    std::array<int, 4> bounds;
+    bounds.fill(node.bound);
+    for (std::size_t begin = 0; begin < offsets.size();
+         begin += kPointsAtOnce) {
+      const std::size_t end = std::min(offsets.size(), begin + kPointsAtOnce);
+      RowLanes lower_loss{};
+      RowLanes upper_loss{};
+      for (std::size_t i = begin; i < end; ++i) {
+        RowLanes lower, upper;
+        std::memcpy(&lower, scores + offsets[i], sizeof(lower));
+        std::memcpy(&upper, above + offsets[i], sizeof(upper));
+        const RowLanes most = lower > upper ? lower : upper;
+        const RowLanes other = __builtin_shufflevector(
+            most, most, 0 ^ kHalf, 1 ^ kHalf, 2 ^ kHalf, 3 ^ kHalf);
+        const RowLanes best = most > other ? most : other;
+        lower_loss += best - lower;
+        upper_loss += best - upper;
+      }
+      bounds[0] -= lower_loss[0];
+      bounds[1] -= lower_loss[kHalf];
+      bounds[2] -= upper_loss[0];
+      bounds[3] -= upper_loss[kHalf];
+      if (*std::max_element(bounds.begin(), bounds.end()) < least) return {};
+    }
+    return bounds;
+  }
+
+  std::array<int, 4> BoundsAtEdge(const Node& node, double least) const {
     const int half = 1 << (node.level - 1);
     const std::int16_t* const scores = grid_.levels[node.level - 1].data();
-    const int columns = grid_.columns;
-    const int rows = grid_.rows;
+    const auto score_at = [&](int x, int y) {
+      const bool is_in =
+          x >= 0 && y >= 0 && x < grid_.columns && y < grid_.rows;
+      return is_in ? int{scores[std::ptrdiff_t{y} * grid_.columns + x]} : 0;
+    };
     const std::vector<Cell>& cells = cells_[node.rotation];
-    std::array<int, 4> sums{};
+    std::array<int, 4> bounds;
+    bounds.fill(node.bound);
     for (std::size_t begin = 0; begin < cells.size(); begin += kPointsAtOnce) {
-      const int best = *std::max_element(sums.begin(), sums.end());
-      if (best + kMostScore * static_cast<double>(cells.size() - begin) <
-          least) {
-        return {};
-      }
       const std::size_t end = std::min(cells.size(), begin + kPointsAtOnce);
       for (std::size_t i = begin; i < end; ++i) {
         const int x = cells[i].x + node.x;
         const int y = cells[i].y + node.y;
-        const auto is_in = [](int at, int size) {
-          return static_cast<unsigned>(at) < static_cast<unsigned>(size);
-        };
-        const std::int64_t at = std::int64_t{y} * columns + x;
-        if (is_in(x, columns - half) && is_in(y, rows - half)) {
-          const std::int16_t* const first = scores + at;
-          const std::int16_t* const above =
-              first + static_cast<std::ptrdiff_t>(half) * columns;
-          sums[0] += first[0];
-          sums[1] += first[half];
-          sums[2] += above[0];
-          sums[3] += above[half];
-          continue;
-        }
-        for (int part = 0; part < 4; ++part) {
-          const int dx = half * (part % 2);
-          const int dy = half * (part / 2);
-          if (is_in(x + dx, columns) && is_in(y + dy, rows)) {
-            sums[static_cast<std::size_t>(part)] +=
-                scores[at + std::int64_t{dy} * columns + dx];
-          }
-        }
+        const std::array<int, 4> parts = {score_at(x, y), score_at(x + half, y),
+                                          score_at(x, y + half),
+                                          score_at(x + half, y + half)};
+        const int best = *std::max_element(parts.begin(), parts.end());
+        for (std::size_t k = 0; k < 4; ++k) bounds[k] -= best - parts[k];
       }
+      if (*std::max_element(bounds.begin(), bounds.end()) < least) return {};
     }
-    return sums;
+    return bounds;
   }
 
   Node BestPart(const Node& node) const {
     Node best{0, node.level - 1, node.rotation, node.x, node.y};
-    VisitParts(node, 0.0, [&](const Node& part) {
+    VisitParts(node, BoundsOfParts(node, 0.0), 0.0, [&](const Node& part) {
       if (part.bound > best.bound) best = part;
     });
     return best;
   }
 
-  void Split(const Node& node) {
+  void Split(const NodeAhead& node) {
     nodes_ += 4;
-    VisitParts(node, least_, [&](const Node& part) {
-      open_.push_back(part);
-      std::push_heap(open_.begin(), open_.end());
+    VisitParts(node, node.parts, least_, [&](const Node& part) {
+      heap_.push_back(part);
+      std::push_heap(heap_.begin(), heap_.end());
     });
+  }
+
+  // Moves the best open nodes to the heap when others than its own may be the
+  // best of all.
+  void FillHeap() {
+    while (!open_.empty() &&
+           (heap_.empty() || heap_.front() < least_in_heap_)) {
+      const auto count = static_cast<std::ptrdiff_t>(
+          std::min<std::size_t>(open_.size(), heaped_));
+      const auto middle = open_.end() - count;
+      std::nth_element(open_.begin(), middle, open_.end());
+      least_in_heap_ = *middle;
+      heap_.insert(heap_.end(), middle, open_.end());
+      open_.erase(middle, open_.end());
+      std::make_heap(heap_.begin(), heap_.end());
+      heaped_ *= kMoreInHeap;
+    }
+  }
+
+  // Sees to it that the last one of ahead_ is the best of all nodes, with the
+  // bounds of its parts; false when there are none. Those that come after it
+  // mostly are seen to at once, in the order in which their scores lie.
+  bool LookAhead(const std::vector<ScoredPose>& peaks) {
+    FillHeap();
+    if (heap_.empty()) return !ahead_.empty();
+    if (!ahead_.empty() && heap_.front() < ahead_.back()) return true;
+    const auto most = static_cast<std::size_t>(std::clamp<std::int64_t>(
+        parts() / kPartsPerAhead, kLeastAhead, kMostAhead));
+    fresh_.clear();
+    while (fresh_.size() < most) {
+      FillHeap();
+      if (heap_.empty() || heap_.front().bound < least_) break;
+      std::pop_heap(heap_.begin(), heap_.end());
+      if (!IsBesideAny(heap_.back(), peaks)) {
+        fresh_.push_back({heap_.back(), {}});
+      }
+      heap_.pop_back();
+    }
+    std::sort(fresh_.begin(), fresh_.end(), [](const Node& a, const Node& b) {
+      return std::tie(a.rotation, a.y, a.x) < std::tie(b.rotation, b.y, b.x);
+    });
+    team_.For((fresh_.size() + kAheadAtOnce - 1) / kAheadAtOnce,
+              [&](std::size_t part) {
+                const std::size_t end =
+                    std::min(fresh_.size(), (part + 1) * kAheadAtOnce);
+                for (std::size_t k = part * kAheadAtOnce; k < end; ++k) {
+                  NodeAhead& node = fresh_[k];
+                  if (node.level > 0) node.parts = BoundsOfParts(node, least_);
+                }
+              });
+    ahead_.insert(ahead_.end(), fresh_.begin(), fresh_.end());
+    std::sort(ahead_.begin(), ahead_.end());
+    return !ahead_.empty();
   }
 
   // Coarsest nodes along an axis, [begin, end): from -window_ on in steps.
@@ -752,8 +707,19 @@ class PeakSearch {
   int rotations_ = 0;
   // By rotation.
   std::vector<std::vector<Cell>> cells_;
-  // A heap once all are open.
+  // Of these from the first cell of the grid on.
+  std::vector<std::vector<std::ptrdiff_t>> offsets_;
+  std::vector<CellBounds> boxes_;
   std::vector<Node> open_;
+  // The best of these and all parts of nodes; all that are at least
+  // least_in_heap_ are there, and so many come next.
+  std::vector<Node> heap_;
+  Node least_in_heap_;
+  std::size_t heaped_ = kFirstInHeap;
+  // Nodes that were taken from the heap, the best one last.
+  std::vector<NodeAhead> ahead_;
+  std::vector<NodeAhead> fresh_;
+  ThreadTeam team_;
   std::int64_t nodes_ = 0;
   // Of these, those that were opened at first.
   std::int64_t opened_ = 0;

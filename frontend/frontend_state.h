@@ -60,8 +60,8 @@ void Exchange(Archive& archive, KeyScanRecord& record) {
 
 template <typename Archive>
 void Exchange(Archive& archive, LooseTrack& track) {
-  auto& [begin, end, why, found] = track;
-  ExchangeAll(archive, begin, end, why, found);
+  auto& [begin, end, why, found, is_ambiguous] = track;
+  ExchangeAll(archive, begin, end, why, found, is_ambiguous);
 }
 
 template <typename Archive>

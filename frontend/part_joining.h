@@ -23,6 +23,9 @@ struct LooseTrack {
   /// It was found again on what had been seen earlier: the tie is one match,
   /// not a guess.
   bool found = false;
+  /// It may as well be in another place of the map: that it fits here confirms
+  /// nothing.
+  bool is_ambiguous = false;
 };
 
 /// A way that nothing in sight could be matched on, and nothing speaks against

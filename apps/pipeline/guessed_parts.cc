@@ -32,6 +32,9 @@ constexpr double kLongGap = 10.0;
 // A part whose place was found by a few of its scans lies elsewhere when this
 // many times as many windows agree there as where it was found.
 constexpr int kMoreToMove = 2;
+// Windows that are looked for in the whole map of a part that nothing speaks
+// against, to see whether it would fit elsewhere, too.
+constexpr int kRivalSearches = 8;
 // So many windows that contradict, more than agree, refute that.
 constexpr int kLeastRefuting = 2;
 // It lies where it was found when it is no farther from there, m and rad.
@@ -83,13 +86,13 @@ class PartPlacing {
   PartPlacing(const std::vector<Scan>& scans,
               const TrackPlacementOptions& options,
               const std::function<bool()>& stop, LogSolverResult* result,
-              std::vector<Pose2>* poses, std::set<int>* sure)
+              std::vector<Pose2>* poses, PartTies* ties)
       : scans_(scans),
         options_(options),
         stop_(stop),
         result_(*result),
         poses_(*poses),
-        sure_(*sure) {
+        ties_(*ties) {
     std::vector<int> keys;
     for (const KeyScanRecord& record : result_.records) {
       keys.push_back(record.scan);
@@ -125,8 +128,40 @@ class PartPlacing {
       }
     }
     if (any_moved_) Finish();
-    TellOfRefuted();
     return any_moved_;
+  }
+
+  // Tells of parts that were found by a few of their scans where all others
+  // speak against it, or would fit elsewhere, too.
+  void TellOfDoubts() {
+    const std::vector<std::vector<std::size_t>> parts = Parts();
+    const std::vector<std::size_t>& rest = *std::max_element(
+        parts.begin(), parts.end(),
+        [](const auto& a, const auto& b) { return a.size() < b.size(); });
+    const int claim = ClaimOf(rest);
+    for (const std::vector<std::size_t>& part : parts) {
+      if (part.empty() || part == rest || part.front() == 0 ||
+          ClaimOf(part) != claim || (stop_ && stop_())) {
+        continue;
+      }
+      const PlaceSupport support =
+          JudgePlace(ViewsOf(rest), ViewsOf(part), Pose2::Zero(), options_);
+      const auto doubt = ties_.doubts.find(record(part.front()).scan);
+      if (support.contradicting >= kLeastRefuting &&
+          support.contradicting > support.agreeing) {
+        TellOfRefuted(part.front(), record(part.back()).scan);
+      } else if (doubt != ties_.doubts.end() &&
+                 support.agreeing >= kLeastAgreeing) {
+        TellOfDoubt(part.front(), doubt->second);
+      }
+    }
+    for (std::size_t k = 1; k < result_.records.size(); ++k) {
+      const auto doubt = ties_.doubts.find(record(k).scan);
+      if (doubt != ties_.doubts.end() &&
+          ties_.sure.count(record(k).scan) != 0) {
+        TellOfDoubt(k, doubt->second);
+      }
+    }
   }
 
  private:
@@ -147,7 +182,7 @@ class PartPlacing {
     for (std::size_t k = 0; k < result_.records.size(); ++k) {
       const int before = k > 0 ? part_[RecordBefore(k)] : 0;
       const RefinedScan& scan = refined(k);
-      const bool is_cut = k == 0 || IsUnsure(scans_, result_, k, sure_);
+      const bool is_cut = k == 0 || IsUnsure(scans_, result_, k, ties_.sure);
       if (!is_cut) {
         part_.push_back(before);
         continue;
@@ -190,11 +225,13 @@ class PartPlacing {
       here = JudgePlace(map, track, Pose2::Zero(), options_);
       if (here.agreeing >= kLeastAgreeing && here.contradicting == 0 &&
           IsTiedTo(rest, part)) {
+        LookForRivals(rest, part);
         return Merge(rest, part, Pose2::Zero());
       }
     }
     const TrackPlacement placement =
         PlaceTrack(map, track, std::nullopt, options_, stop_);
+    NoteDoubt(rest, part, placement);
     if (!placement.found || placement.contradicting_length >
                                 kContradictingPerWindow * placement.agreeing) {
       return false;
@@ -218,6 +255,35 @@ class PartPlacing {
     Tie(earlier, is_later ? at_rest : at_part, later,
         is_later ? at_part : at_rest);
     return Merge(rest, part, placement.pose);
+  }
+
+  // Whether a part that was found again would fit in another place, too.
+  void LookForRivals(const std::vector<std::size_t>& rest,
+                     const std::vector<std::size_t>& part) {
+    const std::size_t later = std::max(rest.front(), part.front());
+    if (refined(later).tie != TrackTie::kMatched) return;
+    TrackPlacementOptions options = options_;
+    options.max_searches = std::min(options.max_searches, kRivalSearches);
+    NoteDoubt(
+        rest, part,
+        PlaceTrack(ViewsOf(rest), ViewsOf(part), std::nullopt, options, stop_));
+  }
+
+  // The scan that the later one of both begins with.
+  int FirstScan(const std::vector<std::size_t>& rest,
+                const std::vector<std::size_t>& part) const {
+    return record(std::max(rest.front(), part.front())).scan;
+  }
+
+  // Keeps in mind why much of a part looks like the rest, but it was not found.
+  void NoteDoubt(const std::vector<std::size_t>& rest,
+                 const std::vector<std::size_t>& part,
+                 const TrackPlacement& placement) {
+    const int scan = FirstScan(rest, part);
+    ties_.doubts.erase(scan);
+    if (!placement.found && placement.agreeing >= kLeastAgreeing) {
+      ties_.doubts[scan] = placement.why_not;
+    }
   }
 
   // The part becomes one of the rest's, moved by `shift`.
@@ -265,7 +331,7 @@ class PartPlacing {
             shifts_[static_cast<std::size_t>(first_part_[later.front()])]) {
       return false;
     }
-    sure_.insert(tied.scan);
+    ties_.sure.insert(tied.scan);
     return true;
   }
 
@@ -299,8 +365,8 @@ class PartPlacing {
     scan.since_key = tie;
     scan.missed = Pose2::Zero();
     scan.missed_since = -1;
-    sure_.insert(tied.scan);
-    TellOf(first);
+    ties_.sure.insert(tied.scan);
+    TellOfFound(first);
   }
 
   double WayBetween(std::size_t a, std::size_t b,
@@ -317,9 +383,9 @@ class PartPlacing {
     return way;
   }
 
-  // Of the track that begins with this record: that it was found, or else that
-  // what it saw up to scan `end` contradicts where it was found.
-  void TellOf(std::size_t first, std::optional<int> end = std::nullopt) {
+  // What is told of the track that begins with this record; where it seemed to
+  // go on, or was found near by, nothing was told so far.
+  LooseTrack& TrackTold(std::size_t first) {
     const int scan = record(first).scan;
     LooseTrack* told = nullptr;
     for (LooseTrack& loose : result_.loose) {
@@ -328,50 +394,41 @@ class PartPlacing {
         told = &loose;
       }
     }
-    if (told == nullptr) {
-      // It seemed to go on, or was found near by, and nothing was told.
-      const auto at = std::find_if(
-          result_.loose.begin(), result_.loose.end(),
-          [&](const LooseTrack& loose) { return loose.begin >= scan; });
-      told = &*result_.loose.insert(at, LooseTrack());
-      told->begin = record(first - 1).scan;
-      told->why = IsAfterLongGap(scans_, result_.records, first)
-                      ? "scans are missing; the next one seemed to follow"
-                      : "the next scan does not fit; found again near by";
-    }
-    told->found = !end;
-    told->end = end.value_or(scan);
-    if (end) {
-      told->why += ", where most of what it saw afterwards contradicts that";
-    } else {
-      told->why = told->why.substr(0, told->why.find(';')) +
-                  "; found again by all that it saw afterwards";
-    }
+    if (told != nullptr) return *told;
+    const auto at = std::find_if(
+        result_.loose.begin(), result_.loose.end(),
+        [&](const LooseTrack& loose) { return loose.begin >= scan; });
+    told = &*result_.loose.insert(at, LooseTrack());
+    told->begin = record(first - 1).scan;
+    told->end = scan;
+    told->found = true;
+    told->why = IsAfterLongGap(scans_, result_.records, first)
+                    ? "scans are missing; the next one seemed to follow"
+                    : "the next scan does not fit; found again near by";
+    return *told;
   }
 
-  // Of parts that were found by a few of their scans, where all others speak
-  // against it.
-  void TellOfRefuted() {
-    const std::vector<std::vector<std::size_t>> parts = Parts();
-    const std::vector<std::size_t>& rest = *std::max_element(
-        parts.begin(), parts.end(),
-        [](const auto& a, const auto& b) { return a.size() < b.size(); });
-    const int claim = ClaimOf(rest);
-    for (const std::vector<std::size_t>& part : parts) {
-      if (part.empty() || part == rest || part.front() == 0 ||
-          ClaimOf(part) != claim || (stop_ && stop_())) {
-        continue;
-      }
-      const Pose2& shift =
-          shifts_[static_cast<std::size_t>(part_[part.front()])];
-      const PlaceSupport support =
-          JudgePlace(ViewsOf(rest), ViewsOf(part), shift, options_);
-      if (support.contradicting < kLeastRefuting ||
-          support.contradicting <= support.agreeing) {
-        continue;
-      }
-      TellOf(part.front(), record(part.back()).scan);
-    }
+  void TellOfFound(std::size_t first) {
+    LooseTrack& told = TrackTold(first);
+    told.found = true;
+    told.end = record(first).scan;
+    told.why = told.why.substr(0, told.why.find(';')) +
+               "; found again by all that it saw afterwards";
+  }
+
+  // What the track saw up to scan `end` speaks against where it was found.
+  void TellOfRefuted(std::size_t first, int end) {
+    LooseTrack& told = TrackTold(first);
+    told.found = false;
+    told.end = end;
+    told.why += ", where most of what it saw afterwards contradicts that";
+  }
+
+  void TellOfDoubt(std::size_t first, const std::string& doubt) {
+    LooseTrack& told = TrackTold(first);
+    told.is_ambiguous = true;
+    told.why +=
+        ", which what it saw afterwards does not make certain: " + doubt;
   }
 
   // What was found nowhere goes along with what it was found in before, or what
@@ -419,8 +476,7 @@ class PartPlacing {
   const std::function<bool()>& stop_;
   LogSolverResult& result_;
   std::vector<Pose2>& poses_;
-  // Scans whose ties are known to be right.
-  std::set<int>& sure_;
+  PartTies& ties_;
   bool any_moved_ = false;
   // By record; the parts' numbers now and in the beginning.
   std::vector<KeyView> views_;
@@ -463,8 +519,16 @@ bool PlaceUnsureParts(const std::vector<Scan>& scans,
                       const TrackPlacementOptions& options,
                       const std::function<bool()>& stop,
                       LogSolverResult* result, std::vector<Pose2>* poses,
-                      std::set<int>* sure) {
-  return PartPlacing(scans, options, stop, result, poses, sure).Run();
+                      PartTies* ties) {
+  return PartPlacing(scans, options, stop, result, poses, ties).Run();
+}
+
+void TellOfDoubtfulParts(const std::vector<Scan>& scans,
+                         const TrackPlacementOptions& options,
+                         const std::function<bool()>& stop,
+                         LogSolverResult* result, std::vector<Pose2> poses,
+                         PartTies ties) {
+  PartPlacing(scans, options, stop, result, &poses, &ties).TellOfDoubts();
 }
 
 }  // namespace plumbline

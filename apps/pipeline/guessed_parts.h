@@ -7,10 +7,21 @@
 #include <plumbline/pipeline/log_solver.h>
 
 #include <functional>
+#include <map>
 #include <set>
+#include <string>
 #include <vector>
 
 namespace plumbline {
+
+/// What is known of the ties of parts, by the scans that the parts begin with.
+struct PartTies {
+  /// Found by more than a few scans, or confirmed by them.
+  std::set<int> sure;
+  /// Why a part that much of the rest looks like was not found all the same,
+  /// for people.
+  std::map<int, std::string> doubts;
+};
 
 /// Whether the place of some part of the log is a guess (TrackTie::kLoose), was
 /// found by a few of its scans (TrackTie::kMatched) or follows scans that are
@@ -34,15 +45,24 @@ TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options);
 /// where it is; parts that were found elsewhere are moved in them, with what
 /// hangs on them. In `result` their ties become matched ones, and
 /// LogSolverResult::loose tells that they were found. `options` are those of
-/// WithinOneBuilding, for the noise of the laser. `sure`: scans that begin
-/// tracks whose place is known, to which those are added that are found or
-/// confirmed. Returns whether any was moved or tied; when `stop` (may be null)
+/// WithinOneBuilding, for the noise of the laser. `ties`: what is known before
+/// and after. Returns whether any was moved or tied; when `stop` (may be null)
 /// has returned true nothing more is.
 bool PlaceUnsureParts(const std::vector<Scan>& scans,
                       const TrackPlacementOptions& options,
                       const std::function<bool()>& stop,
                       LogSolverResult* result, std::vector<Pose2>* poses,
-                      std::set<int>* sure);
+                      PartTies* ties);
+
+/// Tells of parts that were found by a few scans and stayed unsure, in
+/// LogSolverResult::loose: where what they saw afterwards speaks against it,
+/// and where it would fit in another place, too. `poses` as they are in the
+/// end, `ties` as PlaceUnsureParts has left them.
+void TellOfDoubtfulParts(const std::vector<Scan>& scans,
+                         const TrackPlacementOptions& options,
+                         const std::function<bool()>& stop,
+                         LogSolverResult* result, std::vector<Pose2> poses,
+                         PartTies ties);
 
 }  // namespace plumbline
 

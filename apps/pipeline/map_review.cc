@@ -245,7 +245,10 @@ void MapReview::DropConfirmed(std::vector<LooseTrack>* loose) const {
   std::vector<LooseTrack> left;
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     LooseTrack& track = (*loose)[i];
-    if (track.found && verdicts[i] == TieVerdict::kConfirmed) continue;
+    if (track.found && !track.is_ambiguous &&
+        verdicts[i] == TieVerdict::kConfirmed) {
+      continue;
+    }
     if (track.found && verdicts[i] == TieVerdict::kOpen) WidenToStill(&track);
     left.push_back(std::move(track));
   }

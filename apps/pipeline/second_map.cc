@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <future>
-#include <set>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -69,21 +68,33 @@ void SecondMap::AdjustPoses(bool find_parts) {
   KeepFirst();
   AdjustPosesOfRun();
   // What was found makes the poses straighter, and more is found in them.
-  std::set<int> sure;
+  PartTies ties;
   for (int round = 0; find_parts && round < kMostRounds; ++round) {
-    if (!FindParts(&sure)) break;
+    if (!FindParts(&ties)) break;
     AdjustPosesOfRun();
+  }
+  if (find_parts && !run_.IsStopped() &&
+      HasUnsureParts(run_.scans, run_.result, {})) {
+    TellOfDoubtfulParts(
+        run_.scans, PartPlacement(), [this] { return run_.IsStopped(); },
+        &run_.result, adjustment_->KeyPoses(), std::move(ties));
   }
   if (run_.IsStopped()) ReturnToFirst();
 }
 
-bool SecondMap::FindParts(std::set<int>* sure) {
-  if (run_.IsStopped() || !HasUnsureParts(run_.scans, run_.result, *sure))
-    return false;
+TrackPlacementOptions SecondMap::PartPlacement() const {
   TrackPlacementOptions placement;
   placement.points = options_.odometry.points;
   placement.matcher = options_.odometry.matcher;
   placement.ScaleToNoise(run_.result.noise_scale);
+  return WithinOneBuilding(placement);
+}
+
+bool SecondMap::FindParts(PartTies* ties) {
+  if (run_.IsStopped() ||
+      !HasUnsureParts(run_.scans, run_.result, ties->sure)) {
+    return false;
+  }
   std::vector<Pose2> keys = adjustment_->KeyPoses();
   LogSolverResult& result = run_.result;
   const bool is_first = first_records_.empty();
@@ -93,8 +104,8 @@ bool SecondMap::FindParts(std::set<int>* sure) {
     first_loose_ = result.loose;
   }
   if (!PlaceUnsureParts(
-          run_.scans, WithinOneBuilding(placement),
-          [this] { return run_.IsStopped(); }, &run_.result, &keys, sure)) {
+          run_.scans, PartPlacement(), [this] { return run_.IsStopped(); },
+          &run_.result, &keys, ties)) {
     if (is_first) ForgetParts();
     return false;
   }

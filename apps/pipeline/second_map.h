@@ -5,6 +5,8 @@
 #include <plumbline/core/state_archive.h>
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/joint_adjustment.h>
+#include <plumbline/frontend/track_placement_options.h>
+#include <plumbline/pipeline/guessed_parts.h>
 #include <plumbline/pipeline/log_run.h>
 #include <plumbline/pipeline/map_review.h>
 #include <plumbline/pipeline/solved_map.h>
@@ -12,7 +14,6 @@
 #include <atomic>
 #include <future>
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -84,8 +85,9 @@ class SecondMap {
   // The poses alone, from those of the run or by odometry.
   void AdjustPosesOfRun();
   // Whether parts whose place was not sure were found; their poses in the run
-  // are moved. `sure`: as in PlaceUnsureParts.
-  bool FindParts(std::set<int>* sure);
+  // are moved. `ties`: as in PlaceUnsureParts.
+  bool FindParts(PartTies* ties);
+  TrackPlacementOptions PartPlacement() const;
   void ForgetParts();
   // The poses alone by all scans, from these of the key scans.
   void AdjustFrom(const std::vector<Pose2>& start,

@@ -23,7 +23,7 @@ struct GuessedLog {
   LogSolverResult result;
   std::vector<Pose2> truth;
   std::vector<Pose2> poses;
-  std::set<int> sure;
+  PartTies ties;
 
   // Drives along the hall at `y` from x to x, with poses that are off by
   // `shift`.
@@ -91,7 +91,12 @@ struct GuessedLog {
 
   bool Place(const std::function<bool()>& stop = nullptr) {
     return PlaceUnsureParts(scans, WithinOneBuilding(TrackPlacementOptions()),
-                            stop, &result, &poses, &sure);
+                            stop, &result, &poses, &ties);
+  }
+
+  void TellOfDoubts() {
+    TellOfDoubtfulParts(scans, WithinOneBuilding(TrackPlacementOptions()),
+                        nullptr, &result, poses, ties);
   }
 
   void ExpectTrue(std::size_t begin, std::size_t end) const {
@@ -108,7 +113,7 @@ const Pose2 kLost(60.0, -30.0, 2.2);
 TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
   GuessedLog log;
   const std::size_t second = log.DriveThereAndBack(kLost);
-  ASSERT_TRUE(HasUnsureParts(log.scans, log.result, log.sure));
+  ASSERT_TRUE(HasUnsureParts(log.scans, log.result, log.ties.sure));
   ASSERT_TRUE(log.Place());
   log.ExpectTrue(0, log.scans.size());
   EXPECT_EQ(log.poses.front(), log.truth.front());
@@ -125,7 +130,7 @@ TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
   EXPECT_EQ(log.result.loose[0].end, static_cast<int>(second));
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again by all that it saw afterwards");
-  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.sure));
+  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.ties.sure));
 }
 
 // The larger part comes second: the map's frame is that of the first scan all
@@ -147,13 +152,13 @@ TEST(GuessedPartsTest, APartThatWasFoundAtAWrongPlaceIsMoved) {
   GuessedLog log;
   const std::size_t second = log.DriveThereAndBack(Pose2(8.0, 0.1, 0.0));
   log.MakeFound(second, 40);
-  ASSERT_TRUE(HasUnsureParts(log.scans, log.result, log.sure));
+  ASSERT_TRUE(HasUnsureParts(log.scans, log.result, log.ties.sure));
   ASSERT_TRUE(log.Place());
   log.ExpectTrue(0, log.scans.size());
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again by all that it saw afterwards");
   EXPECT_TRUE(log.result.loose[0].found);
-  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.sure));
+  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.ties.sure));
 }
 
 TEST(GuessedPartsTest, APartThatWasFoundAtItsPlaceStays) {
@@ -165,7 +170,7 @@ TEST(GuessedPartsTest, APartThatWasFoundAtItsPlaceStays) {
   EXPECT_FALSE(log.Place());
   EXPECT_EQ(log.poses, before);
   EXPECT_EQ(log.result.records[second].from, 40);
-  EXPECT_EQ(log.sure, std::set<int>{static_cast<int>(second)});
+  EXPECT_EQ(log.ties.sure, std::set<int>{static_cast<int>(second)});
   EXPECT_TRUE(log.result.loose[0].found);
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again on what it saw earlier");
@@ -185,7 +190,7 @@ TEST(GuessedPartsTest, APartThatWasFoundNearByIsHeldAgainstTheRest) {
     log.result.refined[second].missed_since = 7;
     log.result.loose.clear();
     EXPECT_EQ(log.Place(), !is_right);
-    EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.sure));
+    EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.ties.sure));
     if (is_right) {
       EXPECT_TRUE(log.result.loose.empty());
       EXPECT_EQ(log.result.refined[second].missed_since, 7);
@@ -218,7 +223,7 @@ TEST(GuessedPartsTest, WhatSeemsToGoOnAfterALongGapIsHeldAgainstTheRest) {
       log.scans[k].timestamp =
           0.2 * static_cast<double>(k) + (is_long && k >= second ? 60.0 : 0.0);
     }
-    EXPECT_EQ(HasUnsureParts(log.scans, log.result, log.sure), is_long);
+    EXPECT_EQ(HasUnsureParts(log.scans, log.result, log.ties.sure), is_long);
     EXPECT_EQ(log.Place(), is_long);
     if (!is_long) continue;
     log.ExpectTrue(0, log.scans.size());
@@ -243,6 +248,7 @@ TEST(GuessedPartsTest, WhatContradictsItsPlaceIsTold) {
   log.MakeFound(second, 40);
   const std::vector<Pose2> before = log.poses;
   EXPECT_FALSE(log.Place());
+  log.TellOfDoubts();
   EXPECT_EQ(log.poses, before);
   ASSERT_EQ(log.result.loose.size(), 1u);
   EXPECT_FALSE(log.result.loose[0].found);
@@ -250,6 +256,40 @@ TEST(GuessedPartsTest, WhatContradictsItsPlaceIsTold) {
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again on what it saw earlier, where most "
             "of what it saw afterwards contradicts that");
+}
+
+// Nothing speaks against its place, nor against another one where the robot saw
+// the same hall once more.
+TEST(GuessedPartsTest, WhatFitsElsewhereTooIsTold) {
+  for (const bool has_twin : {false, true}) {
+    SCOPED_TRACE(has_twin);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    if (has_twin) {
+      const std::size_t twin = log.scans.size();
+      log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2(0.0, 30.0, 0.0));
+      log.result.refined[twin].tie = TrackTie::kNone;
+      log.result.records[twin].is_loose = false;
+      log.result.loose.clear();
+    }
+    const std::size_t last = log.scans.size();
+    log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2::Zero());
+    log.MakeFound(last, 40);
+    log.result.loose.clear();
+    EXPECT_FALSE(log.Place());
+    log.TellOfDoubts();
+    ASSERT_EQ(log.result.loose.size(), has_twin ? 1u : 0u);
+    if (!has_twin) continue;
+    const LooseTrack& loose = log.result.loose[0];
+    EXPECT_TRUE(loose.found);
+    EXPECT_TRUE(loose.is_ambiguous);
+    EXPECT_EQ(loose.begin, static_cast<int>(last) - 1);
+    EXPECT_EQ(loose.end, static_cast<int>(last));
+    EXPECT_EQ(loose.why,
+              "the next scan does not fit; found again near by, which what it "
+              "saw afterwards does not make certain: it would fit in more than "
+              "one place");
+  }
 }
 
 // What was found in a part, and is too short to be looked for, goes along with
@@ -308,7 +348,7 @@ TEST(GuessedPartsTest, AnotherHallIsNotFound) {
     const std::vector<Pose2> before = log.poses;
     EXPECT_FALSE(log.Place([&] { return is_stopped; }));
     EXPECT_EQ(log.poses, before);
-    EXPECT_TRUE(HasUnsureParts(log.scans, log.result, log.sure));
+    EXPECT_TRUE(HasUnsureParts(log.scans, log.result, log.ties.sure));
     EXPECT_FALSE(log.result.loose[0].found);
   }
 }
@@ -316,7 +356,7 @@ TEST(GuessedPartsTest, AnotherHallIsNotFound) {
 TEST(GuessedPartsTest, ALogWithoutGuessesIsLeftAlone) {
   GuessedLog log;
   log.Drive(LongHall(), -18.0, -10.0, 0.2, Pose2::Zero());
-  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.sure));
+  EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.ties.sure));
   EXPECT_FALSE(log.Place());
   EXPECT_FALSE(GuessedLog().Place());
 }

@@ -39,7 +39,9 @@ TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options);
 /// the poses of either are straight: drift over a thousand metres makes parts
 /// contradict each other that are right (JoinParts has no other poses). The
 /// largest part grows by what is found. What was found by a few scans stays
-/// where it was unless much more of it agrees elsewhere.
+/// where it was unless much more of it agrees elsewhere. A guess of which a few
+/// windows say where it may lie, and nothing speaks against that, is put there,
+/// and stays told as a guess.
 ///
 /// `poses`: of the records' scans, in a frame in which the first one stays
 /// where it is; parts that were found elsewhere are moved in them, with what

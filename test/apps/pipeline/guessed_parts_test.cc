@@ -109,6 +109,15 @@ struct GuessedLog {
 
 const Pose2 kLost(60.0, -30.0, 2.2);
 
+std::vector<WallEnds> MirroredHall() {
+  std::vector<WallEnds> mirrored = LongHall();
+  for (WallEnds& wall : mirrored) {
+    wall.a.y() *= -1.0;
+    wall.b.y() *= -1.0;
+  }
+  return mirrored;
+}
+
 // The robot was carried and sees the hall once more, on another way.
 TEST(GuessedPartsTest, APartIsFoundWhereMostSawIt) {
   GuessedLog log;
@@ -236,11 +245,7 @@ TEST(GuessedPartsTest, WhatSeemsToGoOnAfterALongGapIsHeldAgainstTheRest) {
 
 // It is nowhere else, but not there either, and that is told.
 TEST(GuessedPartsTest, WhatContradictsItsPlaceIsTold) {
-  std::vector<WallEnds> mirrored = LongHall();
-  for (WallEnds& wall : mirrored) {
-    wall.a.y() *= -1.0;
-    wall.b.y() *= -1.0;
-  }
+  const std::vector<WallEnds> mirrored = MirroredHall();
   GuessedLog log;
   log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
   const std::size_t second = log.scans.size();
@@ -292,6 +297,43 @@ TEST(GuessedPartsTest, WhatFitsElsewhereTooIsTold) {
   }
 }
 
+// A robot that was carried sees a few metres of the hall, and then what it had
+// not seen: where it may be, still told as a guess.
+TEST(GuessedPartsTest, AGuessIsPutWhereALittleOfItFits) {
+  for (const bool is_hall : {true, false}) {
+    SCOPED_TRACE(is_hall);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    const std::size_t second = log.scans.size();
+    log.Drive(is_hall ? LongHall() : MirroredHall(), 17.0, 1.0, -0.2, kLost);
+    const std::size_t beyond = log.scans.size();
+    const std::vector<WallEnds> room = {{{-20.0, -9.0}, {20.0, -9.0}},
+                                        {{20.0, -9.0}, {20.0, 11.0}},
+                                        {{20.0, 11.0}, {-20.0, 11.0}},
+                                        {{-20.0, 11.0}, {-20.0, -9.0}}};
+    log.Drive(room, -17.0, 17.0, 0.1, Compose(kLost, Pose2(50.0, 0.0, 0.0)));
+    log.result.refined[beyond].tie = TrackTie::kNone;
+    log.result.records[beyond].is_loose = false;
+    log.result.loose.pop_back();
+    log.result.loose.back().end = static_cast<int>(log.scans.size()) - 1;
+    const std::vector<Pose2> before = log.poses;
+    EXPECT_EQ(log.Place(), is_hall);
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    const LooseTrack& loose = log.result.loose[0];
+    EXPECT_FALSE(loose.found);
+    EXPECT_EQ(loose.end, static_cast<int>(log.scans.size()) - 1);
+    if (!is_hall) {
+      EXPECT_EQ(log.poses, before);
+      continue;
+    }
+    log.ExpectTrue(0, beyond);
+    EXPECT_EQ(log.result.refined[second].tie, TrackTie::kMatched);
+    EXPECT_TRUE(HasUnsureParts(log.scans, log.result, log.ties.sure));
+    EXPECT_EQ(loose.why.substr(0, 50),
+              "scans are missing; where it went on is a guess, on");
+  }
+}
+
 // What was found in a part, and is too short to be looked for, goes along with
 // it; so does the first part where it is the short one.
 TEST(GuessedPartsTest, WhatWasFoundInAPartGoesAlong) {
@@ -336,11 +378,7 @@ TEST(GuessedPartsTest, WhatHangsOnAPartGoesAlong) {
 // Nothing is found in a hall that looks the same in a mirror, nor where nothing
 // is looked for.
 TEST(GuessedPartsTest, AnotherHallIsNotFound) {
-  std::vector<WallEnds> mirrored = LongHall();
-  for (WallEnds& wall : mirrored) {
-    wall.a.y() *= -1.0;
-    wall.b.y() *= -1.0;
-  }
+  const std::vector<WallEnds> mirrored = MirroredHall();
   for (const bool is_stopped : {false, true}) {
     GuessedLog log;
     log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());

@@ -238,7 +238,7 @@ class PartPlacing {
       here = JudgePlace(map, track, Pose2::Zero(), options_);
       if (here.agreeing >= kLeastAgreeing && here.contradicting == 0 &&
           IsTiedTo(rest, part)) {
-        LookForRivals(rest, part);
+        LookForRivals(rest, part, map, track);
         return Merge(rest, part, Pose2::Zero());
       }
     }
@@ -315,29 +315,24 @@ class PartPlacing {
     return later.front();
   }
 
-  // Whether a part that was found again would fit in another place, too.
+  // Whether a part that was found again would fit in another place, too. `map`
+  // and `track` are the views of either.
   void LookForRivals(const std::vector<std::size_t>& rest,
-                     const std::vector<std::size_t>& part) {
+                     const std::vector<std::size_t>& part,
+                     const std::vector<KeyView>& map,
+                     const std::vector<KeyView>& track) {
     const std::size_t later = std::max(rest.front(), part.front());
     if (refined(later).tie != TrackTie::kMatched) return;
     TrackPlacementOptions options = options_;
     options.max_searches = std::min(options.max_searches, kRivalSearches);
-    NoteDoubt(
-        rest, part,
-        PlaceTrack(ViewsOf(rest), ViewsOf(part), std::nullopt, options, stop_));
-  }
-
-  // The scan that the later one of both begins with.
-  int FirstScan(const std::vector<std::size_t>& rest,
-                const std::vector<std::size_t>& part) const {
-    return record(std::max(rest.front(), part.front())).scan;
+    NoteDoubt(rest, part, PlaceTrack(map, track, std::nullopt, options, stop_));
   }
 
   // Keeps in mind why much of a part looks like the rest, but it was not found.
   void NoteDoubt(const std::vector<std::size_t>& rest,
                  const std::vector<std::size_t>& part,
                  const TrackPlacement& placement) {
-    const int scan = FirstScan(rest, part);
+    const int scan = record(std::max(rest.front(), part.front())).scan;
     ties_.doubts.erase(scan);
     if (!placement.found && placement.agreeing >= kLeastAgreeing) {
       ties_.doubts[scan] = placement.why_not;

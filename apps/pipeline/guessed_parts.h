@@ -56,10 +56,10 @@ bool PlaceUnsureParts(const std::vector<Scan>& scans,
                       LogSolverResult* result, std::vector<Pose2>* poses,
                       PartTies* ties);
 
-/// Tells of parts that were found by a few scans and stayed unsure, in
-/// LogSolverResult::loose: where what they saw afterwards speaks against it,
-/// and where it would fit in another place, too. `poses` as they are in the
-/// end, `ties` as PlaceUnsureParts has left them.
+/// Tells in LogSolverResult::loose of parts that were found by a few scans:
+/// where what they saw afterwards speaks against it, and where it would fit in
+/// another place, too, though all of it may fit where it is. `poses`: as in
+/// PlaceUnsureParts, but as they are in the end; `ties` as it has left them.
 void TellOfDoubtfulParts(const std::vector<Scan>& scans,
                          const TrackPlacementOptions& options,
                          const std::function<bool()>& stop,

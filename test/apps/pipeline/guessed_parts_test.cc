@@ -71,6 +71,13 @@ struct GuessedLog {
     return second;
   }
 
+  // The part that begins with this scan goes on from what was before.
+  void MakeGoOn(std::size_t scan) {
+    result.refined[scan].tie = TrackTie::kNone;
+    result.records[scan].is_loose = false;
+    result.loose.pop_back();
+  }
+
   // The part that begins with this scan was found by a few of its scans, where
   // its poses are.
   void MakeFound(std::size_t scan, std::size_t since) {
@@ -225,9 +232,7 @@ TEST(GuessedPartsTest, WhatSeemsToGoOnAfterALongGapIsHeldAgainstTheRest) {
     SCOPED_TRACE(is_long);
     GuessedLog log;
     const std::size_t second = log.DriveThereAndBack(Pose2(4.0, 0.1, 0.0));
-    log.result.refined[second].tie = TrackTie::kNone;
-    log.result.records[second].is_loose = false;
-    log.result.loose.clear();
+    log.MakeGoOn(second);
     for (std::size_t k = 0; k < log.scans.size(); ++k) {
       log.scans[k].timestamp =
           0.2 * static_cast<double>(k) + (is_long && k >= second ? 60.0 : 0.0);
@@ -273,9 +278,7 @@ TEST(GuessedPartsTest, WhatFitsElsewhereTooIsTold) {
     if (has_twin) {
       const std::size_t twin = log.scans.size();
       log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2(0.0, 30.0, 0.0));
-      log.result.refined[twin].tie = TrackTie::kNone;
-      log.result.records[twin].is_loose = false;
-      log.result.loose.clear();
+      log.MakeGoOn(twin);
     }
     const std::size_t last = log.scans.size();
     log.Drive(LongHall(), 17.0, -17.0, -0.2, Pose2::Zero());
@@ -312,9 +315,7 @@ TEST(GuessedPartsTest, AGuessIsPutWhereALittleOfItFits) {
                                         {{20.0, 11.0}, {-20.0, 11.0}},
                                         {{-20.0, 11.0}, {-20.0, -9.0}}};
     log.Drive(room, -17.0, 17.0, 0.1, Compose(kLost, Pose2(50.0, 0.0, 0.0)));
-    log.result.refined[beyond].tie = TrackTie::kNone;
-    log.result.records[beyond].is_loose = false;
-    log.result.loose.pop_back();
+    log.MakeGoOn(beyond);
     log.result.loose.back().end = static_cast<int>(log.scans.size()) - 1;
     const std::vector<Pose2> before = log.poses;
     EXPECT_EQ(log.Place(), is_hall);

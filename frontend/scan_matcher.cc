@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -14,9 +15,10 @@
 namespace plumbline {
 namespace {
 
-// Beyond this the reference is dropped, so that one wild return cannot blow up
-// the grids, m.
-constexpr double kReferenceReach = 120.0;
+// Along either axis the grids reach so far beyond the places that the reference
+// was seen from, and no farther from the middle of all, m.
+constexpr double kAroundViewpoints = 30.0;
+constexpr double kFarthestReach = 250.0;
 
 // Empty buckets around those of a reference.
 constexpr int kMarginBuckets = 10;
@@ -70,7 +72,7 @@ constexpr double kUnmatchedCost = 4.0;
 constexpr double kLeastInformation = 1e-9;
 
 // Reference points that are compared at a time, and what single precision may
-// be off by within kReferenceReach, m.
+// be off by within twice kFarthestReach, m.
 constexpr int kBlock = 4;
 constexpr double kFloatMargin = 2e-4;
 
@@ -85,22 +87,16 @@ struct Nearest {
   }
 };
 
-// Whether the grids of points would reach farther than they may.
-bool IsTooWide(const std::vector<ReferencePoint>& points) {
-  Eigen::Vector2d minimum = points[0].position;
-  Eigen::Vector2d maximum = minimum;
-  for (const ReferencePoint& point : points) {
-    minimum = minimum.cwiseMin(point.position);
-    maximum = maximum.cwiseMax(point.position);
-  }
-  return !((maximum - minimum).maxCoeff() < kReferenceReach - kRounding);
+// Whether points lie so far apart that some may be out of reach of the middle
+// of all.
+bool IsTooWide(const std::vector<ReferencePoint>& points, double reach) {
+  Eigen::AlignedBox2d box;
+  for (const ReferencePoint& point : points) box.extend(point.position);
+  return !(box.sizes().maxCoeff() < reach - kRounding);
 }
 
-// The points that the grids may reach: so far around the middle of all. One
-// wild return cannot blow them up. Wherever it is, that reaches all of what is
-// not larger.
-std::vector<ReferencePoint> WithinReach(
-    const std::vector<ReferencePoint>& points) {
+// The middle of points along either axis: one wild return cannot move it.
+Eigen::Vector2d MiddleOf(const std::vector<ReferencePoint>& points) {
   std::vector<double> xs, ys;
   xs.reserve(points.size());
   ys.reserve(points.size());
@@ -111,11 +107,28 @@ std::vector<ReferencePoint> WithinReach(
   const auto middle = static_cast<std::ptrdiff_t>(points.size() / 2);
   std::nth_element(xs.begin(), xs.begin() + middle, xs.end());
   std::nth_element(ys.begin(), ys.begin() + middle, ys.end());
-  const Eigen::Vector2d center(xs[middle], ys[middle]);
+  return {xs[middle], ys[middle]};
+}
+
+// The points that the grids may reach: within `reach` of the middle of all, or
+// near where they were seen from. One wild return cannot blow them up.
+std::vector<ReferencePoint> WithinReach(
+    const std::vector<ReferencePoint>& points, double reach,
+    const std::vector<Viewpoint>& viewpoints) {
+  const auto around = [](const Eigen::Vector2d& place, double distance) {
+    const Eigen::Vector2d offset = Eigen::Vector2d::Constant(distance);
+    return Eigen::AlignedBox2d(place - offset, place + offset);
+  };
+  const Eigen::Vector2d middle = MiddleOf(points);
+  Eigen::AlignedBox2d seen;
+  for (const Viewpoint& viewpoint : viewpoints) {
+    seen.extend(around(viewpoint.position, kAroundViewpoints));
+  }
+  const Eigen::AlignedBox2d near = around(middle, reach);
+  seen = seen.intersection(around(middle, kFarthestReach));
   std::vector<ReferencePoint> within;
   for (const ReferencePoint& point : points) {
-    if ((point.position - center).lpNorm<Eigen::Infinity>() <=
-        kReferenceReach) {
+    if (near.contains(point.position) || seen.contains(point.position)) {
       within.push_back(point);
     }
   }
@@ -214,10 +227,11 @@ void ScanMatcher::SetReference(ReferencePoints points,
   bucket_rows_ = 0;
   field_valid_ = false;
   if (points.given().empty()) return;
-  if (IsTooWide(points.given())) {
+  if (IsTooWide(points.given(), options_.reference_reach)) {
     if (!viewpoints_.empty()) rays_ = points.given();
     ReferencePoints within(points.merge_distance());
-    within.Add(WithinReach(points.given()));
+    within.Add(
+        WithinReach(points.given(), options_.reference_reach, viewpoints_));
     points = std::move(within);
   } else if (!viewpoints_.empty()) {
     rays_ = points.TakeGiven();
@@ -524,7 +538,7 @@ MatchResult ScanMatcher::Refine(const std::vector<ScanPoint>& scan,
   double progress = 0.0;
   PosesBefore before;
   Eigen::Matrix3d by_prior = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d step = Eigen::Vector3d::Constant(kReferenceReach);
+  Eigen::Vector3d step = Eigen::Vector3d::Constant(kFarthestReach);
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     const bool is_coarse = progress < 1.0;
     const double radius =

@@ -39,6 +39,10 @@ struct ScanMatcherOptions {
   double grid_resolution = 0.1;
   double search_step = 0.15;
   double rotation_step = DegToRad(1.0);
+  /// Points of a reference that lie farther than this from the middle of all
+  /// along either axis, m, are left out: one wild return must not blow up the
+  /// grids. Those near where they were seen from stay, where that is given.
+  double reference_reach = 120.0;
 
   /// Adapts the distances to a laser noisier by this factor (RangeNoiseScale).
   void ScaleToNoise(double scale) { point_sigma *= scale; }

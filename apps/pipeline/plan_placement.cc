@@ -334,7 +334,7 @@ class PartSearch {
   PartSearch(const std::vector<Wall>& lines,
              const std::vector<WallPoint>& points,
              const std::function<bool()>& stop)
-      : matcher_(ScanMatcherOptions()),
+      : matcher_(MatcherOptions()),
         turns_(TurnsOf(points, lines)),
         stop_(stop) {
     std::vector<ScanPoint> samples = SamplesOf(lines);
@@ -367,6 +367,13 @@ class PartSearch {
   }
 
  private:
+  // Nothing in a plan is a wild return.
+  static ScanMatcherOptions MatcherOptions() {
+    ScanMatcherOptions options;
+    options.reference_reach = 250.0;
+    return options;
+  }
+
   ScanMatcher matcher_;
   std::vector<double> turns_;
   std::function<bool()> stop_;

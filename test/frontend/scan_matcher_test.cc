@@ -537,6 +537,54 @@ TEST(ScanMatcherTest, OverlapByTryingEveryReferencePoint) {
   }
 }
 
+// Two rooms and one wild return: the far room stays where it is known that it
+// was seen from nearby, or where that is asked for; the return never does.
+TEST(ScanMatcherTest, AReferenceReachesWhereItWasSeenFrom) {
+  const std::vector<ScanPoint> room = Seen(RoomWithPillar(), Pose2::Zero());
+  struct Case {
+    double distance;
+    bool has_viewpoints;
+    double reach;
+    bool is_there;
+  };
+  for (const Case& c :
+       {Case{100.0, false, 120.0, true}, Case{200.0, false, 120.0, false},
+        Case{200.0, true, 120.0, true}, Case{200.0, false, 250.0, true},
+        Case{300.0, true, 120.0, false}}) {
+    SCOPED_TRACE(::testing::Message()
+                 << c.distance << ' ' << c.has_viewpoints << ' ' << c.reach);
+    const Pose2 there(-c.distance, c.distance / 2.0, 0.0);
+    // More of the near room, so that the middle of all lies in it.
+    std::vector<ScanPoint> reference = room;
+    reference.insert(reference.end(), room.begin(), room.end());
+    const std::size_t second = reference.size();
+    for (const ScanPoint& point : Transformed(room, there)) {
+      reference.push_back(point);
+    }
+    const std::size_t third = reference.size();
+    ScanPoint wild = room.front();
+    wild.position = {5e5, 3e5};
+    reference.push_back(wild);
+    std::vector<Viewpoint> viewpoints;
+    if (c.has_viewpoints) {
+      viewpoints = {{Eigen::Vector2d::Zero(), 0},
+                    {there.head<2>(), second},
+                    {Eigen::Vector2d::Zero(), third}};
+    }
+    ScanMatcherOptions options = MatcherOptions();
+    options.reference_reach = c.reach;
+    ScanMatcher matcher(options);
+    matcher.SetReference(reference, viewpoints);
+    EXPECT_EQ(matcher.Overlap(room, Pose2::Zero()), 1.0);
+    EXPECT_EQ(matcher.Overlap(room, there), c.is_there ? 1.0 : 0.0);
+    EXPECT_EQ(matcher.Overlap({wild}, Pose2::Zero()), 0.0);
+    if (!c.is_there) continue;
+    const MatchResult result = matcher.Refine(
+        room, Compose(there, Pose2(0.1, -0.05, DegToRad(2.0))), MatchPrior());
+    EXPECT_LT((result.pose - there).norm(), 1e-3);
+  }
+}
+
 TEST(ScanMatcherTest, RefineTakesTheNearestReferencePoint) {
   // Lines of points one behind the other, at distances that fall into the same
   // and into other buckets: one step of least squares without a prior goes

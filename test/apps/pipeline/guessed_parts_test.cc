@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "frontend/long_hall.h"
@@ -302,9 +303,11 @@ TEST(GuessedPartsTest, WhatFitsElsewhereTooIsTold) {
 
 // A robot that was carried sees a few metres of the hall, and then what it had
 // not seen: where it may be, still told as a guess.
+// However far the rest lies from there.
 TEST(GuessedPartsTest, AGuessIsPutWhereALittleOfItFits) {
-  for (const bool is_hall : {true, false}) {
-    SCOPED_TRACE(is_hall);
+  for (const auto& [is_hall, distance] :
+       {std::pair<bool, double>(true, 50.0), {true, 200.0}, {false, 50.0}}) {
+    SCOPED_TRACE(::testing::Message() << is_hall << ' ' << distance);
     GuessedLog log;
     log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
     const std::size_t second = log.scans.size();
@@ -314,7 +317,8 @@ TEST(GuessedPartsTest, AGuessIsPutWhereALittleOfItFits) {
                                         {{20.0, -9.0}, {20.0, 11.0}},
                                         {{20.0, 11.0}, {-20.0, 11.0}},
                                         {{-20.0, 11.0}, {-20.0, -9.0}}};
-    log.Drive(room, -17.0, 17.0, 0.1, Compose(kLost, Pose2(50.0, 0.0, 0.0)));
+    log.Drive(room, -17.0, 17.0, 0.1,
+              Compose(kLost, Pose2(distance, 0.0, 0.0)));
     log.MakeGoOn(beyond);
     log.result.loose.back().end = static_cast<int>(log.scans.size()) - 1;
     const std::vector<Pose2> before = log.poses;

@@ -629,6 +629,31 @@ TEST(PlanPlacementTest, APlanOfAPartOfTheBuildingIsUsed) {
   EXPECT_LT(Between(pose, *placement.map_in_plan).head<2>().norm(), 0.05);
 }
 
+// All else of the building is far from where the robot drove.
+TEST(PlanPlacementTest, IsFoundAtTheFarEndOfALargePlan) {
+  KnownStructure known;
+  known.plan = UnevenRoom();
+  const std::vector<PlanLine> room = known.plan;
+  for (int k = 0; k < 20; ++k) {
+    const Eigen::Vector2d corner(150.0 + 5.0 * k, 0.0);
+    const Eigen::Vector2d opposite = corner + Eigen::Vector2d(5.0, 4.0);
+    for (const Eigen::Vector2d& other :
+         {Eigen::Vector2d(corner.x(), opposite.y()),
+          Eigen::Vector2d(opposite.x(), corner.y())}) {
+      PlanLine line;
+      line.begin = other;
+      line.end = corner;
+      known.plan.push_back(line);
+      line.end = opposite;
+      known.plan.push_back(line);
+    }
+  }
+  const Pose2 pose(3.0, -2.0, 0.4);
+  const PlanPlacement placement = PlacePlan(known, WallsOf(room, pose));
+  ASSERT_TRUE(placement.map_in_plan) << placement.note;
+  EXPECT_LT(Between(pose, *placement.map_in_plan).head<2>().norm(), 0.05);
+}
+
 TEST(PlanPlacementTest, SaysNothingWhenItIsStopped) {
   KnownStructure known;
   known.plan = UnevenRoom();

@@ -18,10 +18,11 @@ namespace {
 
 // A part of fewer windows says too little.
 constexpr std::size_t kLeastWindows = 3;
-// A part is looked for again when the rest has grown by this factor, and no
-// more than so many are in all.
+// A part is looked for again when it or the rest has grown by this factor, and
+// no more than so many are in all, in the largest part and in others.
 constexpr double kMoreRest = 1.25;
 constexpr int kMostPlacements = 24;
+constexpr int kMostPairs = 12;
 // Windows that have to agree (twice as many where another place has any), and
 // the share that may contradict: places that were found by parts of carried
 // robots and were wrong had up to 7, and 0.4.
@@ -112,29 +113,12 @@ class PartPlacing {
 
   bool Run() {
     bool grows = true;
-    int placements = 0;
-    // Views of the rest when a part was looked for, by part.
-    std::map<int, std::size_t> tried;
     while (grows) {
-      grows = false;
       std::vector<std::vector<std::size_t>> parts = Parts();
       std::stable_sort(
           parts.begin(), parts.end(),
           [](const auto& a, const auto& b) { return a.size() > b.size(); });
-      for (std::size_t p = 1; p < parts.size() && !grows; ++p) {
-        const auto least =
-            kLeastWindows * static_cast<std::size_t>(options_.window_keys);
-        if (parts[p].size() < least) break;
-        if (placements == kMostPlacements || (stop_ && stop_())) break;
-        std::size_t& before = tried[part_[parts[p].front()]];
-        if (static_cast<double>(parts[0].size()) <
-            kMoreRest * static_cast<double>(before)) {
-          continue;
-        }
-        before = parts[0].size();
-        ++placements;
-        grows = Join(parts[0], parts[p]);
-      }
+      grows = JoinAny(parts);
       for (std::size_t p = 1; p < parts.size() && !grows; ++p) {
         if (parts[p].empty() || (stop_ && stop_())) break;
         grows = JoinRoughly(parts[0], parts[p]);
@@ -226,10 +210,42 @@ class PartPlacing {
     return views;
   }
 
+  // Joins two parts, the largest one and another if that can be: two that were
+  // found in each other may show together where they lie. `parts`: the largest
+  // one first.
+  bool JoinAny(const std::vector<std::vector<std::size_t>>& parts) {
+    const auto least =
+        kLeastWindows * static_cast<std::size_t>(options_.window_keys);
+    for (std::size_t r = 0; r < parts.size(); ++r) {
+      const std::vector<std::size_t>& rest = parts[r];
+      for (std::size_t p = r + 1; p < parts.size(); ++p) {
+        const std::vector<std::size_t>& part = parts[p];
+        if (part.size() < least) break;
+        if (stop_ && stop_()) return false;
+        int& left = r == 0 ? placements_left_ : pairs_left_;
+        if (left == 0) break;
+        Tried& tried = tried_[{part_[rest.front()], part_[part.front()]}];
+        const auto has_grown = [](std::size_t now, std::size_t before) {
+          return static_cast<double>(now) >=
+                 kMoreRest * static_cast<double>(before);
+        };
+        if (!has_grown(rest.size(), tried.rest) &&
+            !has_grown(part.size(), tried.part)) {
+          continue;
+        }
+        tried = {rest.size(), part.size()};
+        --left;
+        if (Join(rest, part, r == 0)) return true;
+      }
+    }
+    return false;
+  }
+
   // Moves a part to where it lies in the rest, if it is found there. It is not
   // looked for where it was found before and nothing contradicts that.
+  // `is_largest`: the rest, of all.
   bool Join(const std::vector<std::size_t>& rest,
-            const std::vector<std::size_t>& part) {
+            const std::vector<std::size_t>& part, bool is_largest) {
     const std::vector<KeyView> map = ViewsOf(rest);
     const std::vector<KeyView> track = ViewsOf(part);
     const bool has_claim = ClaimOf(rest) == ClaimOf(part);
@@ -238,14 +254,14 @@ class PartPlacing {
       here = JudgePlace(map, track, Pose2::Zero(), options_);
       if (here.agreeing >= kLeastAgreeing && here.contradicting == 0 &&
           IsTiedTo(rest, part)) {
-        LookForRivals(rest, part, map, track);
+        if (is_largest) LookForRivals(rest, part, map, track);
         return Merge(rest, part, Pose2::Zero());
       }
     }
     const TrackPlacement placement =
         PlaceTrack(map, track, std::nullopt, options_, stop_);
-    NoteDoubt(rest, part, placement);
-    if (!has_claim && IsRough(placement)) {
+    if (is_largest) NoteDoubt(rest, part, placement);
+    if (is_largest && !has_claim && IsRough(placement)) {
       rough_[part_[part.front()]] = placement.pose;
     }
     if (!placement.found || placement.contradicting_length >
@@ -344,6 +360,7 @@ class PartPlacing {
              const std::vector<std::size_t>& part, const Pose2& shift) {
     const int moved = part_[part.front()];
     const int into = part_[rest.front()];
+    rough_.erase(moved);
     for (std::size_t p = 0; p < shifts_.size(); ++p) {
       if (OwnerOf(p) != moved) continue;
       shifts_[p] = Compose(shift, shifts_[p]);
@@ -491,8 +508,8 @@ class PartPlacing {
   }
 
   // What was found nowhere goes along with what it was found in before, or what
-  // was found in it, or else with what it is a guess from; the first record
-  // stays.
+  // was found in it, or else with what it is a guess from, and takes along what
+  // was joined with it; the first record stays.
   void Finish() {
     const std::size_t count = shifts_.size();
     std::vector<bool> is_placed(count);
@@ -503,11 +520,19 @@ class PartPlacing {
                                             return a.size() < b.size();
                                           }) -
                          parts.begin());
-    for (std::size_t p = 0; p < count; ++p) is_placed[p] = OwnerOf(p) == rest;
+    std::vector<int> owners;
+    for (std::size_t p = 0; p < count; ++p) {
+      owners.push_back(OwnerOf(p));
+      is_placed[p] = owners[p] == rest;
+    }
     const auto along = [&](std::size_t p, std::size_t with) {
       if (is_placed[p] || !is_placed[with]) return false;
-      shifts_[p] = shifts_[with];
-      is_placed[p] = true;
+      const Pose2 move = Compose(shifts_[with], Inverse(shifts_[p]));
+      for (std::size_t other = 0; other < count; ++other) {
+        if (owners[other] != owners[p]) continue;
+        shifts_[other] = Compose(move, shifts_[other]);
+        is_placed[other] = true;
+      }
       return true;
     };
     for (bool any = true; any;) {
@@ -537,6 +562,16 @@ class PartPlacing {
   std::vector<Pose2>& poses_;
   PartTies& ties_;
   bool any_moved_ = false;
+  // How large two parts were, by their numbers, when one was looked for in the
+  // other.
+  struct Tried {
+    std::size_t rest = 0;
+    std::size_t part = 0;
+  };
+  std::map<std::pair<int, int>, Tried> tried_;
+  // Searches in the largest part, and in others.
+  int placements_left_ = kMostPlacements;
+  int pairs_left_ = kMostPairs;
   // By record; the parts' numbers now and in the beginning.
   std::vector<KeyView> views_;
   std::vector<int> part_;

@@ -339,6 +339,54 @@ TEST(GuessedPartsTest, AGuessIsPutWhereALittleOfItFits) {
   }
 }
 
+// Two parts show too little of the hall each, and another one together: found
+// in each other they are found in the hall, and where they were not in it they
+// lie right to each other all the same.
+TEST(GuessedPartsTest, PartsThatAreFoundInEachOtherGoTogether) {
+  std::vector<WallEnds> beyond = MirroredHall();
+  for (WallEnds& wall : beyond) {
+    wall.a.x() += 50.0;
+    wall.b.x() += 50.0;
+  }
+  for (const bool are_in_hall : {true, false}) {
+    SCOPED_TRACE(are_in_hall);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    const Pose2 lost_again(-40.0, 70.0, -1.1);
+    const std::size_t second = log.scans.size();
+    if (are_in_hall) log.Drive(LongHall(), 17.0, 1.0, -0.2, kLost);
+    const std::size_t second_beyond = log.scans.size();
+    log.Drive(beyond, 33.0, 67.0, 0.1, kLost);
+    if (are_in_hall) log.MakeGoOn(second_beyond);
+    log.result.loose.back().end = static_cast<int>(log.scans.size()) - 1;
+    const std::size_t third = log.scans.size();
+    if (are_in_hall) log.Drive(LongHall(), -17.0, -1.0, 0.1, lost_again);
+    const std::size_t third_beyond = log.scans.size();
+    log.Drive(beyond, 67.0, 33.0, -0.2, lost_again);
+    if (are_in_hall) log.MakeGoOn(third_beyond);
+    log.result.loose.back().end = static_cast<int>(log.scans.size()) - 1;
+    const std::vector<Pose2> before = log.poses;
+    ASSERT_TRUE(log.Place());
+    EXPECT_EQ(log.result.records[third].is_loose, false);
+    EXPECT_EQ(log.result.records[second].is_loose, !are_in_hall);
+    ASSERT_EQ(log.result.loose.size(), 2u);
+    EXPECT_EQ(log.result.loose[0].found, are_in_hall);
+    EXPECT_TRUE(log.result.loose[1].found);
+    if (are_in_hall) {
+      log.ExpectTrue(0, log.scans.size());
+      continue;
+    }
+    for (std::size_t k = second; k < third; ++k) {
+      EXPECT_EQ(log.poses[k], before[k]);
+    }
+    for (std::size_t k = third; k < log.scans.size(); ++k) {
+      const Pose2 right = Compose(kLost, log.truth[k]);
+      EXPECT_LT(PositionError(log.poses[k], right), 0.1) << k;
+      EXPECT_LT(HeadingError(log.poses[k], right), DegToRad(0.5)) << k;
+    }
+  }
+}
+
 // What was found in a part, and is too short to be looked for, goes along with
 // it; so does the first part where it is the short one.
 TEST(GuessedPartsTest, WhatWasFoundInAPartGoesAlong) {

@@ -105,6 +105,14 @@ struct MapAgreement {
   bool IsBetterThan(const MapAgreement& other) const {
     return contradicting < other.contradicting && agreeing >= other.agreeing;
   }
+
+  /// Whether so much less of it contradicts than in `other` that a little less
+  /// may agree, if what was measured speaks for it, too: three times as much.
+  bool ContradictsFarLessThan(const MapAgreement& other) const {
+    return contradicting < other.contradicting &&
+           other.contradicting - contradicting >=
+               3 * (other.agreeing - agreeing);
+  }
 };
 
 /// Counts them. Arguments, cost and Error as of FindContradictions; none once

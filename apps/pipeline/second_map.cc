@@ -169,14 +169,16 @@ void SecondMap::TryFrom(const std::vector<Pose2>& start, bool has_kink) {
   adjustment_->WriteState(&kept);
   std::vector<Pose2> trajectory = run_.result.trajectory;
   AdjustFrom(start, options_.adjustment);
+  const MapAgreement now = Review().Agreement();
+  const bool fits_better = adjustment_->FitsBetterThan(misfit, relations);
   // Where scans agree everywhere, as in a round corridor, what was measured
   // between them decides, and how far odometry has the same.
-  const MapAgreement now = Review().Agreement();
   const bool is_better =
-      has_contradictions ? now.IsBetterThan(agreement)
-                         : now.contradicting <= agreement.contradicting &&
-                               adjustment_->FitsBetterThan(misfit, relations) &&
-                               Review().LargestOpenSigma() <= open_sigma;
+      has_contradictions
+          ? now.IsBetterThan(agreement) ||
+                (fits_better && now.ContradictsFarLessThan(agreement))
+          : fits_better && now.contradicting <= agreement.contradicting &&
+                Review().LargestOpenSigma() <= open_sigma;
   if (run_.IsStopped() || is_better) return;
   const std::string bytes = kept.bytes();
   StateReader reader(bytes);

@@ -117,6 +117,24 @@ TEST(FindContradictionsTest, ARoundThatIsTurned) {
   }
 }
 
+// Three contradictions outweigh an agreement.
+TEST(CountAgreementTest, ALittleLessMayAgree) {
+  const auto is_far_less = [](int agreeing, int contradicting) {
+    MapAgreement now;
+    now.agreeing = agreeing;
+    now.contradicting = contradicting;
+    MapAgreement before;
+    before.agreeing = 100;
+    before.contradicting = 40;
+    return now.ContradictsFarLessThan(before);
+  };
+  EXPECT_TRUE(is_far_less(90, 10));
+  EXPECT_FALSE(is_far_less(89, 10));
+  EXPECT_TRUE(is_far_less(100, 39));
+  EXPECT_FALSE(is_far_less(100, 40));
+  EXPECT_FALSE(is_far_less(200, 41));
+}
+
 // A round that is turned contradicts the other one; one that lies elsewhere
 // does not, but then nothing agrees.
 TEST(CountAgreementTest, ATrueMapIsBetter) {
@@ -142,6 +160,10 @@ TEST(CountAgreementTest, ATrueMapIsBetter) {
   EXPECT_FALSE(apart.IsBetterThan(turned));
   EXPECT_FALSE(apart.IsBetterThan(right));
   EXPECT_FALSE(right.IsBetterThan(right));
+  EXPECT_TRUE(right.ContradictsFarLessThan(turned));
+  EXPECT_FALSE(apart.ContradictsFarLessThan(turned));
+  EXPECT_FALSE(apart.ContradictsFarLessThan(right));
+  EXPECT_FALSE(right.ContradictsFarLessThan(right));
   const MapAgreement stopped = CountAgreement(
       rounds.scans, rounds.keys, rounds.poses, {}, [] { return true; });
   EXPECT_EQ(stopped.agreeing + stopped.contradicting, 0);

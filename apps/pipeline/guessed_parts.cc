@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kLeastWindows = 3;
 // A part is looked for again when it or the rest has grown by this factor, and
 // no more than so many are in all, in the largest part and in others.
-constexpr double kMoreRest = 1.25;
+constexpr double kMoreRest = 1.1;
 constexpr int kMostPlacements = 24;
 constexpr int kMostPairs = 12;
 // Windows that have to agree (twice as many where another place has any), and
@@ -37,6 +37,9 @@ constexpr int kLeastRough = 3;
 constexpr double kMostRoughContradicting = 0.2;
 constexpr double kMostRoughRival = 0.5;
 constexpr double kMostRoughMisfit = 0.1;
+// Of a long part one window is looked for in so many key scans at least, as the
+// rest may be seen from a small piece of it.
+constexpr int kKeysPerSearch = 48;
 // Scans that are missing for so long, s, may be those of another place.
 constexpr double kLongGap = 10.0;
 // A part whose place was found by a few of its scans lies elsewhere when this
@@ -152,6 +155,10 @@ class PartPlacing {
         TellOfDoubt(part.front(), doubt->second);
       }
     }
+    for (const FoundPart& found : ties_.found) {
+      if (stop_ && stop_()) return;
+      TellOfContradicting(found);
+    }
     for (std::size_t k = 1; k < result_.records.size(); ++k) {
       const auto doubt = ties_.doubts.find(record(k).scan);
       if (doubt != ties_.doubts.end() &&
@@ -241,6 +248,18 @@ class PartPlacing {
     return false;
   }
 
+  // Poses were adjusted since both were compared: what still contradicts lies
+  // elsewhere than the rest of either has it.
+  void TellOfContradicting(const FoundPart& found) {
+    const PlaceSupport support = JudgePlace(
+        ViewsOf(found.rest), ViewsOf(found.part), Pose2::Zero(), options_);
+    if (support.contradicting < kLeastRefuting) return;
+    TellOfDoubt(std::max(found.rest.front(), found.part.front()),
+                std::to_string(support.agreeing) +
+                    " short stretches of it agree with what was seen there, " +
+                    std::to_string(support.contradicting) + " contradict it");
+  }
+
   // Moves a part to where it lies in the rest, if it is found there. It is not
   // looked for where it was found before and nothing contradicts that.
   // `is_largest`: the rest, of all.
@@ -258,14 +277,20 @@ class PartPlacing {
         return Merge(rest, part, Pose2::Zero());
       }
     }
+    TrackPlacementOptions options = options_;
+    options.max_searches = std::max(
+        options.max_searches, static_cast<int>(part.size()) / kKeysPerSearch);
     const TrackPlacement placement =
-        PlaceTrack(map, track, std::nullopt, options_, stop_);
+        PlaceTrack(map, track, std::nullopt, options, stop_);
     if (is_largest) NoteDoubt(rest, part, placement);
     if (is_largest && !has_claim && IsRough(placement)) {
       rough_[part_[part.front()]] = placement.pose;
     }
-    if (!placement.found || placement.contradicting_length >
-                                kContradictingPerWindow * placement.agreeing) {
+    const bool is_found =
+        placement.found ||
+        (has_claim && IsLikely(placement) && IsSamePlace(part, placement.pose));
+    if (!is_found || placement.contradicting_length >
+                         kContradictingPerWindow * placement.agreeing) {
       return false;
     }
     if (has_claim) {
@@ -277,8 +302,16 @@ class PartPlacing {
     }
     const std::size_t first = MoveTo(rest, part, placement);
     ties_.sure.insert(record(first).scan);
+    ties_.found.push_back({rest, part});
     TellOfFound(first);
     return Merge(rest, part, placement.pose);
+  }
+
+  // Whether a place that is not certain is the likeliest by far: where a part
+  // was found before, it stays there, and is told with the doubt.
+  bool IsLikely(const TrackPlacement& placement) const {
+    return placement.is_candidate && placement.agreeing >= kLeastAgreeing &&
+           placement.rival <= options_.rival_share * placement.agreeing;
   }
 
   // Whether a few windows say where a guess may lie, and hardly anything speaks

@@ -14,6 +14,13 @@
 
 namespace plumbline {
 
+/// Two parts of a log, one of which was found in the other by all that they
+/// saw: their records, ascending.
+struct FoundPart {
+  std::vector<std::size_t> rest;
+  std::vector<std::size_t> part;
+};
+
 /// What is known of the ties of parts, by the scans that the parts begin with.
 struct PartTies {
   /// Found by more than a few scans, or confirmed by them.
@@ -21,6 +28,8 @@ struct PartTies {
   /// Why a part that much of the rest looks like was not found all the same,
   /// for people.
   std::map<int, std::string> doubts;
+  /// Those that were moved to where they were found.
+  std::vector<FoundPart> found;
 };
 
 /// Whether the place of some part of the log is a guess (TrackTie::kLoose), was
@@ -38,10 +47,12 @@ TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options);
 /// Looks for these parts among what the largest part saw, largest first, when
 /// the poses of either are straight: drift over a thousand metres makes parts
 /// contradict each other that are right (JoinParts has no other poses). The
-/// largest part grows by what is found. What was found by a few scans stays
-/// where it was unless much more of it agrees elsewhere. A guess of which a few
-/// windows say where it may lie, and nothing speaks against that, is put there,
-/// and stays told as a guess.
+/// largest part grows by what is found; where nothing more is found in it parts
+/// are looked for in each other, and go together from then on. What was found
+/// by a few scans stays where it was unless much more of it agrees elsewhere,
+/// also where some of it would fit in another place, too. A guess of which a
+/// few windows say where it may lie, and nothing speaks against that, is put
+/// there, and stays told as a guess.
 ///
 /// `poses`: of the records' scans, in a frame in which the first one stays
 /// where it is; parts that were found elsewhere are moved in them, with what
@@ -58,7 +69,9 @@ bool PlaceUnsureParts(const std::vector<Scan>& scans,
 
 /// Tells in LogSolverResult::loose of parts that were found by a few scans:
 /// where what they saw afterwards speaks against it, and where it would fit in
-/// another place, too, though all of it may fit where it is. `poses`: as in
+/// another place, too, though all of it may fit where it is; and of parts that
+/// were found by all that they saw, where some of it still contradicts the
+/// place when all was adjusted. `poses`: as in
 /// PlaceUnsureParts, but as they are in the end; `ties` as it has left them.
 void TellOfDoubtfulParts(const std::vector<Scan>& scans,
                          const TrackPlacementOptions& options,

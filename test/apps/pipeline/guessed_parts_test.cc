@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -298,6 +299,61 @@ TEST(GuessedPartsTest, WhatFitsElsewhereTooIsTold) {
               "the next scan does not fit; found again near by, which what it "
               "saw afterwards does not make certain: it would fit in more than "
               "one place");
+  }
+}
+
+// A third of it would fit in another place, too: it stays where it was found,
+// as sure as can be, and that is told. Where it was not found before it is not
+// put there.
+TEST(GuessedPartsTest, ALikelyPlaceWhereItWasFoundBeforeHolds) {
+  for (const bool was_found : {true, false}) {
+    SCOPED_TRACE(was_found);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    const std::size_t twin = log.scans.size();
+    log.Drive(LongHall(), -18.0, -7.0, 0.2, Pose2(0.0, 30.0, 0.0));
+    log.MakeGoOn(twin);
+    const Pose2 shift = was_found ? Pose2(0.3, 0.1, 0.0) : kLost;
+    const std::size_t few = log.scans.size();
+    log.Drive(LongHall(), 17.0, 14.0, -0.2, shift);
+    if (was_found) log.MakeFound(few, 40);
+    const std::size_t last = log.scans.size();
+    log.Drive(LongHall(), 14.0, -17.0, -0.2, shift);
+    log.MakeFound(last, last - 1);
+    log.result.loose.clear();
+    EXPECT_EQ(log.Place(), was_found);
+    EXPECT_EQ(log.ties.sure.count(static_cast<int>(last)), was_found ? 1u : 0u);
+    if (!was_found) continue;
+    log.ExpectTrue(last, log.scans.size());
+    log.TellOfDoubts();
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    EXPECT_TRUE(log.result.loose[0].is_ambiguous);
+    EXPECT_EQ(log.result.loose[0].why,
+              "the next scan does not fit; found again by all that it saw "
+              "afterwards, which what it saw afterwards does not make certain: "
+              "much of it would fit in another place, too");
+  }
+}
+
+// What was found by most of it was adjusted, and some of it is elsewhere then.
+TEST(GuessedPartsTest, WhatStillContradictsIsTold) {
+  for (const bool is_bent : {false, true}) {
+    SCOPED_TRACE(is_bent);
+    GuessedLog log;
+    log.DriveThereAndBack(kLost);
+    ASSERT_TRUE(log.Place());
+    if (is_bent) {
+      for (std::size_t k = log.scans.size() - 50; k < log.scans.size(); ++k) {
+        log.poses[k] = Compose(Pose2(2.0, 1.5, 0.0), log.poses[k]);
+      }
+    }
+    log.TellOfDoubts();
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    EXPECT_EQ(log.result.loose[0].is_ambiguous, is_bent);
+    EXPECT_EQ(
+        log.result.loose[0].why.find(" contradict it") != std::string::npos,
+        is_bent)
+        << log.result.loose[0].why;
   }
 }
 

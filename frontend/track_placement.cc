@@ -260,13 +260,19 @@ class Search {
                      });
     for (const Candidate& found : found_) {
       if (stop && stop()) return false;
-      if (judged_.size() >= most) break;
+      if (num_places_ >= most) break;
+      bool is_new = true;
       bool is_known = false;
       for (const Candidate& other : judged_) {
-        is_known = is_known ||
-                   AreOne(found, other, windows_, kSameDistance, kSameTurn);
+        if (!AreOne(found, other, windows_, kSameDistance, kSameTurn)) continue;
+        is_new = false;
+        // A window that speaks for a place may not agree when it is looked at
+        // closely, as where people stood, and another one may.
+        is_known = is_known || other.agreeing > 0 ||
+                   other.window == found.window || !options_.ask_all_voters;
       }
       if (is_known) continue;
+      if (is_new) ++num_places_;
       judged_.push_back(found);
       Candidate& candidate = judged_.back();
       JudgeCandidate(map_, track_, windows_, options_, &candidate);
@@ -372,9 +378,13 @@ class Search {
   bool IsRather(Candidate* place, Candidate* other) {
     const WallContradictions& of_place = ContradictionsOf(place);
     const WallContradictions& of_other = ContradictionsOf(other);
-    return 2 * of_place.number() <= of_other.number() &&
-           WhyAnother(place->agreeing, of_place).empty() &&
-           !WhyAnother(other->agreeing, of_other).empty();
+    const double length_of_place = of_place.length() / place->agreeing;
+    const double length_of_other = of_other.length() / other->agreeing;
+    return (2 * of_place.number() <= of_other.number() &&
+            WhyAnother(place->agreeing, of_place).empty() &&
+            !WhyAnother(other->agreeing, of_other).empty()) ||
+           (2.0 * length_of_place <= length_of_other &&
+            length_of_other > options_.max_contradicting_per_window);
   }
 
   // Those of a place, which are found once.
@@ -448,6 +458,12 @@ class Search {
     placement->walls_through_track =
         static_cast<int>(contradictions.of_map.size());
     placement->contradicting_length = contradictions.length();
+    if (contradictions.length() >
+        options_.max_contradicting_per_window * best->agreeing) {
+      return "where " + Parts(best->agreeing) + " of it would fit, " +
+             ShortText(contradictions.length()) +
+             " m of wall in all stand where the other has none";
+    }
     if (is_plain) return "";
     const int moved = CountMovedDoors(contradictions);
     placement->is_candidate =
@@ -684,6 +700,8 @@ class Search {
   double reach_ = 0.0;
   std::vector<Candidate> found_;
   std::vector<Candidate> judged_;
+  // Of these, those that are no other window's.
+  std::size_t num_places_ = 0;
   // Support of the rival of the best place that nobody told from it.
   double untold_rival_ = 0.0;
   std::optional<double> mirrored_support_;

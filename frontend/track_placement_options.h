@@ -5,6 +5,8 @@
 #include <plumbline/frontend/scan_matcher.h>
 #include <plumbline/frontend/scan_points.h>
 
+#include <limits>
+
 namespace plumbline {
 
 /// Options of PlaceTrack: what it takes for two maps to be of one building.
@@ -59,6 +61,13 @@ struct TrackPlacementOptions {
   /// moved, but walls of over 1.7 m are not. Corridors of two buildings may
   /// agree wherever both were seen, but for the mouth of a wing.
   double max_contradicting_stretch = 1.1;
+  /// Length of all such pieces, m, for each window that agrees, from which on
+  /// it is another place. Of two places one of which has more than that, and at
+  /// least twice as much as the other, that one is no rival.
+  double max_contradicting_per_window = std::numeric_limits<double>::infinity();
+  /// Whether a place is given up only when none of the windows that speak for
+  /// it agrees when it is looked at closely; else when the first does not.
+  bool ask_all_voters = false;
   /// Shorter pieces are doors that were opened or shut, but where walls stand
   /// in openings of the map and the map's walls in openings of the track, it is
   /// another building, as its own mirror image is: either happens at two places

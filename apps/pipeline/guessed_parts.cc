@@ -289,10 +289,7 @@ class PartPlacing {
     const bool is_found =
         placement.found ||
         (has_claim && IsLikely(placement) && IsSamePlace(part, placement.pose));
-    if (!is_found || placement.contradicting_length >
-                         kContradictingPerWindow * placement.agreeing) {
-      return false;
-    }
+    if (!is_found) return false;
     if (has_claim) {
       if (!IsSamePlace(part, placement.pose)) {
         if (placement.agreeing < kMoreToMove * here.agreeing) return false;
@@ -336,11 +333,7 @@ class PartPlacing {
     rough_.erase(rough);
     const TrackPlacement placement =
         PlaceTrack(ViewsOf(rest), track, start, options_, stop_);
-    if (!placement.found || placement.agreeing < kLeastRough ||
-        placement.contradicting_length >
-            kContradictingPerWindow * placement.agreeing) {
-      return false;
-    }
+    if (!placement.found || placement.agreeing < kLeastRough) return false;
     TellOfRough(MoveTo(rest, part, placement), placement.agreeing);
     return Merge(rest, part, placement.pose);
   }
@@ -632,6 +625,8 @@ bool HasUnsureParts(const std::vector<Scan>& scans,
 
 TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options) {
   options.max_contradicting_stretch = kLongestContradicting;
+  options.max_contradicting_per_window = kContradictingPerWindow;
+  options.ask_all_voters = true;
   options.min_moved_doors = kNever;
   options.min_exchanged = kNever;
   options.min_agreeing = kLeastAgreeing;

@@ -5,8 +5,10 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "frontend/long_hall.h"
 #include "frontend/synthetic_world.h"
 
 namespace plumbline {
@@ -79,6 +81,73 @@ TEST(PlaceTrackTest, JudgesAPlace) {
       JudgePlace(map, track, Pose2(0.0, 0.0, 0.5 * kPi), {});
   EXPECT_EQ(wrong.agreeing, 0);
   EXPECT_GE(wrong.contradicting, 1);
+}
+
+// Key scans along a hall from `from` to `to`; poses are those of the truth.
+std::vector<KeyView> DriveAlong(const std::vector<WallEnds>& hall, double from,
+                                double to, double y, double sigma) {
+  testing::Noise noise(5);
+  testing::Laser laser = testing::FullCircle();
+  laser.angle_step = DegToRad(1.0);
+  laser.beams = 360;
+  laser.sigma = sigma;
+  std::vector<Scan> scans;
+  std::vector<int> keys;
+  std::vector<Pose2> poses;
+  for (double x = from; x < to; x += 0.3) {
+    keys.push_back(static_cast<int>(keys.size()));
+    poses.emplace_back(x, y, 0.0);
+    scans.push_back(testing::MakeScan(hall, poses.back(), laser, &noise));
+  }
+  return MakeKeyViews(scans, keys, poses, {});
+}
+
+// The window that fits best looks through what stood there before; others agree
+// once they are asked.
+TEST(PlaceTrackTest, AsksAllWindowsThatSpeakForAPlace) {
+  const std::vector<WallEnds> after = testing::LongHall();
+  std::vector<WallEnds> before = after;
+  for (double x = -12.0; x < -6.0; x += 1.5) {
+    before.push_back({{x, 1.0}, {x + 0.3, 1.0}});
+  }
+  const std::vector<KeyView> map = DriveAlong(before, -18.0, 18.0, 0.2, 0.0);
+  std::vector<KeyView> track = DriveAlong(after, -13.0, -4.0, -0.2, 0.0);
+  for (const KeyView& view : DriveAlong(after, -4.0, 14.0, -0.2, 0.08)) {
+    track.push_back(view);
+  }
+  TrackPlacementOptions options;
+  options.max_seen_through = 0.04;
+  EXPECT_EQ(PlaceTrack(map, track, std::nullopt, options).agreeing, 0);
+  options.ask_all_voters = true;
+  const TrackPlacement placement =
+      PlaceTrack(map, track, std::nullopt, options);
+  EXPECT_EQ(placement.agreeing, 3);
+  EXPECT_EQ(placement.doubtful, 2);
+  EXPECT_LT(placement.pose.norm(), 0.05);
+}
+
+// A hall in which a wall of 1.2 m stands on another day, more or less than what
+// may for each window that agrees.
+TEST(PlaceTrackTest, TooMuchWallThatContradictsIsAnotherPlace) {
+  const std::vector<WallEnds> after = testing::LongHall();
+  std::vector<WallEnds> before = after;
+  before.push_back({{1.0, 1.0}, {2.2, 1.0}});
+  const std::vector<KeyView> map = DriveAlong(before, -18.0, 18.0, 0.2, 0.0);
+  const std::vector<KeyView> track = DriveAlong(after, -13.0, 14.0, -0.2, 0.0);
+  TrackPlacementOptions options;
+  options.min_agreeing_per_change = 1;
+  const TrackPlacement found = PlaceTrack(map, track, std::nullopt, options);
+  ASSERT_TRUE(found.found) << found.why_not;
+  EXPECT_GT(found.contradicting_length, 0.2);
+  const double per_window = found.contradicting_length / found.agreeing;
+  for (const double share : {0.9, 1.1}) {
+    options.max_contradicting_per_window = share * per_window;
+    const TrackPlacement now = PlaceTrack(map, track, std::nullopt, options);
+    EXPECT_EQ(now.found, share > 1.0) << now.why_not;
+    EXPECT_EQ(now.why_not.find("m of wall in all") != std::string::npos,
+              share < 1.0)
+        << now.why_not;
+  }
 }
 
 }  // namespace

@@ -426,12 +426,12 @@ TEST(GuessedPartsTest, PartsThatAreFoundInEachOtherGoTogether) {
     EXPECT_EQ(log.result.records[third].is_loose, false);
     EXPECT_EQ(log.result.records[second].is_loose, !are_in_hall);
     ASSERT_EQ(log.result.loose.size(), 2u);
-    EXPECT_EQ(log.result.loose[0].found, are_in_hall);
     EXPECT_TRUE(log.result.loose[1].found);
     if (are_in_hall) {
       log.ExpectTrue(0, log.scans.size());
       continue;
     }
+    EXPECT_FALSE(log.result.loose[0].found);
     for (std::size_t k = second; k < third; ++k) {
       EXPECT_EQ(log.poses[k], before[k]);
     }

@@ -367,7 +367,12 @@ class PartPlacing {
     if (refined(later).tie != TrackTie::kMatched) return;
     TrackPlacementOptions options = options_;
     options.max_searches = std::min(options.max_searches, kRivalSearches);
-    NoteDoubt(rest, part, PlaceTrack(map, track, std::nullopt, options, stop_));
+    const TrackPlacement placement =
+        PlaceTrack(map, track, std::nullopt, options, stop_);
+    // What else may be said of its own place was said for it.
+    if (placement.rival > 0.0 || !IsSamePlace(part, placement.pose)) {
+      NoteDoubt(rest, part, placement);
+    }
   }
 
   // Keeps in mind why much of a part looks like the rest, but it was not found.

@@ -302,6 +302,23 @@ TEST(GuessedPartsTest, WhatFitsElsewhereTooIsTold) {
   }
 }
 
+// What could be said of a place that was not known yet, as that corridors look
+// alike, is not told of one that all agrees with.
+TEST(GuessedPartsTest, WhatFitsNowhereElseIsNotTold) {
+  GuessedLog log;
+  const std::size_t second = log.DriveThereAndBack(Pose2::Zero());
+  log.MakeFound(second, 40);
+  log.result.loose.clear();
+  TrackPlacementOptions options = WithinOneBuilding(TrackPlacementOptions());
+  options.min_certain_information_share = 1.1;
+  EXPECT_FALSE(PlaceUnsureParts(log.scans, options, nullptr, &log.result,
+                                &log.poses, &log.ties));
+  EXPECT_TRUE(log.ties.doubts.empty());
+  TellOfDoubtfulParts(log.scans, options, nullptr, &log.result, log.poses,
+                      log.ties);
+  EXPECT_TRUE(log.result.loose.empty());
+}
+
 // A third of it would fit in another place, too: it stays where it was found,
 // as sure as can be, and that is told. Where it was not found before it is not
 // put there.

@@ -158,6 +158,7 @@ class PartPlacing {
     for (const FoundPart& found : ties_.found) {
       if (stop_ && stop_()) return;
       TellOfContradicting(found);
+      if (ClaimOf(found.part) != claim) TellOfGuess(found);
     }
     for (std::size_t k = 1; k < result_.records.size(); ++k) {
       const auto doubt = ties_.doubts.find(record(k).scan);
@@ -201,6 +202,12 @@ class PartPlacing {
     }
     first_part_ = part_;
     shifts_.assign(hangs_on_.size(), Pose2::Zero());
+  }
+
+  // The record that the later one of both begins with.
+  static std::size_t FirstOfLater(const std::vector<std::size_t>& rest,
+                                  const std::vector<std::size_t>& part) {
+    return std::max(rest.front(), part.front());
   }
 
   std::vector<std::vector<std::size_t>> Parts() const {
@@ -254,10 +261,16 @@ class PartPlacing {
     const PlaceSupport support = JudgePlace(
         ViewsOf(found.rest), ViewsOf(found.part), Pose2::Zero(), options_);
     if (support.contradicting < kLeastRefuting) return;
-    TellOfDoubt(std::max(found.rest.front(), found.part.front()),
+    TellOfDoubt(FirstOfLater(found.rest, found.part),
                 std::to_string(support.agreeing) +
                     " short stretches of it agree with what was seen there, " +
                     std::to_string(support.contradicting) + " contradict it");
+  }
+
+  // Both hang on a guess, which is told of one of them alone.
+  void TellOfGuess(const FoundPart& found) {
+    TellOfDoubt(FirstOfLater(found.rest, found.part),
+                "what it was found in lies there by a guess itself");
   }
 
   // Moves a part to where it lies in the rest, if it is found there. It is not
@@ -363,8 +376,7 @@ class PartPlacing {
                      const std::vector<std::size_t>& part,
                      const std::vector<KeyView>& map,
                      const std::vector<KeyView>& track) {
-    const std::size_t later = std::max(rest.front(), part.front());
-    if (refined(later).tie != TrackTie::kMatched) return;
+    if (refined(FirstOfLater(rest, part)).tie != TrackTie::kMatched) return;
     TrackPlacementOptions options = options_;
     options.max_searches = std::min(options.max_searches, kRivalSearches);
     const TrackPlacement placement =
@@ -379,7 +391,7 @@ class PartPlacing {
   void NoteDoubt(const std::vector<std::size_t>& rest,
                  const std::vector<std::size_t>& part,
                  const TrackPlacement& placement) {
-    const int scan = record(std::max(rest.front(), part.front())).scan;
+    const int scan = record(FirstOfLater(rest, part)).scan;
     ties_.doubts.erase(scan);
     if (!placement.found && placement.agreeing >= kLeastAgreeing) {
       ties_.doubts[scan] = placement.why_not;

@@ -71,8 +71,9 @@ bool PlaceUnsureParts(const std::vector<Scan>& scans,
 /// where what they saw afterwards speaks against it, and where it would fit in
 /// another place, too, though all of it may fit where it is; and of parts that
 /// were found by all that they saw, where some of it still contradicts the
-/// place when all was adjusted. `poses`: as in
-/// PlaceUnsureParts, but as they are in the end; `ties` as it has left them.
+/// place when all was adjusted, and where what they were found in hangs on a
+/// guess. `poses`: as in PlaceUnsureParts, but as they are in the end; `ties`
+/// as it has left them.
 void TellOfDoubtfulParts(const std::vector<Scan>& scans,
                          const TrackPlacementOptions& options,
                          const std::function<bool()>& stop,

@@ -425,6 +425,12 @@ TEST(GuessedPartsTest, PartsThatAreFoundInEachOtherGoTogether) {
     SCOPED_TRACE(are_in_hall);
     GuessedLog log;
     log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    if (!are_in_hall) {
+      // The largest part, on which the others hang.
+      const std::size_t back = log.scans.size();
+      log.Drive(LongHall(), 18.0, -18.0, -0.2, Pose2::Zero());
+      log.MakeGoOn(back);
+    }
     const Pose2 lost_again(-40.0, 70.0, -1.1);
     const std::size_t second = log.scans.size();
     if (are_in_hall) log.Drive(LongHall(), 17.0, 1.0, -0.2, kLost);
@@ -444,6 +450,12 @@ TEST(GuessedPartsTest, PartsThatAreFoundInEachOtherGoTogether) {
     EXPECT_EQ(log.result.records[second].is_loose, !are_in_hall);
     ASSERT_EQ(log.result.loose.size(), 2u);
     EXPECT_TRUE(log.result.loose[1].found);
+    log.TellOfDoubts();
+    EXPECT_EQ(log.result.loose[1].is_ambiguous, !are_in_hall);
+    EXPECT_EQ(
+        log.result.loose[1].why.find("by a guess itself") != std::string::npos,
+        !are_in_hall)
+        << log.result.loose[1].why;
     if (are_in_hall) {
       log.ExpectTrue(0, log.scans.size());
       continue;

@@ -412,6 +412,45 @@ TEST(GuessedPartsTest, AGuessIsPutWhereALittleOfItFits) {
   }
 }
 
+// A few metres are put where all of them fit, and where they would fit in no
+// other place; still told as a guess. The first scan stays, whose part it is.
+TEST(GuessedPartsTest, AShortGuessIsPutWhereAllOfItFits) {
+  enum Case { kLast, kFirst, kTwice, kNowhere };
+  for (const Case which : {kLast, kFirst, kTwice, kNowhere}) {
+    SCOPED_TRACE(which);
+    GuessedLog log;
+    const std::vector<WallEnds> hall =
+        which == kNowhere ? MirroredHall() : LongHall();
+    if (which == kFirst) {
+      log.Drive(hall, 17.0, 11.0, -0.2, Pose2::Zero());
+      log.Drive(LongHall(), -18.0, 18.0, 0.2, kLost);
+    } else {
+      log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+      const std::size_t twin = log.scans.size();
+      if (which == kTwice) {
+        log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2(0.0, 30.0, 0.0));
+        log.MakeGoOn(twin);
+      }
+      log.Drive(hall, 17.0, 11.0, -0.2, kLost);
+    }
+    const std::vector<Pose2> before = log.poses;
+    const bool is_put = which == kLast || which == kFirst;
+    EXPECT_EQ(log.Place(), is_put);
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    EXPECT_FALSE(log.result.loose[0].found);
+    if (!is_put) {
+      EXPECT_EQ(log.poses, before);
+      continue;
+    }
+    log.ExpectTrue(0, log.scans.size());
+    EXPECT_LT(PositionError(log.poses.front(), log.truth.front()), 1e-9);
+    EXPECT_TRUE(HasUnsureParts(log.scans, log.result, log.ties.sure));
+    EXPECT_EQ(log.result.loose[0].why,
+              "scans are missing; where it went on is a guess, on 2 short "
+              "stretches of what it saw afterwards");
+  }
+}
+
 // Two parts show too little of the hall each, and another one together: found
 // in each other they are found in the hall, and where they were not in it they
 // lie right to each other all the same.

@@ -42,6 +42,9 @@ constexpr double kContradictionWeight = 2.0;
 constexpr double kInPlace = 0.1;
 constexpr int kPasses = 2;
 constexpr double kAsClearly = 0.95;
+// Of two places the one of whose returns the share that is contradicted is so
+// many times that of the other's is hardly a rival of that one.
+constexpr double kClearlyMore = 1.5;
 // The share of the best place's support from which on another one may be the
 // place where the best contradicts the map.
 constexpr double kNearlyAsMuch = 0.9;
@@ -71,10 +74,16 @@ struct Candidate {
   int agreeing = 0;
   int contradicting = 0;
   int doubtful = 0;
+  // Returns of all windows.
+  int compared = 0;
+  int contradicted = 0;
   // Once they were asked for.
   std::shared_ptr<const WallContradictions> contradictions;
   double support() const {
     return agreeing - kContradictionWeight * contradicting;
+  }
+  double contradicted_share() const {
+    return static_cast<double>(contradicted) / std::max(1, compared);
   }
 };
 
@@ -95,11 +104,14 @@ bool AreOne(const Candidate& a, const Candidate& b,
 
 void Count(Candidate* candidate) {
   candidate->agreeing = candidate->contradicting = candidate->doubtful = 0;
+  candidate->compared = candidate->contradicted = 0;
   for (const WindowJudgement& judgement : candidate->judgements) {
     const WindowVerdict verdict = judgement.verdict;
     candidate->agreeing += verdict == WindowVerdict::kAgrees ? 1 : 0;
     candidate->contradicting += verdict == WindowVerdict::kContradicts ? 1 : 0;
     candidate->doubtful += verdict == WindowVerdict::kDoubtful ? 1 : 0;
+    candidate->compared += judgement.compared;
+    candidate->contradicted += judgement.contradicted;
   }
 }
 
@@ -300,6 +312,9 @@ class Search {
     placement.agreeing = best->agreeing;
     placement.contradicting = best->contradicting;
     placement.doubtful = best->doubtful;
+    placement.compared = best->compared;
+    placement.contradicted = best->contradicted;
+    placement.clean_rival = CleanRival(*best);
     for (Candidate& rival : judged_) {
       const bool is_told = IsToldFrom(*best, rival);
       if (&rival == best ||
@@ -325,7 +340,7 @@ class Search {
     if (placement.found) {
       AddDoubts(*best, placement, &placement.doubt);
     }
-    if (placement.found || placement.is_candidate) TakeTie(*best, &placement);
+    TakeTie(*best, &placement);
     return placement;
   }
 
@@ -475,13 +490,21 @@ class Search {
 
   // Whether next to nothing contradicts of what both have seen at a place.
   bool IsClean(const Candidate& place) const {
-    double compared = 0.0;
-    double contradicted = 0.0;
-    for (const WindowJudgement& judgement : place.judgements) {
-      compared += judgement.compared;
-      contradicted += judgement.contradicted;
+    return place.contradicted <=
+           options_.max_plain_contradicted_share * place.compared;
+  }
+
+  // Support of the best other place that hardly more contradicts.
+  double CleanRival(const Candidate& best) const {
+    const double most = kClearlyMore * best.contradicted_share();
+    double support = 0.0;
+    for (const Candidate& rival : judged_) {
+      if (rival.contradicted_share() <= most &&
+          !AreOne(best, rival, windows_, kRivalDistance, kRivalTurn)) {
+        support = std::max(support, rival.support());
+      }
     }
-    return contradicted <= options_.max_plain_contradicted_share * compared;
+    return support;
   }
 
   // Whether there is another place that it may be as well: a rival that is more

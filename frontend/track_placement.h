@@ -26,12 +26,19 @@ struct TrackPlacement {
   int contradicting = 0;
   int doubtful = 0;
   double rival = 0.0;
+  /// The same of the best other place of whose returns not clearly more
+  /// contradict the map, or are contradicted by it.
+  double clean_rival = 0.0;
   /// It may as well be in another place, which nothing speaks against, as in a
   /// building that looks the same from its other end: which one it is the other
   /// way round cannot tell, either.
   bool has_twin = false;
   /// How far the agreeing windows lie from where `pose` puts them: the RMS, m.
   double misfit = 0.0;
+  /// Returns of either that are known to the other, in all windows, and those
+  /// of them that the other contradicts.
+  int compared = 0;
+  int contradicted = 0;
   /// Pieces of wall of the track that the map looks through, those of the map
   /// that the track looks through, and the length of all, m, without the 0.3 m
   /// at either end: doors that were opened or shut, or another building.

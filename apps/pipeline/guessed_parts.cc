@@ -29,21 +29,20 @@ constexpr int kMostPairs = 12;
 constexpr int kLeastAgreeing = 6;
 constexpr double kMostContradicting = 0.25;
 // Of a part that is a guess: windows that have to agree for it to be put there
-// all the same, still as a guess; the share of these that contradict and that
-// agree elsewhere at most, and their distances from each other (RMS), m. Of
-// what carried robots saw that was at most 0.2, 0.4 (0.67 where it was bent)
-// and 0.07 at right places, 0.33, 0.8 to 1 and 0.18 at wrong ones.
-constexpr int kLeastRough = 3;
-constexpr double kMostRoughContradicting = 0.2;
+// all the same, still as a guess; the share of the returns compared that
+// contradict, that of the windows that agree at another place where hardly more
+// do, and the distances of those that agree from where the part has them (RMS),
+// m, at most. Of 667 pieces of two logs, each looked for in another piece of
+// its log, 109 that are not found are put so, two of them where they were not.
+constexpr int kLeastRough = 2;
+constexpr double kMostRoughContradicted = 0.06;
 constexpr double kMostRoughRival = 0.5;
 constexpr double kMostRoughMisfit = 0.1;
-// A part of fewer windows than that, which is a guess, is put where these of
-// its shorter ones agree, of so many keys each, when none contradicts and none
-// would fit elsewhere, and they say at least this share of its place along the
-// walls. Of 360 pieces of 16 to 32 key scans of three logs, each looked for in
-// all the rest, 235 were put so, one of them wrong.
+// A part of fewer windows than are looked for is a guess that is put where so
+// many keys each agree, if they say at least this share of its place along the
+// walls. Of 360 pieces of 16 to 32 key scans, each looked for in all the rest,
+// 235 were put so, one of them wrong.
 constexpr int kShortWindow = 8;
-constexpr int kLeastShort = 2;
 constexpr double kLeastShortInformation = 0.1;
 // Of a long part one window is looked for in so many key scans at least, as the
 // rest may be seen from a small piece of it.
@@ -131,12 +130,7 @@ class PartPlacing {
       std::stable_sort(
           parts.begin(), parts.end(),
           [](const auto& a, const auto& b) { return a.size() > b.size(); });
-      grows = JoinAny(parts);
-      for (std::size_t p = 1; p < parts.size() && !grows; ++p) {
-        if (parts[p].empty() || (stop_ && stop_())) break;
-        grows =
-            JoinRoughly(parts[0], parts[p]) || JoinShort(parts[0], parts[p]);
-      }
+      grows = JoinAny(parts) || JoinAnyRoughly(parts);
     }
     if (any_moved_) Finish();
     return any_moved_;
@@ -314,8 +308,8 @@ class PartPlacing {
     const TrackPlacement placement =
         PlaceTrack(map, track, std::nullopt, options, stop_);
     if (is_largest) NoteDoubt(rest, part, placement);
-    if (is_largest && !has_claim && IsRough(placement)) {
-      rough_[part_[part.front()]] = placement.pose;
+    if (is_largest && !has_claim && !placement.found && IsRough(placement)) {
+      rough_[part_[part.front()]] = {placement.pose, placement.agreeing};
     }
     const bool is_found =
         placement.found ||
@@ -345,12 +339,33 @@ class PartPlacing {
   // Whether a few windows say where a guess may lie, and hardly anything speaks
   // against it.
   static bool IsRough(const TrackPlacement& placement) {
-    return !placement.found && placement.agreeing >= kLeastRough &&
-           placement.agreeing < kLeastAgreeing &&
-           placement.contradicting <=
-               kMostRoughContradicting * placement.agreeing &&
-           placement.rival <= kMostRoughRival * placement.agreeing &&
+    return placement.agreeing >= kLeastRough &&
+           placement.contradicted <=
+               kMostRoughContradicted * placement.compared &&
+           placement.clean_rival <= kMostRoughRival * placement.agreeing &&
            placement.misfit <= kMostRoughMisfit;
+  }
+
+  // Puts one part that is a guess where it may lie, if that is known of any.
+  // Those of which many windows agree may be found yet, when others have been
+  // put there.
+  bool JoinAnyRoughly(const std::vector<std::vector<std::size_t>>& parts) {
+    for (const bool do_many : {false, true}) {
+      for (std::size_t p = 1; p < parts.size(); ++p) {
+        if (parts[p].empty() || (stop_ && stop_())) break;
+        const auto rough = rough_.find(part_[parts[p].front()]);
+        if (rough != rough_.end() &&
+            (rough->second.agreeing >= kLeastAgreeing) == do_many &&
+            JoinRoughly(parts[0], parts[p])) {
+          return true;
+        }
+      }
+    }
+    for (std::size_t p = 1; p < parts.size(); ++p) {
+      if (parts[p].empty() || (stop_ && stop_())) break;
+      if (JoinShort(parts[0], parts[p])) return true;
+    }
+    return false;
   }
 
   // Moves a guess to where a few of its windows say, if they do; it stays told
@@ -360,11 +375,11 @@ class PartPlacing {
     const auto rough = rough_.find(part_[part.front()]);
     if (rough == rough_.end()) return false;
     const std::vector<KeyView> track = ViewsOf(part);
-    const Pose2 start = Compose(rough->second, track.front().pose);
+    const Pose2 start = Compose(rough->second.pose, track.front().pose);
     rough_.erase(rough);
     const TrackPlacement placement =
         PlaceTrack(ViewsOf(rest), track, start, options_, stop_);
-    if (!placement.found || placement.agreeing < kLeastRough) return false;
+    if (!IsRough(placement)) return false;
     TellOfRough(MoveTo(rest, part, placement), placement.agreeing);
     return Merge(rest, part, placement.pose);
   }
@@ -374,19 +389,16 @@ class PartPlacing {
                  const std::vector<std::size_t>& part) {
     TrackPlacementOptions options = options_;
     if (part.size() >= kLeastWindows * Keys(options.window_keys) ||
-        part.size() < kLeastShort * Keys(kShortWindow) ||
+        part.size() < kLeastRough * Keys(kShortWindow) ||
         ClaimOf(rest) == ClaimOf(part) || !HaveGrown(rest, part)) {
       return false;
     }
     options.window_keys = kShortWindow;
-    options.min_agreeing = kLeastShort;
+    options.min_agreeing = kLeastRough;
     options.min_information_share = kLeastShortInformation;
     const TrackPlacement placement =
         PlaceTrack(ViewsOf(rest), ViewsOf(part), std::nullopt, options, stop_);
-    if (!placement.found || placement.contradicting > 0 ||
-        placement.rival > 0.0 || placement.misfit > kMostRoughMisfit) {
-      return false;
-    }
+    if (!placement.found || !IsRough(placement)) return false;
     TellOfRough(MoveTo(rest, part, placement), placement.agreeing);
     return Merge(rest, part, placement.pose);
   }
@@ -667,7 +679,11 @@ class PartPlacing {
   std::vector<int> claim_;
   std::vector<Pose2> shifts_;
   // Where a few windows put parts that are guesses, by their numbers now.
-  std::map<int, Pose2> rough_;
+  struct Rough {
+    Pose2 pose = Pose2::Zero();
+    int agreeing = 0;
+  };
+  std::map<int, Rough> rough_;
 };
 
 }  // namespace

@@ -150,5 +150,29 @@ TEST(PlaceTrackTest, TooMuchWallThatContradictsIsAnotherPlace) {
   }
 }
 
+// The same hall is on another floor, with and without a wall that the track
+// looks through.
+TEST(PlaceTrackTest, APlaceThatMoreContradictsIsHardlyARival) {
+  const std::vector<WallEnds> hall = testing::LongHall();
+  const std::vector<KeyView> track = DriveAlong(hall, -13.0, 14.0, -0.2, 0.0);
+  for (const bool has_wall : {false, true}) {
+    SCOPED_TRACE(has_wall);
+    std::vector<WallEnds> other = hall;
+    if (has_wall) other.push_back({{1.0, 1.0}, {3.4, 1.0}});
+    std::vector<KeyView> map = DriveAlong(hall, -18.0, 18.0, 0.2, 0.0);
+    for (KeyView& view : DriveAlong(other, -18.0, 18.0, 0.2, 0.0)) {
+      view.pose = Compose(Pose2(0.0, 60.0, 0.0), view.pose);
+      map.push_back(view);
+    }
+    const TrackPlacement placement =
+        PlaceTrack(map, track, std::nullopt, TrackPlacementOptions());
+    EXPECT_GE(placement.agreeing, 4);
+    EXPECT_GE(placement.rival, 3.0);
+    EXPECT_EQ(placement.clean_rival, has_wall ? 0.0 : placement.rival);
+    EXPECT_GT(placement.compared, 1000);
+    EXPECT_LT(placement.contradicted, 0.02 * placement.compared);
+  }
+}
+
 }  // namespace
 }  // namespace plumbline

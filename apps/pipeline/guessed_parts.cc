@@ -31,9 +31,10 @@ constexpr double kMostContradicting = 0.25;
 // Of a part that is a guess: windows that have to agree for it to be put there
 // all the same, still as a guess; the share of the returns compared that
 // contradict, that of the windows that agree at another place where hardly more
-// do, and the distances of those that agree from where the part has them (RMS),
-// m, at most. Of 667 pieces of two logs, each looked for in another piece of
-// its log, 109 that are not found are put so, two of them where they were not.
+// do, and, where fewer agree than to be found, their distances from where the
+// part has them (RMS), m, at most. Of 667 pieces of two logs, each looked for
+// in another piece of its log, 109 that are not found are put so, two of them
+// where they were not; of 21 where six windows agree none.
 constexpr int kLeastRough = 2;
 constexpr double kMostRoughContradicted = 0.06;
 constexpr double kMostRoughRival = 0.5;
@@ -338,12 +339,14 @@ class PartPlacing {
 
   // Whether a few windows say where a guess may lie, and hardly anything speaks
   // against it.
-  static bool IsRough(const TrackPlacement& placement) {
+  bool IsRough(const TrackPlacement& placement) const {
+    const bool has_many = placement.agreeing >= kLeastAgreeing;
     return placement.agreeing >= kLeastRough &&
            placement.contradicted <=
                kMostRoughContradicted * placement.compared &&
            placement.clean_rival <= kMostRoughRival * placement.agreeing &&
-           placement.misfit <= kMostRoughMisfit;
+           placement.misfit <=
+               (has_many ? options_.max_misfit : kMostRoughMisfit);
   }
 
   // Puts one part that is a guess where it may lie, if that is known of any.

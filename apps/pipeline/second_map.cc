@@ -1,5 +1,7 @@
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/factors/angle.h>
+#include <plumbline/frontend/agreeing_visits.h>
+#include <plumbline/frontend/key_views.h>
 #include <plumbline/frontend/wall_completion.h>
 #include <plumbline/pipeline/bent_map.h>
 #include <plumbline/pipeline/guessed_parts.h>
@@ -73,6 +75,9 @@ void SecondMap::AdjustPoses(bool find_parts) {
     if (!FindParts(&ties)) break;
     AdjustPosesOfRun();
   }
+  for (int round = 0; find_parts && round < kMostRounds; ++round) {
+    if (!HasContradictions() || !TryFrom(WhereVisitsAgree(), false)) break;
+  }
   if (find_parts && !run_.IsStopped() &&
       HasUnsureParts(run_.scans, run_.result, {})) {
     TellOfDoubtfulParts(
@@ -88,6 +93,22 @@ TrackPlacementOptions SecondMap::PartPlacement() const {
   placement.matcher = options_.odometry.matcher;
   placement.ScaleToNoise(run_.result.noise_scale);
   return WithinOneBuilding(placement);
+}
+
+std::vector<Pose2> SecondMap::WhereVisitsAgree() const {
+  std::vector<int> keys;
+  std::vector<bool> follows;
+  for (const KeyScanRecord& record : run_.result.records) {
+    keys.push_back(record.scan);
+    const TrackTie tie =
+        run_.result.refined[static_cast<std::size_t>(record.scan)].tie;
+    follows.push_back(tie == TrackTie::kNone && FollowsTheOneBefore(record));
+  }
+  const TrackPlacementOptions options = PartPlacement();
+  return PosesOfAgreeingVisits(
+      MakeKeyViews(run_.scans, keys, adjustment_->KeyPoses(), options.points),
+      follows, options, options_.adjustment.num_threads,
+      [this] { return run_.IsStopped(); });
 }
 
 bool SecondMap::FindParts(PartTies* ties) {
@@ -157,10 +178,11 @@ void SecondMap::AdjustFrom(const std::vector<Pose2>& start,
   run_.TakeTrajectory(map_.graph(), options_.adjustment.place_stride);
 }
 
-void SecondMap::TryFrom(const std::vector<Pose2>& start, bool has_kink) {
+bool SecondMap::TryFrom(const std::vector<Pose2>& start, bool has_kink) {
+  if (start.empty()) return false;
   const bool has_contradictions = HasContradictions();
   const double open_sigma = has_contradictions ? 0.0 : LargestOpenSigma();
-  if (!has_contradictions && open_sigma == 0.0 && !has_kink) return;
+  if (!has_contradictions && open_sigma == 0.0 && !has_kink) return false;
   const MapAgreement agreement = Review().Agreement();
   const double misfit = adjustment_->Misfit();
   const std::int64_t relations = adjustment_->num_relations();
@@ -179,7 +201,7 @@ void SecondMap::TryFrom(const std::vector<Pose2>& start, bool has_kink) {
                 (fits_better && now.ContradictsFarLessThan(agreement))
           : fits_better && now.contradicting <= agreement.contradicting &&
                 Review().LargestOpenSigma() <= open_sigma;
-  if (run_.IsStopped() || is_better) return;
+  if (run_.IsStopped() || is_better) return true;
   const std::string bytes = kept.bytes();
   StateReader reader(bytes);
   adjustment_.reset();
@@ -187,6 +209,7 @@ void SecondMap::TryFrom(const std::vector<Pose2>& start, bool has_kink) {
   ReadAdjustment(&reader);
   run_.places = adjustment_->places();
   run_.result.trajectory = std::move(trajectory);
+  return false;
 }
 
 MapReview SecondMap::Review() const {

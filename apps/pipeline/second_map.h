@@ -50,8 +50,10 @@ class SecondMap {
   /// Adjusts the poses alone, from the key poses of the run or from odometry,
   /// whichever agrees better with what was seen. Sets the places and the
   /// trajectory of the run. Parts of the log whose place is not sure are then
-  /// looked for in the rest (PlaceUnsureParts), if `find_parts`, and all is
-  /// adjusted once more when some were found, a few times. Throws Error when a
+  /// looked for in the rest (PlaceUnsureParts), if `find_parts`, and where the
+  /// map contradicts itself the way is bent so that visits agree
+  /// (PosesOfAgreeingVisits); all is adjusted once more after either, a few
+  /// times. Throws Error when a
   /// solve fails; likewise below.
   void AdjustPoses(bool find_parts = false);
   /// Adds walls to adjusted poses.
@@ -88,6 +90,9 @@ class SecondMap {
   // are moved. `ties`: as in PlaceUnsureParts.
   bool FindParts(PartTies* ties);
   TrackPlacementOptions PartPlacement() const;
+  // Poses of the key scans, from those that are adjusted; none where they
+  // agree.
+  std::vector<Pose2> WhereVisitsAgree() const;
   void ForgetParts();
   // The poses alone by all scans, from these of the key scans.
   void AdjustFrom(const std::vector<Pose2>& start,
@@ -97,8 +102,9 @@ class SecondMap {
   void AdjustBoth();
   // A start that is far off ends in a wrong place: where scans contradict each
   // other, lengths hang on odometry, or the map has a kink that odometry does
-  // not have, the better of two starts stands.
-  void TryFrom(const std::vector<Pose2>& start, bool has_kink);
+  // not have, the better of two starts stands. Nothing to start from is none.
+  // Returns whether the new one does.
+  bool TryFrom(const std::vector<Pose2>& start, bool has_kink);
   MapReview Review() const;
   // Not when the map is not to be checked.
   bool HasContradictions() const;

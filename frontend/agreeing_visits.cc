@@ -21,7 +21,7 @@ namespace plumbline {
 namespace {
 
 // A window is looked for so far from where it is, m and rad.
-constexpr double kReach = 3.0;
+constexpr double kReach = 6.0;
 constexpr double kTurn = DegToRad(10.0);
 // Least score of a place that a search finds, its share of the best, and how
 // many are looked at.

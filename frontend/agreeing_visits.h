@@ -15,7 +15,7 @@ namespace plumbline {
 /// 0.3 m: after a long way along which nothing was seen twice the poses may be
 /// a metre off, and stay so. Here short stretches of the way (windows of
 /// options.window_keys key scans) are held against each other visit, where they
-/// are and, where they do not agree, within 3 m and 10 degrees; the poses then
+/// are and, where they do not agree, within 6 m and 10 degrees; the poses then
 /// go where least is bent between them.
 ///
 /// `views`: key scans in the order of the way, map frame; `follows`: for each,

@@ -8,11 +8,9 @@
 #include <plumbline/frontend/track_windows.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -45,10 +43,7 @@ constexpr double kWayDistance = 0.05;
 constexpr double kWayTurn = DegToRad(0.5);
 constexpr double kUnknownDistance = 0.3;
 constexpr double kUnknownTurn = DegToRad(3.0);
-// Least weight of a window's position along its walls, as a share of that
-// across them.
-constexpr double kLeastAlong = 0.01;
-// Chi-square at which a match counts half.
+// A match that is so many standard deviations off counts half.
 constexpr double kLossScale = 3.0;
 
 // A stretch of the way.
@@ -62,9 +57,7 @@ struct Stretch {
 // Where a stretch lies in what was seen on another visit.
 struct Match {
   std::size_t visit = 0;
-  // Of the window's middle, map frame.
-  Pose2 pose = Pose2::Zero();
-  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  WindowJudgement judgement;
   bool is_elsewhere = false;
 };
 
@@ -173,8 +166,7 @@ class VisitMatcher {
       }
     }
     Match match;
-    match.pose = best.pose;
-    match.information = best.information;
+    match.judgement = best;
     match.is_elsewhere =
         (best.pose - window.middle).head<2>().norm() > kElsewhere;
     double nearest = -1.0;
@@ -198,22 +190,15 @@ Eigen::Matrix3d SqrtInformation(double distance, double turn) {
       .asDiagonal();
 }
 
-// Of a match, in the frame of the pose that it is seen from: along a bare
-// corridor it says nothing.
+// Of a match, in the frame of the pose that it is seen from.
 Eigen::Matrix3d SqrtInformation(const Match& match, const Pose2& from) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(
-      match.information);
-  Eigen::Matrix2d weight = Eigen::Matrix2d::Identity();
-  if (solver.eigenvalues()[1] > 0.0) {
-    weight = match.information / solver.eigenvalues()[1] +
-             kLeastAlong * Eigen::Matrix2d::Identity();
-  }
   Eigen::Matrix2d rotation;
   rotation << std::cos(from[2]), -std::sin(from[2]), std::sin(from[2]),
       std::cos(from[2]);
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  information.topLeftCorner<2, 2>() = rotation.transpose() * weight * rotation /
-                                      (kMatchDistance * kMatchDistance);
+  information.topLeftCorner<2, 2>() =
+      rotation.transpose() * PositionWeight(match.judgement, kMatchDistance) *
+      rotation;
   information(2, 2) = 1.0 / (kMatchTurn * kMatchTurn);
   return information.llt().matrixU();
 }
@@ -243,10 +228,10 @@ std::vector<Pose2> Bend(const std::vector<Stretch>& stretches,
     }
     for (const Match& match : matches[s]) {
       const Pose2& from = start[match.visit];
-      problem.AddResidualBlock(PosePose::Create(Between(from, match.pose),
-                                                SqrtInformation(match, from)),
-                               &loss, poses[match.visit].data(),
-                               poses[s].data());
+      problem.AddResidualBlock(
+          PosePose::Create(Between(from, match.judgement.pose),
+                           SqrtInformation(match, from)),
+          &loss, poses[match.visit].data(), poses[s].data());
     }
   }
   problem.SetParameterBlockConstant(poses.front().data());

@@ -27,9 +27,9 @@ constexpr double kWindowTurn = DegToRad(1.0);
 constexpr double kLeastAlong = 0.01;
 constexpr int kFitSteps = 3;
 
-// The weight of a window's position in the fit of the track, map's frame: along
-// a bare corridor it says nothing.
-Eigen::Matrix2d PositionWeight(const WindowJudgement& judgement) {
+}  // namespace
+
+Eigen::Matrix2d PositionWeight(const WindowJudgement& judgement, double sigma) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(
       judgement.information);
   Eigen::Matrix2d weight = Eigen::Matrix2d::Identity();
@@ -37,10 +37,8 @@ Eigen::Matrix2d PositionWeight(const WindowJudgement& judgement) {
     weight = judgement.information / solver.eigenvalues()[1] +
              kLeastAlong * Eigen::Matrix2d::Identity();
   }
-  return weight / (kWindowDistance * kWindowDistance);
+  return weight / (sigma * sigma);
 }
-
-}  // namespace
 
 std::vector<TrackWindow> MakeTrackWindows(const std::vector<KeyView>& track,
                                           std::size_t size) {
@@ -179,7 +177,7 @@ Pose2 FitTrack(const std::vector<TrackWindow>& windows,
   fit << mean_map - rotation * mean_track, angle;
   std::vector<Eigen::Matrix2d> weights;
   for (const WindowJudgement& judgement : judgements) {
-    weights.push_back(PositionWeight(judgement));
+    weights.push_back(PositionWeight(judgement, kWindowDistance));
   }
   for (int step = 0; step < kFitSteps; ++step) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();

@@ -59,6 +59,11 @@ WindowJudgement JudgeWindow(const std::vector<KeyView>& map,
                             const TrackWindow& window, const Pose2& guess,
                             const TrackPlacementOptions& options);
 
+/// What a window says of its position (1/m^2, map's frame) when it is known to
+/// `sigma`, m, where its returns say most: along a bare corridor next to
+/// nothing. At least 1 % of that, so that it can be solved for.
+Eigen::Matrix2d PositionWeight(const WindowJudgement& judgement, double sigma);
+
 /// Pose of the track's frame in the map's that suits the windows which agree
 /// best: least squares of directions, and of positions with what the returns
 /// say of them across walls and along them. At least one must agree.

@@ -160,6 +160,7 @@ void SecondMap::KeepFirst() {
 void SecondMap::AdjustFrom(const std::vector<Pose2>& start,
                            const JointAdjustmentOptions& options) {
   adjustment_.reset();
+  contradicts_.reset();
   map_.Clear();
   std::vector<Place> places;
   if (gathered_.valid()) places = gathered_.get();
@@ -209,6 +210,7 @@ bool SecondMap::TryFrom(const std::vector<Pose2>& start, bool has_kink) {
   ReadAdjustment(&reader);
   run_.places = adjustment_->places();
   run_.result.trajectory = std::move(trajectory);
+  contradicts_ = has_contradictions;
   return false;
 }
 
@@ -218,9 +220,10 @@ MapReview SecondMap::Review() const {
                    [this] { return run_.IsStopped(); });
 }
 
-bool SecondMap::HasContradictions() const {
-  return options_.check_map && !run_.IsStopped() &&
-         Review().HasContradictions();
+bool SecondMap::HasContradictions() {
+  if (!options_.check_map || run_.IsStopped()) return false;
+  if (!contradicts_) contradicts_ = Review().HasContradictions();
+  return *contradicts_;
 }
 
 double SecondMap::LargestOpenSigma() {

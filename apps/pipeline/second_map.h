@@ -14,6 +14,7 @@
 #include <atomic>
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,8 +54,7 @@ class SecondMap {
   /// looked for in the rest (PlaceUnsureParts), if `find_parts`, and where the
   /// map contradicts itself the way is bent so that visits agree
   /// (PosesOfAgreeingVisits); all is adjusted once more after either, a few
-  /// times. Throws Error when a
-  /// solve fails; likewise below.
+  /// times. Throws Error when a solve fails; likewise below.
   void AdjustPoses(bool find_parts = false);
   /// Adds walls to adjusted poses.
   void MakeWalls();
@@ -107,7 +107,7 @@ class SecondMap {
   bool TryFrom(const std::vector<Pose2>& start, bool has_kink);
   MapReview Review() const;
   // Not when the map is not to be checked.
-  bool HasContradictions() const;
+  bool HasContradictions();
   double LargestOpenSigma();
 
   const Registry& registry_;
@@ -123,6 +123,8 @@ class SecondMap {
   std::vector<KeyScanRecord> first_records_;
   std::vector<LooseTrack> first_loose_;
   double first_length_ = 0.0;
+  // Whether the adjusted map contradicts itself, once that was asked.
+  std::optional<bool> contradicts_;
   double vote_excess_ = 1.0;
   std::atomic<bool> is_gathering_dropped_{false};
   // None once they are taken. Last, as it uses the others.

@@ -811,4 +811,18 @@ PlaceSupport JudgePlace(const std::vector<KeyView>& map,
   return support;
 }
 
+WallContradictions ContradictionsOfPlace(const std::vector<KeyView>& map,
+                                         const std::vector<KeyView>& track,
+                                         const Pose2& pose,
+                                         const TrackPlacementOptions& options) {
+  const std::vector<TrackWindow> windows =
+      MakeTrackWindows(track, static_cast<std::size_t>(options.window_keys));
+  std::vector<WindowJudgement> judgements;
+  for (const TrackWindow& window : windows) {
+    judgements.push_back(
+        JudgeWindow(map, track, window, Compose(pose, window.middle), options));
+  }
+  return FindWallContradictions(map, track, windows, judgements, options);
+}
+
 }  // namespace plumbline

@@ -4,6 +4,7 @@
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/key_views.h>
 #include <plumbline/frontend/track_placement_options.h>
+#include <plumbline/frontend/wall_contradictions.h>
 
 #include <functional>
 #include <optional>
@@ -90,6 +91,13 @@ struct PlaceSupport {
 PlaceSupport JudgePlace(const std::vector<KeyView>& map,
                         const std::vector<KeyView>& track, const Pose2& pose,
                         const TrackPlacementOptions& options);
+
+/// Wall of one in openings of the other where `pose`, of the track's frame in
+/// the map's, puts the track: of the windows that agree there.
+WallContradictions ContradictionsOfPlace(const std::vector<KeyView>& map,
+                                         const std::vector<KeyView>& track,
+                                         const Pose2& pose,
+                                         const TrackPlacementOptions& options);
 
 }  // namespace plumbline
 

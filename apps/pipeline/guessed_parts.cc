@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <string>
@@ -172,6 +173,25 @@ class PartPlacing {
           ties_.sure.count(record(k).scan) != 0) {
         TellOfDoubt(k, doubt->second);
       }
+    }
+  }
+
+  // Tells of parts that lie where they agree with what was seen before, but
+  // whose doors stand elsewhere in the same walls.
+  void TellOfMovedDoors() {
+    for (const std::vector<std::size_t>& part : Parts()) {
+      if (part.empty() || part.front() == 0 || (stop_ && stop_())) continue;
+      if (refined(part.front()).tie == TrackTie::kLoose) continue;
+      std::vector<std::size_t> before(part.front());
+      std::iota(before.begin(), before.end(), std::size_t{0});
+      const int moved = CountMovedDoors(ContradictionsOfPlace(
+          ViewsOf(before), ViewsOf(part), Pose2::Zero(), options_));
+      if (moved == 0) continue;
+      TellOfDoubt(part.front(),
+                  std::to_string(moved) +
+                      (moved == 1 ? " door stands" : " doors stand") +
+                      " elsewhere in the same wall than before, as on another "
+                      "floor");
     }
   }
 
@@ -600,9 +620,12 @@ class PartPlacing {
 
   void TellOfDoubt(std::size_t first, const std::string& doubt) {
     LooseTrack& told = TrackTold(first);
-    told.is_ambiguous = true;
     told.why +=
-        ", which what it saw afterwards does not make certain: " + doubt;
+        (told.is_ambiguous
+             ? "; "
+             : ", which what it saw afterwards does not make certain: ") +
+        doubt;
+    told.is_ambiguous = true;
   }
 
   // What was found nowhere goes along with what it was found in before, or what
@@ -729,6 +752,9 @@ void TellOfDoubtfulParts(const std::vector<Scan>& scans,
                          LogSolverResult* result, std::vector<Pose2> poses,
                          PartTies ties) {
   PartPlacing(scans, options, stop, result, &poses, &ties).TellOfDoubts();
+  // Also of those that are sure by now.
+  PartTies none;
+  PartPlacing(scans, options, stop, result, &poses, &none).TellOfMovedDoors();
 }
 
 }  // namespace plumbline

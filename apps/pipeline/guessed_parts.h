@@ -72,8 +72,10 @@ bool PlaceUnsureParts(const std::vector<Scan>& scans,
 /// another place, too, though all of it may fit where it is; and of parts that
 /// were found by all that they saw, where some of it still contradicts the
 /// place when all was adjusted, and where what they were found in hangs on a
-/// guess. `poses`: as in PlaceUnsureParts, but as they are in the end; `ties`
-/// as it has left them.
+/// guess. Of either it is told where a door stands elsewhere in the same wall
+/// than before (CountMovedDoors): the robot may have been carried to another
+/// floor of the same walls. `poses`: as in PlaceUnsureParts, but as they are in
+/// the end; `ties` as it has left them.
 void TellOfDoubtfulParts(const std::vector<Scan>& scans,
                          const TrackPlacementOptions& options,
                          const std::function<bool()>& stop,

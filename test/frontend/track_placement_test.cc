@@ -102,6 +102,33 @@ std::vector<KeyView> DriveAlong(const std::vector<WallEnds>& hall, double from,
   return MakeKeyViews(scans, keys, poses, {});
 }
 
+// A wall of 1.4 m in the middle of the hall, of which 0.3 m at either end count
+// for nothing.
+TEST(PlaceTrackTest, SaysWhatContradictsAtAPlace) {
+  const std::vector<WallEnds> empty = testing::LongHall();
+  std::vector<WallEnds> full = empty;
+  full.push_back({{-1.4, 1.2}, {0.0, 1.2}});
+  const std::vector<KeyView> without = DriveAlong(empty, -18.0, 18.0, 0.2, 0.0);
+  const std::vector<KeyView> with = DriveAlong(full, -12.0, 12.0, -0.2, 0.0);
+  const WallContradictions there =
+      ContradictionsOfPlace(without, with, Pose2::Zero(), {});
+  EXPECT_TRUE(there.of_map.empty());
+  ASSERT_EQ(there.of_track.size(), 1u);
+  EXPECT_NEAR(there.of_track[0].middle.x(), -0.7, 0.4);
+  EXPECT_NEAR(there.of_track[0].middle.y(), 1.2, 0.1);
+  EXPECT_NEAR(there.of_track[0].length, 0.8, 0.2);
+  const WallContradictions back =
+      ContradictionsOfPlace(with, without, Pose2::Zero(), {});
+  EXPECT_TRUE(back.of_track.empty());
+  EXPECT_EQ(back.of_map.size(), 1u);
+  EXPECT_EQ(ContradictionsOfPlace(without, without, Pose2::Zero(), {}).number(),
+            0u);
+  // No window agrees, so none says anything.
+  EXPECT_EQ(
+      ContradictionsOfPlace(without, with, Pose2(0.0, 100.0, 0.0), {}).number(),
+      0u);
+}
+
 // The window that fits best looks through what stood there before; others agree
 // once they are asked.
 TEST(PlaceTrackTest, AsksAllWindowsThatSpeakForAPlace) {

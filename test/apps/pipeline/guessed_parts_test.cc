@@ -319,6 +319,61 @@ TEST(GuessedPartsTest, WhatFitsNowhereElseIsNotTold) {
   EXPECT_TRUE(log.result.loose.empty());
 }
 
+// The long hall with openings of 1.2 m in the wall above, at these x; behind
+// them is another wall.
+std::vector<WallEnds> HallWithDoors(const std::vector<double>& doors) {
+  std::vector<WallEnds> walls;
+  for (const WallEnds& wall : LongHall()) {
+    const bool is_above = wall.a.y() == 3.0 && wall.b.y() == 3.0;
+    if (!is_above) walls.push_back(wall);
+  }
+  double begin = -20.0;
+  for (const double door : doors) {
+    walls.push_back({{begin, 3.0}, {door - 0.6, 3.0}});
+    begin = door + 0.6;
+  }
+  walls.push_back({{begin, 3.0}, {20.0, 3.0}});
+  walls.push_back({{-20.0, 5.5}, {20.0, 5.5}});
+  return walls;
+}
+
+// People shut a door and open another one, and the walls are the same on the
+// next floor.
+TEST(GuessedPartsTest, DoorsThatStandElsewhereAreTold) {
+  const std::vector<double> before = {-9.0, 3.0};
+  const std::vector<std::vector<double>> afterwards = {
+      before, {-9.0, 3.0, 9.0}, {-7.0, 3.0}, {-7.0, 5.0}};
+  const std::vector<std::string> told = {
+      "", "",
+      "1 door stands elsewhere in the same wall than before, as on "
+      "another floor",
+      "2 doors stand elsewhere in the same wall than before, as on "
+      "another floor"};
+  for (std::size_t i = 0; i < afterwards.size(); ++i) {
+    SCOPED_TRACE(i);
+    GuessedLog log;
+    log.Drive(HallWithDoors(before), -18.0, 18.0, 0.2, Pose2::Zero());
+    const std::size_t second = log.scans.size();
+    log.Drive(HallWithDoors(afterwards[i]), 17.0, -17.0, -0.2, Pose2::Zero());
+    log.MakeFound(second, second - 1);
+    log.result.loose.clear();
+    log.Place();
+    EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.ties.sure));
+    log.TellOfDoubts();
+    if (told[i].empty()) {
+      EXPECT_TRUE(log.result.loose.empty());
+      continue;
+    }
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    EXPECT_EQ(log.result.loose[0].why,
+              "the next scan does not fit; found again near by, which what it "
+              "saw afterwards does not make certain: " +
+                  told[i]);
+    EXPECT_TRUE(log.result.loose[0].found);
+    EXPECT_TRUE(log.result.loose[0].is_ambiguous);
+  }
+}
+
 // A third of it would fit in another place, too: it stays where it was found,
 // as sure as can be, and that is told. Where it was not found before it is put
 // there as a guess.

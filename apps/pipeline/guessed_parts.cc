@@ -154,8 +154,7 @@ class PartPlacing {
       const PlaceSupport support =
           JudgePlace(ViewsOf(rest), ViewsOf(part), Pose2::Zero(), options_);
       const auto doubt = ties_.doubts.find(record(part.front()).scan);
-      if (support.contradicting >= kLeastRefuting &&
-          support.contradicting > support.agreeing) {
+      if (IsRefuted(support)) {
         TellOfRefuted(part.front(), record(part.back()).scan);
       } else if (doubt != ties_.doubts.end() &&
                  support.agreeing >= kLeastAgreeing) {
@@ -329,7 +328,11 @@ class PartPlacing {
     const TrackPlacement placement =
         PlaceTrack(map, track, std::nullopt, options, stop_);
     if (is_largest) NoteDoubt(rest, part, placement);
-    if (is_largest && !has_claim && !placement.found && IsRough(placement)) {
+    const bool may_be_elsewhere =
+        !has_claim || IsRefuted(here) ||
+        (here.agreeing == 0 && placement.agreeing >= kLeastAgreeing);
+    if (is_largest && may_be_elsewhere && !placement.found &&
+        IsRough(placement) && !IsSamePlace(part, placement.pose)) {
       rough_[part_[part.front()]] = {placement.pose, placement.agreeing};
     }
     const bool is_found =
@@ -338,7 +341,10 @@ class PartPlacing {
     if (!is_found) return false;
     if (has_claim) {
       if (!IsSamePlace(part, placement.pose)) {
-        if (placement.agreeing < kMoreToMove * here.agreeing) return false;
+        if (!IsRefuted(here) &&
+            placement.agreeing < kMoreToMove * here.agreeing) {
+          return false;
+        }
       } else if (IsTiedTo(rest, part)) {
         return Merge(rest, part, Pose2::Zero());
       }
@@ -348,6 +354,13 @@ class PartPlacing {
     ties_.found.push_back({rest, part});
     TellOfFound(first);
     return Merge(rest, part, placement.pose);
+  }
+
+  // Whether most of what a part saw speaks against the place that it was found
+  // at by a few scans.
+  static bool IsRefuted(const PlaceSupport& here) {
+    return here.contradicting >= kLeastRefuting &&
+           here.contradicting > here.agreeing;
   }
 
   // Whether a place that is not certain is the likeliest by far: where a part
@@ -403,7 +416,7 @@ class PartPlacing {
     const TrackPlacement placement =
         PlaceTrack(ViewsOf(rest), track, start, options_, stop_);
     if (!IsRough(placement)) return false;
-    TellOfRough(MoveTo(rest, part, placement), placement.agreeing);
+    TellOfRough(MoveTo(rest, part, placement), part, placement.agreeing);
     return Merge(rest, part, placement.pose);
   }
 
@@ -422,7 +435,7 @@ class PartPlacing {
     const TrackPlacement placement =
         PlaceTrack(ViewsOf(rest), ViewsOf(part), std::nullopt, options, stop_);
     if (!placement.found || !IsRough(placement)) return false;
-    TellOfRough(MoveTo(rest, part, placement), placement.agreeing);
+    TellOfRough(MoveTo(rest, part, placement), part, placement.agreeing);
     return Merge(rest, part, placement.pose);
   }
 
@@ -602,8 +615,13 @@ class PartPlacing {
                "; found again by all that it saw afterwards";
   }
 
-  void TellOfRough(std::size_t first, int agreeing) {
+  void TellOfRough(std::size_t first, const std::vector<std::size_t>& part,
+                   int agreeing) {
     LooseTrack& told = TrackTold(first);
+    // All of it is a guess from now on.
+    if (told.found && part.front() == first) {
+      told.end = record(part.back()).scan;
+    }
     told.found = false;
     told.why = told.why.substr(0, told.why.find(';')) +
                "; where it went on is a guess, on " + std::to_string(agreeing) +

@@ -52,7 +52,8 @@ TrackPlacementOptions WithinOneBuilding(TrackPlacementOptions options);
 /// by a few scans stays where it was unless much more of it agrees elsewhere,
 /// also where some of it would fit in another place, too. A guess of which a
 /// few windows say where it may lie, and nothing speaks against that, is put
-/// there, and stays told as a guess.
+/// there, and stays told as a guess; so is what was found by a few scans, and
+/// most of what it saw contradicts that, or nothing agrees with it.
 ///
 /// `poses`: of the records' scans, in a frame in which the first one stays
 /// where it is; parts that were found elsewhere are moved in them, with what

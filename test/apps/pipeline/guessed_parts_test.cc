@@ -474,6 +474,42 @@ TEST(GuessedPartsTest, AGuessIsPutWhereALittleOfItFits) {
   }
 }
 
+// A few scans of it look like those of 9 m farther on, and the others contradict
+// that: it is put where a little of it fits, as a guess. Where nothing speaks
+// against its place a little does not move it.
+TEST(GuessedPartsTest, WhatIsRefutedIsPutWhereALittleOfItFits) {
+  for (const bool is_refuted : {true, false}) {
+    SCOPED_TRACE(is_refuted);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    const std::size_t second = log.scans.size();
+    const Pose2 shift = is_refuted ? Pose2(-9.0, 0.0, 0.0) : kLost;
+    log.Drive(LongHall(), 17.0, -4.0, -0.2, shift);
+    log.MakeFound(second, 40);
+    const std::size_t beyond = log.scans.size();
+    const std::vector<WallEnds> room = {{{-20.0, -9.0}, {20.0, -9.0}},
+                                        {{20.0, -9.0}, {20.0, 11.0}},
+                                        {{20.0, 11.0}, {-20.0, 11.0}},
+                                        {{-20.0, 11.0}, {-20.0, -9.0}}};
+    log.Drive(room, -17.0, -4.0, 0.1, Compose(shift, Pose2(60.0, 0.0, 0.0)));
+    log.MakeGoOn(beyond);
+    const std::vector<Pose2> before = log.poses;
+    EXPECT_EQ(log.Place(), is_refuted);
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    const LooseTrack& loose = log.result.loose[0];
+    EXPECT_EQ(loose.found, !is_refuted);
+    if (!is_refuted) {
+      EXPECT_EQ(log.poses, before);
+      continue;
+    }
+    log.ExpectTrue(0, beyond);
+    EXPECT_TRUE(HasUnsureParts(log.scans, log.result, log.ties.sure));
+    EXPECT_EQ(loose.why.substr(0, 50),
+              "scans are missing; where it went on is a guess, on");
+    EXPECT_EQ(loose.end, static_cast<int>(log.scans.size()) - 1);
+  }
+}
+
 // A few metres are put where all of them fit, and where they would fit in no
 // other place; still told as a guess. The first scan stays, whose part it is.
 TEST(GuessedPartsTest, AShortGuessIsPutWhereAllOfItFits) {

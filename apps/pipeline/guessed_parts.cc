@@ -51,6 +51,9 @@ constexpr double kLeastShortInformation = 0.1;
 constexpr int kKeysPerSearch = 48;
 // Scans that are missing for so long, s, may be those of another place.
 constexpr double kLongGap = 10.0;
+// What odometry missed while nothing could be matched, m and rad.
+constexpr double kMissed = 0.5;
+constexpr double kMissedTurn = DegToRad(10.0);
 // A part whose place was found by a few of its scans lies elsewhere when this
 // many times as many windows agree there as where it was found.
 constexpr int kMoreToMove = 2;
@@ -90,6 +93,22 @@ bool IsAfterLongGap(const std::vector<Scan>& scans,
   return false;
 }
 
+// Whether odometry alone had placed scans before this record, and was wrong by
+// so much that the match after it may be of another place.
+bool IsAfterMissedMotion(const LogSolverResult& result, std::size_t k) {
+  if (k == 0) return false;
+  const auto end = static_cast<std::size_t>(result.records[k].scan);
+  auto at = static_cast<std::size_t>(result.records[k - 1].scan) + 1;
+  for (; at <= end; ++at) {
+    const RefinedScan& scan = result.refined[at];
+    if (scan.missed_since >= 0 && (scan.missed.head<2>().norm() > kMissed ||
+                                   std::abs(scan.missed[2]) > kMissedTurn)) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // Whether a track begins with this record whose place is a guess, or was found
 // by a few of its scans.
 bool IsUnsure(const std::vector<Scan>& scans, const LogSolverResult& result,
@@ -98,7 +117,8 @@ bool IsUnsure(const std::vector<Scan>& scans, const LogSolverResult& result,
   const TrackTie tie = result.refined[static_cast<std::size_t>(scan)].tie;
   if (tie == TrackTie::kLoose) return true;
   return (tie == TrackTie::kMatched ||
-          IsAfterLongGap(scans, result.records, k)) &&
+          IsAfterLongGap(scans, result.records, k) ||
+          IsAfterMissedMotion(result, k)) &&
          sure.count(scan) == 0;
 }
 
@@ -156,6 +176,8 @@ class PartPlacing {
       const auto doubt = ties_.doubts.find(record(part.front()).scan);
       if (IsRefuted(support)) {
         TellOfRefuted(part.front(), record(part.back()).scan);
+      } else if (IsContested(support)) {
+        TellOfSupport(part.front(), support);
       } else if (doubt != ties_.doubts.end() &&
                  support.agreeing >= kLeastAgreeing) {
         TellOfDoubt(part.front(), doubt->second);
@@ -293,7 +315,11 @@ class PartPlacing {
     const PlaceSupport support = JudgePlace(
         ViewsOf(found.rest), ViewsOf(found.part), Pose2::Zero(), options_);
     if (support.contradicting < kLeastRefuting) return;
-    TellOfDoubt(FirstOfLater(found.rest, found.part),
+    TellOfSupport(FirstOfLater(found.rest, found.part), support);
+  }
+
+  void TellOfSupport(std::size_t first, const PlaceSupport& support) {
+    TellOfDoubt(first,
                 std::to_string(support.agreeing) +
                     " short stretches of it agree with what was seen there, " +
                     std::to_string(support.contradicting) + " contradict it");
@@ -330,6 +356,7 @@ class PartPlacing {
     if (is_largest) NoteDoubt(rest, part, placement);
     const bool may_be_elsewhere =
         !has_claim || IsRefuted(here) ||
+        (IsContested(here) && placement.agreeing >= here.agreeing) ||
         (here.agreeing == 0 && placement.agreeing >= kLeastAgreeing);
     if (is_largest && may_be_elsewhere && !placement.found &&
         IsRough(placement) && !IsSamePlace(part, placement.pose)) {
@@ -361,6 +388,13 @@ class PartPlacing {
   static bool IsRefuted(const PlaceSupport& here) {
     return here.contradicting >= kLeastRefuting &&
            here.contradicting > here.agreeing;
+  }
+
+  // Whether it would not be found there with so much that speaks against it.
+  static bool IsContested(const PlaceSupport& here) {
+    return here.contradicting >= kLeastRefuting &&
+           here.contradicting >
+               kMostContradicting * (here.agreeing + here.contradicting);
   }
 
   // Whether a place that is not certain is the likeliest by far: where a part
@@ -445,6 +479,8 @@ class PartPlacing {
                      const std::vector<std::size_t>& part,
                      const TrackPlacement& placement) {
     any_moved_ = true;
+    // Says how it was tied, which is known no more afterwards.
+    TrackTold(FirstOfLater(rest, part));
     for (const std::size_t k : part) {
       views_[k].pose = Compose(placement.pose, views_[k].pose);
     }
@@ -603,6 +639,10 @@ class PartPlacing {
     told->found = true;
     told->why = IsAfterLongGap(scans_, result_.records, first)
                     ? "scans are missing; the next one seemed to follow"
+                : refined(first).tie == TrackTie::kNone &&
+                        IsAfterMissedMotion(result_, first)
+                    ? "odometry alone says where the robot went; the next scan "
+                      "seemed to follow"
                     : "the next scan does not fit; found again near by";
     return *told;
   }

@@ -33,8 +33,10 @@ struct PartTies {
 };
 
 /// Whether the place of some part of the log is a guess (TrackTie::kLoose), was
-/// found by a few of its scans (TrackTie::kMatched) or follows scans that are
-/// missing for over 10 s, but for tracks that begin with the scans `sure`.
+/// found by a few of its scans (TrackTie::kMatched), follows scans that are
+/// missing for over 10 s, or scans that odometry alone had placed and missed by
+/// over 0.5 m or 10 degrees (RefinedScan::missed), but for tracks that begin
+/// with the scans `sure`.
 bool HasUnsureParts(const std::vector<Scan>& scans,
                     const LogSolverResult& result, const std::set<int>& sure);
 

@@ -250,6 +250,29 @@ TEST(GuessedPartsTest, WhatSeemsToGoOnAfterALongGapIsHeldAgainstTheRest) {
   }
 }
 
+// Where nothing could be matched for a while the first match may be of another
+// place, which only what odometry missed by then tells.
+TEST(GuessedPartsTest, WhatOdometryMissedIsHeldAgainstTheRest) {
+  for (const bool is_far : {false, true}) {
+    SCOPED_TRACE(is_far);
+    GuessedLog log;
+    const std::size_t second = log.DriveThereAndBack(Pose2(4.0, 0.1, 0.0));
+    log.MakeGoOn(second);
+    log.result.refined[second].missed_since = static_cast<int>(second) - 1;
+    log.result.refined[second].missed = Pose2(is_far ? 1.7 : 0.3, 0.0, 0.0);
+    EXPECT_EQ(HasUnsureParts(log.scans, log.result, log.ties.sure), is_far);
+    EXPECT_EQ(log.Place(), is_far);
+    if (!is_far) continue;
+    log.ExpectTrue(0, log.scans.size());
+    EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.ties.sure));
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    EXPECT_TRUE(log.result.loose[0].found);
+    EXPECT_EQ(log.result.loose[0].why,
+              "odometry alone says where the robot went; found again by all "
+              "that it saw afterwards");
+  }
+}
+
 // It is nowhere else, but not there either, and that is told.
 TEST(GuessedPartsTest, WhatContradictsItsPlaceIsTold) {
   const std::vector<WallEnds> mirrored = MirroredHall();
@@ -268,6 +291,40 @@ TEST(GuessedPartsTest, WhatContradictsItsPlaceIsTold) {
   EXPECT_EQ(log.result.loose[0].why,
             "scans are missing; found again on what it saw earlier, where most "
             "of what it saw afterwards contradicts that");
+}
+
+// Most of it agrees, and more contradicts than of a place that is found: it is
+// nowhere else, and that is told.
+TEST(GuessedPartsTest, WhatIsContestedIsTold) {
+  for (const bool is_contested : {false, true}) {
+    SCOPED_TRACE(is_contested);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, 18.0, 0.2, Pose2::Zero());
+    const std::size_t second = log.scans.size();
+    log.Drive(LongHall(), 17.0, -3.0, -0.2, Pose2::Zero());
+    log.MakeFound(second, 40);
+    const std::size_t third = log.scans.size();
+    log.Drive(is_contested ? MirroredHall() : LongHall(), -3.0, -17.0, -0.2,
+              Pose2::Zero());
+    log.MakeGoOn(third);
+    const std::vector<Pose2> before = log.poses;
+    EXPECT_FALSE(log.Place());
+    EXPECT_EQ(log.ties.sure.empty(), is_contested);
+    log.TellOfDoubts();
+    EXPECT_EQ(log.poses, before);
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    EXPECT_TRUE(log.result.loose[0].found);
+    EXPECT_EQ(log.result.loose[0].is_ambiguous, is_contested);
+    EXPECT_EQ(
+        log.result.loose[0].why,
+        std::string("scans are missing; found again on what it saw "
+                    "earlier") +
+            (is_contested
+                 ? ", which what it saw afterwards does not make certain: "
+                   "4 short stretches of it agree with what was seen "
+                   "there, 3 contradict it"
+                 : ""));
+  }
 }
 
 // Nothing speaks against its place, nor against another one where the robot saw
@@ -474,9 +531,9 @@ TEST(GuessedPartsTest, AGuessIsPutWhereALittleOfItFits) {
   }
 }
 
-// A few scans of it look like those of 9 m farther on, and the others contradict
-// that: it is put where a little of it fits, as a guess. Where nothing speaks
-// against its place a little does not move it.
+// A few scans of it look like those of 9 m farther on, and the others
+// contradict that: it is put where a little of it fits, as a guess. Where
+// nothing speaks against its place a little does not move it.
 TEST(GuessedPartsTest, WhatIsRefutedIsPutWhereALittleOfItFits) {
   for (const bool is_refuted : {true, false}) {
     SCOPED_TRACE(is_refuted);

@@ -44,11 +44,10 @@ constexpr double kWayDistance = 0.05;
 constexpr double kWayTurn = DegToRad(0.5);
 constexpr double kUnknownDistance = 0.3;
 constexpr double kUnknownTurn = DegToRad(3.0);
-// A match that is so many standard deviations off counts half. What is right
-// may be metres off, and count for nothing beside what holds a fault: all is
-// solved for once more from what comes out when they count for more.
-constexpr double kLossScale = 3.0;
-constexpr std::array<double, 3> kWiderScales = {100.0, 30.0, 10.0};
+// A match that is so many standard deviations off counts half, in one solve
+// after the other: what is right may be metres off, and would count for nothing
+// beside what holds a fault.
+constexpr std::array<double, 4> kLossScales = {100.0, 30.0, 10.0, 3.0};
 
 // A stretch of the way.
 struct Stretch {
@@ -243,20 +242,12 @@ std::vector<Pose2> Bend(const std::vector<Stretch>& stretches,
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
-  const auto solve = [&](double scale) -> std::optional<double> {
+  for (const double scale : kLossScales) {
     loss.Reset(new ceres::CauchyLoss(scale), ceres::TAKE_OWNERSHIP);
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
-    if (!summary.IsSolutionUsable()) return std::nullopt;
-    return summary.final_cost;
-  };
-  const std::optional<double> cost = solve(kLossScale);
-  if (!cost) return {};
-  const std::vector<Pose2> bent = poses;
-  std::copy(start.begin(), start.end(), poses.begin());
-  for (const double scale : kWiderScales) solve(scale);
-  const std::optional<double> other_cost = solve(kLossScale);
-  if (!other_cost || *other_cost >= *cost) return bent;
+    if (!summary.IsSolutionUsable()) return {};
+  }
   return poses;
 }
 

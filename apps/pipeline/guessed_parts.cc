@@ -211,8 +211,7 @@ class PartPlacing {
       TellOfDoubt(part.front(),
                   std::to_string(moved) +
                       (moved == 1 ? " door stands" : " doors stand") +
-                      " elsewhere in the same wall than before, as on another "
-                      "floor");
+                      " elsewhere in the same wall, as on another floor");
     }
   }
 

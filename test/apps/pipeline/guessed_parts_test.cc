@@ -108,6 +108,27 @@ struct GuessedLog {
                         nullptr, &result, poses, ties);
   }
 
+  // All of it is where it was, and one part is told as found: `how` it was
+  // tied before.
+  void ExpectFound(const std::string& how) const {
+    ExpectTrue(0, poses.size());
+    EXPECT_FALSE(HasUnsureParts(scans, result, ties.sure));
+    ASSERT_EQ(result.loose.size(), 1u);
+    EXPECT_TRUE(result.loose[0].found);
+    EXPECT_EQ(result.loose[0].why,
+              how + "; found again by all that it saw afterwards");
+  }
+
+  // The scan is no key scan: the next one is.
+  void TakeKeyFrom(std::size_t scan) {
+    const auto at = static_cast<std::ptrdiff_t>(scan);
+    result.refined[scan].is_key = false;
+    result.records.erase(result.records.begin() + at);
+    poses.erase(poses.begin() + at);
+    truth.erase(truth.begin() + at);
+    result.records[scan].motion.mean = Between(poses[scan - 1], poses[scan]);
+  }
+
   void ExpectTrue(std::size_t begin, std::size_t end) const {
     for (std::size_t k = begin; k < end; ++k) {
       EXPECT_LT(PositionError(poses[k], truth[k]), 0.1) << k;
@@ -242,34 +263,44 @@ TEST(GuessedPartsTest, WhatSeemsToGoOnAfterALongGapIsHeldAgainstTheRest) {
     EXPECT_EQ(HasUnsureParts(log.scans, log.result, log.ties.sure), is_long);
     EXPECT_EQ(log.Place(), is_long);
     if (!is_long) continue;
-    log.ExpectTrue(0, log.scans.size());
+    log.ExpectFound("scans are missing");
     EXPECT_EQ(log.result.refined[second].tie, TrackTie::kMatched);
-    ASSERT_EQ(log.result.loose.size(), 1u);
-    EXPECT_EQ(log.result.loose[0].why,
-              "scans are missing; found again by all that it saw afterwards");
   }
 }
 
 // Where nothing could be matched for a while the first match may be of another
 // place, which only what odometry missed by then tells.
 TEST(GuessedPartsTest, WhatOdometryMissedIsHeldAgainstTheRest) {
-  for (const bool is_far : {false, true}) {
-    SCOPED_TRACE(is_far);
+  struct Case {
+    Pose2 missed;
+    bool is_since_matched;
+    bool is_of_key;
+    bool is_held;
+  };
+  const Pose2 far(0.4, -0.4, 0.0);
+  for (const Case& c :
+       {Case{far, true, true, true}, Case{far, true, false, true},
+        Case{Pose2(0.0, 0.0, -0.2), true, true, true},
+        Case{Pose2(0.3, 0.3, 0.15), true, true, false},
+        Case{far, false, true, false}}) {
+    SCOPED_TRACE(::testing::Message() << c.missed.transpose() << ' '
+                                      << c.is_since_matched << c.is_of_key);
     GuessedLog log;
     const std::size_t second = log.DriveThereAndBack(Pose2(4.0, 0.1, 0.0));
     log.MakeGoOn(second);
-    log.result.refined[second].missed_since = static_cast<int>(second) - 1;
-    log.result.refined[second].missed = Pose2(is_far ? 1.7 : 0.3, 0.0, 0.0);
-    EXPECT_EQ(HasUnsureParts(log.scans, log.result, log.ties.sure), is_far);
-    EXPECT_EQ(log.Place(), is_far);
-    if (!is_far) continue;
-    log.ExpectTrue(0, log.scans.size());
-    EXPECT_FALSE(HasUnsureParts(log.scans, log.result, log.ties.sure));
-    ASSERT_EQ(log.result.loose.size(), 1u);
-    EXPECT_TRUE(log.result.loose[0].found);
-    EXPECT_EQ(log.result.loose[0].why,
-              "odometry alone says where the robot went; found again by all "
-              "that it saw afterwards");
+    RefinedScan& scan = log.result.refined[second];
+    scan.missed_since = c.is_since_matched ? static_cast<int>(second) - 1 : -1;
+    scan.missed = c.missed;
+    if (!c.is_of_key) log.TakeKeyFrom(second);
+    EXPECT_EQ(HasUnsureParts(log.scans, log.result, log.ties.sure), c.is_held);
+    const std::vector<Pose2> before = log.poses;
+    EXPECT_EQ(log.Place(), c.is_held);
+    if (c.is_held) {
+      log.ExpectFound("odometry alone says where the robot went");
+    } else {
+      EXPECT_EQ(log.poses, before);
+      EXPECT_TRUE(log.result.loose.empty());
+    }
   }
 }
 
@@ -401,11 +432,8 @@ TEST(GuessedPartsTest, DoorsThatStandElsewhereAreTold) {
   const std::vector<std::vector<double>> afterwards = {
       before, {-9.0, 3.0, 9.0}, {-7.0, 3.0}, {-7.0, 5.0}};
   const std::vector<std::string> told = {
-      "", "",
-      "1 door stands elsewhere in the same wall than before, as on "
-      "another floor",
-      "2 doors stand elsewhere in the same wall than before, as on "
-      "another floor"};
+      "", "", "1 door stands elsewhere in the same wall, as on another floor",
+      "2 doors stand elsewhere in the same wall, as on another floor"};
   for (std::size_t i = 0; i < afterwards.size(); ++i) {
     SCOPED_TRACE(i);
     GuessedLog log;

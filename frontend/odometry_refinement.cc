@@ -86,6 +86,9 @@ constexpr int kLeastSeenThrough = 20;
 // Share of a scan that must not lie in the unknown where odometry, which is in
 // doubt, speaks of another place.
 constexpr double kLeastKnown = 0.8;
+// Standard deviations of odometry within which a place is looked for that it
+// leads to over a gap.
+constexpr double kNearSigmas = 2.0;
 // Standard deviations of a tie: m and rad, and those that grow with the way.
 constexpr double kTieSigma = 0.03;
 constexpr double kTieAngle = DegToRad(0.5);
@@ -485,6 +488,29 @@ void OdometryRefiner::MatchWithoutIntruders(const std::vector<bool>& intruders,
   }
 }
 
+MatchResult OdometryRefiner::MatchNearOdometry(const MatchPrior& prior,
+                                               const Eigen::Vector2d& laser,
+                                               double seen_through) const {
+  const ScanMatcher& matcher = track_.matcher;
+  MatchPrior held = prior;
+  held.is_heavy_tailed = false;
+  const MatchResult there = matcher.Refine(points_, prior.pose, held);
+  const ScanAgreement agreement = matcher.Compare(points_, there.pose, laser);
+  if (!Contradicts(agreement, seen_through)) return there;
+  const Eigen::Vector3d sigmas =
+      prior.information.inverse().diagonal().cwiseSqrt();
+  const Pose2 found =
+      matcher.Search(points_, prior.pose,
+                     std::min(kNearSigmas * sigmas.head<2>().maxCoeff(),
+                              options_.max_search_translation),
+                     std::min(kNearSigmas * sigmas[2], kPi), nullptr);
+  const MatchResult searched = matcher.Refine(points_, found, held);
+  return matcher.Compare(points_, searched.pose, laser).Quality() >
+                 agreement.Quality()
+             ? searched
+             : there;
+}
+
 bool OdometryRefiner::Contradicts(const ScanAgreement& agreement,
                                   double seen_through) const {
   const TrackingOptions& tracking = options_.tracking;
@@ -526,23 +552,36 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
   // it leaves too many open for that, and may be off by less than a look-alike.
   const bool is_far =
       track_.after_gap && IsFar(Between(track_.last_pose, prior.pose));
-  const bool may_agree =
-      !is_far ||
-      (here.hits >= tracking.min_hits &&
-       std::abs(NormalizeAngle(match->pose[2] - prior.pose[2])) <=
-           MostWrongTurn(last_motion_.head<2>().norm(), last_motion_[2]));
-  const bool agrees =
-      may_agree &&
-      (here.hits >= tracking.min_hits
-           ? innovation <= tracking.max_innovation
-           : innovation + room <=
-                 tracking.max_innovation * here.hits / tracking.min_hits);
+  const auto agrees_with_odometry = [&] {
+    const bool has_many = here.hits >= tracking.min_hits;
+    if (is_far &&
+        (!has_many ||
+         std::abs(NormalizeAngle(match->pose[2] - prior.pose[2])) >
+             MostWrongTurn(last_motion_.head<2>().norm(), last_motion_[2]))) {
+      return false;
+    }
+    return has_many ? innovation <= tracking.max_innovation
+                    : innovation + room <= tracking.max_innovation * here.hits /
+                                               tracking.min_hits;
+  };
+  bool agrees = agrees_with_odometry();
   // What contradicted the scan before already is no news.
   const double before =
       track_.after_gap
           ? track_.matcher.Compare(track_.last_points, track_.last_pose, laser)
                 .SeenThroughShare()
           : 0.0;
+  // Where odometry went on over a gap the robot lies ahead, where little was
+  // seen as yet, and places behind it that look alike are known all around: it
+  // is where odometry leads, or lost.
+  const bool goes_on = track_.after_gap && !track_.jumped &&
+                       GoesOn(track_.matched_odometry, last_odometry_);
+  if (!agrees && goes_on) {
+    *match = MatchNearOdometry(prior, laser, before);
+    here = track_.matcher.Compare(points_, match->pose, laser);
+    innovation = SquaredInnovation(*match, prior);
+    agrees = agrees_with_odometry();
+  }
   const double ratio = here.OfKnown(match->inlier_ratio);
   // After a gap a match must be better, and so must one that leaves odometry.
   double least = options_.minimum_inlier_ratio;
@@ -552,7 +591,7 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
       ratio >= least && match->inliers >= options_.minimum_points &&
       (agrees || here.hits >= tracking.min_hits) &&
       (agrees || !track_.after_gap ||
-       (here.Support() >= tracking.min_unexpected_support &&
+       (!goes_on && here.Support() >= tracking.min_unexpected_support &&
         here.KnownShare() >= kLeastKnown)) &&
       !((track_.after_gap || !agrees) && Contradicts(here, before));
   if (!believed && (track_.after_gap || Contradicts(there, before))) {
@@ -804,7 +843,9 @@ void OdometryRefiner::NoteMatch(const Outcome& outcome, const Pose2& motion) {
   if (outcome.verdict == Outcome::Verdict::kBelieved) {
     // What follows on a gap, or was not matched, is no motion of one scan.
     const Pose2 moved = Between(track_.last_pose, outcome.refined.pose);
-    if (track_.refused > 0 || (track_.after_gap && !steady_.Explains(moved))) {
+    // Nor is what odometry leapt over.
+    if (track_.refused > 0 || track_.jumped ||
+        (track_.after_gap && !steady_.Explains(moved))) {
       steady_.Break();
     } else if (!outcome.has_gone_on) {
       steady_.Add(moved);
@@ -841,7 +882,7 @@ bool OdometryRefiner::IsLost(const Outcome& outcome) const {
          track_.turn > options_.tracking.max_blind_turn;
 }
 
-void OdometryRefiner::Lose(int scan, const Outcome& outcome) {
+Pose2 OdometryRefiner::Lose(int scan, const Outcome& outcome) {
   const TrackingOptions& tracking = options_.tracking;
   if (trace_) trace_("LOST " + outcome.why);
   const double blind_way = track_.way;
@@ -853,7 +894,9 @@ void OdometryRefiner::Lose(int scan, const Outcome& outcome) {
       open_ != nullptr &&
       static_cast<int>(open_->keys.size()) < tracking.min_tie_keys &&
       pending_.size() < kMostPending;
+  const Pose2 last_pose = track_.last_pose;
   if (open_ != nullptr && !tiny) Tie(true);
+  const Pose2 shift = Compose(track_.last_pose, Inverse(last_pose));
   ++losses_;
   bool goes_on = false;
   if (open_ == nullptr) {
@@ -878,6 +921,8 @@ void OdometryRefiner::Lose(int scan, const Outcome& outcome) {
       pending.refined.is_key = false;
       pending.refined.odometry_only = true;
       pending.refined.tie = TrackTie::kNone;
+      pending.refined.missed = Pose2::Zero();
+      pending.refined.missed_since = -1;
       pending.refined.since_key = UncertainPose2();
       pending.refined.since_key.mean =
           Between(open_->before.keys.back().pose, pending.refined.pose);
@@ -895,6 +940,7 @@ void OdometryRefiner::Lose(int scan, const Outcome& outcome) {
   open_->next_attempt = tracking.min_tie_keys;
   open_->next_global = tracking.first_global_keys;
   track_ = Track(options_.matcher);
+  return shift;
 }
 
 void OdometryRefiner::CatchUp(const Scan& scan, const Pose2& by_wheels,
@@ -954,6 +1000,7 @@ void OdometryRefiner::BeginTrack(const Scan& scan, SettledScan* first) {
   track_.last_points = points_;
   key_odometry_ = scan.odometry;
   scans_since_key_ = 0;
+  ahead_.exists = false;
   odometry_calibration_.Break();
   track_.keys.push_back(
       {first->index, refined.pose, points_, scan.laser_offset.head<2>()});
@@ -1003,7 +1050,7 @@ RefinedScan OdometryRefiner::Process(const Scan& scan,
   done.index = count_++;
   const Pose2 by_wheels =
       started_ ? Between(last_odometry_, scan.odometry) : Pose2::Zero();
-  const UncertainPose2 step = StepOf(by_wheels);
+  const UncertainPose2 step = started_ ? StepOf(by_wheels) : UncertainPose2();
   const Pose2& motion = step.mean;
   const double seconds = started_ ? scan.timestamp - last_time_ : 0.0;
   last_odometry_ = scan.odometry;
@@ -1039,9 +1086,11 @@ RefinedScan OdometryRefiner::Process(const Scan& scan,
   NoteMatch(outcome, motion);
   done.refined = outcome.refined;
   const bool is_lost = IsLost(outcome);
-  const Pose2 last_pose = track_.last_pose;
+  Pose2 last_pose = track_.last_pose;
   if (is_lost) {
-    Lose(done.index, outcome);
+    const Pose2 shift = Lose(done.index, outcome);
+    last_pose = Compose(shift, last_pose);
+    done.refined.pose = Compose(shift, done.refined.pose);
     BeginTrack(scan, &done);
   } else {
     ContinueTrack(scan, outcome.information, &done);
@@ -1348,8 +1397,6 @@ void OdometryRefiner::Settle(const Pose2& shift, const RefinedScan& first) {
       done.refined.tie = first.tie;
       done.refined.since = first.since;
       done.refined.since_key = first.since_key;
-    } else if (done.index < open_->first) {
-      // Lost between the tracks: with the one that follows.
     }
     if (done.index >= open_->first) {
       done.refined.pose = Compose(shift, done.refined.pose);

@@ -387,6 +387,12 @@ class OdometryRefiner {
   // determinants of their covariances, which adds to a chi-square where
   // densities are compared. At least 0.
   double RoomSinceMatch(const MatchPrior& prior, const Pose2& motion) const;
+  // The match that odometry leads to, or where that is contradicted the best
+  // one within what odometry leaves open. `laser`: in the robot's frame;
+  // `seen_through`: see Contradicts.
+  MatchResult MatchNearOdometry(const MatchPrior& prior,
+                                const Eigen::Vector2d& laser,
+                                double seen_through) const;
   // Whether more is intruding or seen through than may be; `seen_through`:
   // share that was before.
   bool Contradicts(const ScanAgreement& agreement, double seen_through) const;
@@ -396,8 +402,9 @@ class OdometryRefiner {
   void NoteMatch(const Outcome& outcome, const Pose2& motion);
   bool IsContradicted(const Outcome& outcome) const;
   bool IsLost(const Outcome& outcome) const;
-  // Opens a tie, or starts the open one again, at this scan.
-  void Lose(int scan, const Outcome& outcome);
+  // Opens a tie, or starts the open one again, at this scan. Returns by what
+  // the track so far was moved when the tie that was open was settled.
+  Pose2 Lose(int scan, const Outcome& outcome);
   // Where odometry that did not move over a gap tells of the way at once, the
   // open track lies where it says.
   void CatchUp(const Scan& scan, const Pose2& by_wheels, const Pose2& matched,

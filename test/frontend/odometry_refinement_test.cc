@@ -450,6 +450,45 @@ TEST(OdometryRefinerTest, OdometryThatIsLateNowAndThen) {
   }
 }
 
+// It begins late, and has all of the way in one step, which is no speed of the
+// robot's.
+TEST(OdometryRefinerTest, OdometryThatCatchesUpInABareCorridor) {
+  for (const int late : {5, 10, 15, 16, 17, 18, 19}) {
+    const std::vector<Pose2> motions(60, Pose2(0.2, 0.0, 0.0));
+    std::vector<Pose2> reported = motions;
+    std::fill_n(reported.begin(), late, Pose2::Zero());
+    reported[static_cast<std::size_t>(late)] =
+        Pose2(0.2 * (late + 1), 0.0, 0.0);
+    const std::vector<double> errors =
+        ErrorsAlong(Corridor(), motions, reported);
+    EXPECT_LT(errors.back(), 0.5) << late << " scans late";
+  }
+}
+
+// Odometry need not begin at zero.
+TEST(OdometryRefinerTest, StandsAtFirstAwayFromTheOrigin) {
+  std::vector<WallEnds> walls = Room(20.0, 6.0);
+  for (const WallEnds& side : Pillars(-10.0)) walls.push_back(side);
+  const Pose2 start(10.0, 5.0, 0.7);
+  Laser laser = FullCircle();
+  laser.sigma = 0.01;
+  for (std::size_t still = 1; still <= 12; ++still) {
+    std::vector<Pose2> motions(still + 30, Pose2(0.1, 0.0, 0.0));
+    std::fill_n(motions.begin(), still, Pose2::Zero());
+    Drive drive = Along(Pose2(-9.0, 0.0, 0.0), motions, motions);
+    for (Pose2& pose : drive.odometry) {
+      pose = Compose(start, Between(drive.truth.front(), pose));
+    }
+    Noise noise(8);
+    const std::vector<RefinedScan> refined =
+        Refine(walls, drive, laser, OdometryRefinementOptions(), &noise);
+    for (std::size_t i = 0; i < refined.size(); ++i) {
+      ASSERT_LT(PositionError(refined[i].pose, drive.odometry[i]), 0.1)
+          << still << " scans still, scan " << i;
+    }
+  }
+}
+
 // Where no return tells how far it went.
 TEST(OdometryRefinerTest, OdometryThatJumpsInABareCorridor) {
   const std::vector<Pose2> motions(60, Pose2(0.1, 0.0, 0.0));
@@ -1200,6 +1239,113 @@ TEST(OdometryRefinerTest, CarriedIntoTheUnknown) {
   EXPECT_EQ(refined[15].tie, TrackTie::kLoose);
   EXPECT_TRUE(refined[15].is_key);
   EXPECT_GT(refined[15].since_key.covariance(0, 0), 1.0);
+}
+
+// A corridor of steps, one like another, in which scans are missing while the
+// robot goes on: what it sees then fits a step that it knows already, behind
+// it, better than the one that it is at, of which it has seen little.
+TEST(OdometryRefinerTest, OdometryOverAGapTellsStepsApart) {
+  std::vector<WallEnds> walls;
+  for (int i = 0; i < 40; ++i) {
+    const double x = 3.6 * i;
+    walls.push_back({{x, 1.2}, {x + 1.2, 1.2}});
+    walls.push_back({{x + 1.2, 1.2}, {x + 1.2, 2.4}});
+    walls.push_back({{x + 1.2, 2.4}, {x + 3.6, 2.4}});
+    walls.push_back({{x + 3.6, 2.4}, {x + 3.6, 1.2}});
+    walls.push_back({{x, -1.2}, {x + 3.6, -1.2}});
+  }
+  Laser laser;
+  laser.maximum_range = 8.0;
+  laser.sigma = 0.01;
+  for (const double missing : {2.2, 2.6, 2.9, 3.2}) {
+    Noise noise(4);
+    OdometryRefiner refiner(RefinerOptions());
+    std::vector<Pose2> truths;
+    std::vector<Pose2> odometry = {Pose2::Zero()};
+    std::vector<RefinedScan> refined;
+    double time = 100.0;
+    double way = 0.0;
+    for (int i = 0; i < 300; ++i) {
+      const bool is_gap = i % 60 == 59;
+      const double step = i == 0 ? 0.0 : is_gap ? missing : 0.15;
+      way += step;
+      time += is_gap ? missing / 0.75 : 0.2;
+      truths.push_back({4.0 + way, 0.0, 0.0});
+      // By 1 % too long.
+      odometry.push_back(
+          Compose(odometry.back(), Pose2(1.01 * step, 0.0, 0.0)));
+      Scan scan = MakeScan(walls, truths.back(), laser, &noise);
+      scan.timestamp = time;
+      scan.odometry = odometry.back();
+      refiner.Process(scan);
+      refined = TakeAll(&refiner, std::move(refined));
+    }
+    refiner.Finish();
+    refined = TakeAll(&refiner, std::move(refined));
+    ASSERT_EQ(refined.size(), truths.size());
+    for (std::size_t i = 0; i < truths.size(); ++i) {
+      ASSERT_LT(
+          PositionError(refined[i].pose, Between(truths.front(), truths[i])),
+          0.5)
+          << missing << " m missing, scan " << i;
+    }
+  }
+}
+
+// Scans are missing again before it is known where a robot was carried to,
+// which is found out then: what odometry says of the second gap counts from
+// where the robot is found to have been.
+TEST(OdometryRefinerTest, LostAgainWhenItIsFoundWhereItWasCarriedTo) {
+  std::vector<WallEnds> hall = Room(20.0, 6.0);
+  for (const WallEnds& side : Pillars(-10.0)) hall.push_back(side);
+  const std::vector<WallEnds> unknown = Room(3.0, 5.5);
+  Laser laser = FullCircle();
+  laser.beams = 240;
+  laser.angle_step = DegToRad(1.5);
+  laser.maximum_range = 5.0;
+  laser.sigma = 0.01;
+  const Pose2 over_gap(3.0, 0.0, 0.0);
+  for (const auto& [after, there] :
+       {std::make_pair(48, -4.0), std::make_pair(64, -5.0)}) {
+    Noise noise(8);
+    OdometryRefiner refiner(RefinerOptions());
+    std::vector<RefinedScan> refined;
+    Pose2 odometry(-1.0, 0.0, 0.0);
+    double time = 100.0;
+    const int carried = 80;
+    const int again = carried + after;
+    for (int i = 0; i < again + 60; ++i) {
+      Pose2 truth;
+      Pose2 motion(0.1, 0.0, 0.0);
+      if (i < carried) {
+        truth = Pose2(-1.0 + 0.1 * i, 0.0, 0.0);
+      } else if (i < again) {
+        truth = Pose2(there + 0.1 * (i - carried), 0.3, 0.0);
+      } else {
+        truth = Pose2(0.3, -2.0 + 0.05 * (i - again), kPi / 2.0);
+        motion = Pose2(0.05, 0.0, 0.0);
+      }
+      time += i == carried ? 40.2 : i == again ? 10.2 : 0.2;
+      if (i == again) motion = over_gap;
+      if (i > 0 && i != carried) odometry = Compose(odometry, motion);
+      Scan scan = MakeScan(i < again ? hall : unknown, truth, laser, &noise);
+      scan.timestamp = time;
+      scan.odometry = odometry;
+      refiner.Process(scan);
+      refined = TakeAll(&refiner, std::move(refined));
+    }
+    refiner.Finish();
+    refined = TakeAll(&refiner, std::move(refined));
+    ASSERT_EQ(refined.size(), static_cast<std::size_t>(again + 60));
+    // Where it was carried to was found.
+    EXPECT_EQ(refined[carried].tie, TrackTie::kMatched);
+    EXPECT_LT(PositionError(refined[again - 1].pose,
+                            {there + 0.1 * (after - 1), 0.3, 0.0}),
+              0.3);
+    const Pose2 step = Between(refined[again - 1].pose,
+                               refined[static_cast<std::size_t>(again)].pose);
+    EXPECT_LT(PositionError(step, over_gap), 0.5) << after << " scans";
+  }
 }
 
 // Carried along a corridor of equal doors, by 12 m and a little more: nearly

@@ -50,6 +50,11 @@ constexpr std::size_t kFewestSweeps = 20;
 constexpr int kSweepParts = 8;
 // Scans that are matched to tell, where odometry carries the log.
 constexpr std::size_t kTrialScans = 150;
+// Scans are missing where the next one comes after so many times the usual.
+constexpr double kGapPeriods = 3.0;
+// Share of the scans that have to fit better as sweeps: all may do so in the
+// mean where one run was lost and the other was not.
+constexpr double kMostlyBetter = 0.6;
 // What sweeps less, rad, is not taken for a turning laser.
 constexpr double kLeastSweep = DegToRad(200.0);
 
@@ -176,10 +181,15 @@ class SweepTrial {
     period_ = steps[steps.size() / 2];
     if (!(period_ >= kShortestStep) || period_ > kLongestStep) return;
     velocities_.assign(scans.size(), Pose2::Zero());
+    for (std::size_t i = 1; i < scans.size(); ++i) {
+      if (scans[i].timestamp - scans[i - 1].timestamp > kGapPeriods * period_) {
+        gaps_.push_back(i);
+      }
+    }
     for (std::size_t i = 1; i + 1 < scans.size(); ++i) {
       const double span = scans[i + 1].timestamp - scans[i - 1].timestamp;
       const Scan& scan = scans[i];
-      if (!(span >= kShortestStep) || span > 3.0 * period_ ||
+      if (!(span >= kShortestStep) || span > kGapPeriods * period_ ||
           !scan.bearings.empty() ||
           scan.angle_step * static_cast<double>(scan.ranges.size()) <
               kLeastSweep) {
@@ -198,6 +208,20 @@ class SweepTrial {
 
   // Scans while whose sweep the robot turned.
   const std::vector<std::size_t>& turning() const { return turning_; }
+
+  // The first scan after this one before which scans are missing, or the end.
+  std::size_t NextGap(std::size_t scan) const {
+    const auto gap = std::upper_bound(gaps_.begin(), gaps_.end(), scan);
+    return gap == gaps_.end() ? velocities_.size() : *gap;
+  }
+
+  // The share of these scans of which the second costs are less.
+  double ShareOfLess(const std::vector<double>& costs,
+                     const std::vector<double>& others) const {
+    std::size_t less = 0;
+    for (const std::size_t i : turning_) less += others[i] < costs[i] ? 1 : 0;
+    return static_cast<double>(less) / static_cast<double>(turning_.size());
+  }
 
   double MeanCost(const std::vector<double>& costs) const {
     double sum = 0.0;
@@ -240,6 +264,8 @@ class SweepTrial {
   double period_ = 0.0;
   std::vector<Pose2> velocities_;
   std::vector<std::size_t> turning_;
+  // Scans before which others are missing.
+  std::vector<std::size_t> gaps_;
 };
 
 // Figures of Matcher::Run.
@@ -299,8 +325,8 @@ class Matcher {
         last_time = scan.timestamp;
         continue;
       }
-      const double step =
-          std::min(std::max(scan.timestamp - last_time, 0.0), kLongestStep);
+      const double seconds = std::max(scan.timestamp - last_time, 0.0);
+      const double step = std::min(seconds, kLongestStep);
       double rate = 0.0;
       const bool is_measured =
           turns_.MeanRate(last_time, scan.timestamp, &rate);
@@ -308,7 +334,10 @@ class Matcher {
       last_time = scan.timestamp;
 
       Pose2 motion = velocity * step;
-      if (is_guided) motion[2] = (yaw->scale * rate + yaw->bias) * step;
+      // A gyroscope has measured all of it, however long it took.
+      if (is_guided) {
+        motion[2] = NormalizeAngle((yaw->scale * rate + yaw->bias) * seconds);
+      }
       const double sigma = kLeastMotion + options_.speed_noise * step;
       const double turn_sigma =
           kLeastTurn +
@@ -324,9 +353,9 @@ class Matcher {
         figures->way += displacement.norm();
         figures->open_way += OpenPart(information, displacement);
         if (step >= kShortestStep) {
-          velocity = moved / step;
-          if (turns != nullptr && is_measured) {
-            turns->emplace_back(rate, moved[2] / step);
+          velocity = moved / seconds;
+          if (turns != nullptr && is_measured && seconds <= kLongestStep) {
+            turns->emplace_back(rate, moved[2] / seconds);
           }
         }
         pose = matched;
@@ -458,7 +487,9 @@ SweepRun* ChooseSweep(const ScanOdometryOptions& options,
     if (!run.is_done) return nullptr;
     if (run.direction == 0) continue;
     const double cost = trial.MeanCost(run.costs);
-    if (cost >= best) continue;
+    if (cost >= best || trial.ShareOfLess(costs, run.costs) < kMostlyBetter) {
+      continue;
+    }
     best = cost;
     chosen = &run;
   }
@@ -515,19 +546,19 @@ int UndoSweepsByOdometry(const ScanOdometryOptions& options, Log* log) {
   const SweepTrial whole(scans, no_turns, nullptr);
   const std::vector<std::size_t>& turning = whole.turning();
   if (turning.size() < kFewestSweeps) return 0;
-  // The stretch with most scans that tell.
+  // The stretch with most scans that tell, of which none are missing: a run
+  // that is lost there costs more whatever the laser is.
   std::size_t begin = turning.front();
   std::size_t most = 0;
   for (std::size_t first = 0, last = 0; first < turning.size(); ++first) {
-    while (last < turning.size() &&
-           turning[last] < turning[first] + kTrialScans) {
-      ++last;
-    }
+    const std::size_t stretch_end =
+        std::min(turning[first] + kTrialScans, whole.NextGap(turning[first]));
+    while (last < turning.size() && turning[last] < stretch_end) ++last;
     if (last - first <= most) continue;
     most = last - first;
     begin = turning[first];
   }
-  const std::size_t end = std::min(scans.size(), begin + kTrialScans);
+  const std::size_t end = std::min(begin + kTrialScans, whole.NextGap(begin));
   std::vector<Scan> stretch(scans.begin() + static_cast<std::ptrdiff_t>(begin),
                             scans.begin() + static_cast<std::ptrdiff_t>(end));
   const SweepTrial trial(stretch, no_turns, nullptr);

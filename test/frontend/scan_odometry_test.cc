@@ -103,6 +103,20 @@ TEST(ScanOdometryTest, ScansTakenAtOnceAreLeftAsTheyAre) {
   }
 }
 
+// The robot may be lost where scans are missing, in one run and not in another:
+// that says nothing of the laser.
+TEST(ScanOdometryTest, ScansTakenAtOnceOfWhichSomeAreMissingAreLeft) {
+  for (int first = 10; first < 80; first += 5) {
+    for (const int missing : {10, 20}) {
+      Log log = Drive(0.0, 1, true);
+      log.scans.erase(log.scans.begin() + first,
+                      log.scans.begin() + first + missing);
+      EXPECT_EQ(UndoSweepsByOdometry({}, &log), 0)
+          << missing << " scans from " << first << " on";
+    }
+  }
+}
+
 TEST(ScanOdometryTest, ANarrowViewIsNoSweep) {
   Log log = Drive(kPeriod, 1, true);
   for (Scan& scan : log.scans) scan.ranges.resize(180);
@@ -142,6 +156,45 @@ TEST(ScanOdometryTest, AWayThatScansLeaveOpenIsMeasured) {
   }
   const ScanOdometryReport open = AddScanOdometry({}, &corridor);
   EXPECT_GT(open.open_way, 0.5 * open.way);
+}
+
+// The robot turns while scans are missing.
+TEST(ScanOdometryTest, AGyroscopeMeasuresATurnThatScansMiss) {
+  const std::vector<WallEnds> world = Room();
+  for (const double gap : {1.0, 1.5, 2.0}) {
+    Noise noise(3);
+    Log log;
+    double time = kStart;
+    double heading = 0.0;
+    std::vector<Pose2> truths;
+    for (int i = 0; i < 120; ++i) {
+      const bool is_gap = i == 80;
+      const double rate = is_gap ? DegToRad(60.0) : 0.6 * std::sin(0.3 * i);
+      const double step = is_gap ? gap : 0.1;
+      for (int k = 0; i > 0 && k < 10 * step / 0.1; ++k) {
+        log.yaw_rates.push_back({time + 0.01 * k, rate});
+      }
+      if (i > 0) {
+        time += step;
+        heading += rate * step;
+      }
+      truths.push_back({-1.0 + 0.01 * i, 0.0, heading});
+      Scan scan = testing::MakeScan(world, truths.back(), testing::FullCircle(),
+                                    &noise);
+      scan.timestamp = time;
+      scan.odometry = Pose2::Zero();
+      log.scans.push_back(std::move(scan));
+    }
+    log.yaw_rates.push_back({time, 0.0});
+    AddScanOdometry({}, &log);
+    for (std::size_t i = 0; i < truths.size(); ++i) {
+      const Pose2 moved = Between(truths.front(), truths[i]);
+      const Pose2 found =
+          Between(log.scans.front().odometry, log.scans[i].odometry);
+      ASSERT_LT(testing::HeadingError(found, moved), DegToRad(3.0))
+          << gap << " s, scan " << i;
+    }
+  }
 }
 
 TEST(ScanOdometryTest, TimesThatCannotBe) {

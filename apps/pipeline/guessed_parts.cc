@@ -62,6 +62,15 @@ constexpr int kMoreToMove = 2;
 constexpr int kRivalSearches = 8;
 // So many windows that contradict, more than agree, refute that.
 constexpr int kLeastRefuting = 2;
+// A window that contradicts weighs as much as so many that agree.
+constexpr int kContradictionWeight = 2;
+// Windows that have to agree, less those that contradict by their weight, at a
+// place where a part is put, as a guess, in place of one that more speaks
+// against than for.
+constexpr int kLeastBetter = 2;
+// How far they may lie from where such a part has them (RMS), m: parts that
+// were never compared are bent.
+constexpr double kMostBetterMisfit = 0.5;
 // It lies where it was found when it is no farther from there, m and rad.
 constexpr double kSamePlace = 1.5;
 constexpr double kSamePlaceTurn = DegToRad(5.0);
@@ -287,6 +296,7 @@ class PartPlacing {
         --left;
         if (Join(rest, part, r == 0)) return true;
       }
+      if (r == 0 && JoinAnyBetter(parts)) return true;
     }
     return false;
   }
@@ -357,9 +367,12 @@ class PartPlacing {
         !has_claim || IsRefuted(here) ||
         (IsContested(here) && placement.agreeing >= here.agreeing) ||
         (here.agreeing == 0 && placement.agreeing >= kLeastAgreeing);
-    if (is_largest && may_be_elsewhere && !placement.found &&
-        IsRough(placement) && !IsSamePlace(part, placement.pose)) {
-      rough_[part_[part.front()]] = {placement.pose, placement.agreeing};
+    const bool is_better = IsOutweighed(here) && IsBetter(placement);
+    if (is_largest && !placement.found &&
+        ((may_be_elsewhere && IsRough(placement)) || is_better) &&
+        !IsSamePlace(part, placement.pose)) {
+      rough_[part_[part.front()]] = {placement.pose, placement.agreeing,
+                                     is_better};
     }
     const bool is_found =
         placement.found ||
@@ -394,6 +407,21 @@ class PartPlacing {
     return here.contradicting >= kLeastRefuting &&
            here.contradicting >
                kMostContradicting * (here.agreeing + here.contradicting);
+  }
+
+  // Whether more speaks against that place than for it.
+  static bool IsOutweighed(const PlaceSupport& here) {
+    return here.contradicting >= kLeastRefuting &&
+           kContradictionWeight * here.contradicting > here.agreeing;
+  }
+
+  // Whether a part is rather here than where it is outweighed: it would fit
+  // nowhere else.
+  bool IsBetter(const TrackPlacement& placement) const {
+    return placement.agreeing -
+                   kContradictionWeight * placement.contradicting >=
+               kLeastBetter &&
+           placement.rival <= 0.0 && placement.misfit <= kMostBetterMisfit;
   }
 
   // Whether a place that is not certain is the likeliest by far: where a part
@@ -437,6 +465,20 @@ class PartPlacing {
     return false;
   }
 
+  // Puts one part, as a guess, where more speaks for it than where it was
+  // found: before others are joined with it there.
+  bool JoinAnyBetter(const std::vector<std::vector<std::size_t>>& parts) {
+    for (std::size_t p = 1; p < parts.size(); ++p) {
+      if (parts[p].empty() || (stop_ && stop_())) break;
+      const auto rough = rough_.find(part_[parts[p].front()]);
+      if (rough != rough_.end() && rough->second.is_better &&
+          JoinRoughly(parts[0], parts[p])) {
+        return true;
+      }
+    }
+    return false;
+  }
+
   // Moves a guess to where a few of its windows say, if they do; it stays told
   // as a guess.
   bool JoinRoughly(const std::vector<std::size_t>& rest,
@@ -445,10 +487,13 @@ class PartPlacing {
     if (rough == rough_.end()) return false;
     const std::vector<KeyView> track = ViewsOf(part);
     const Pose2 start = Compose(rough->second.pose, track.front().pose);
+    const bool is_better = rough->second.is_better;
     rough_.erase(rough);
     const TrackPlacement placement =
         PlaceTrack(ViewsOf(rest), track, start, options_, stop_);
-    if (!IsRough(placement)) return false;
+    if (!IsRough(placement) && !(is_better && IsBetter(placement))) {
+      return false;
+    }
     TellOfRough(MoveTo(rest, part, placement), part, placement.agreeing);
     return Merge(rest, part, placement.pose);
   }
@@ -686,8 +731,8 @@ class PartPlacing {
   }
 
   // What was found nowhere goes along with what it was found in before, or what
-  // was found in it, or else with what it is a guess from, and takes along what
-  // was joined with it; the first record stays.
+  // was found in it, or else with what it is a guess from, or what is a guess
+  // from it, and takes along what was joined with it; the first record stays.
   void Finish() {
     const std::size_t count = shifts_.size();
     std::vector<bool> is_placed(count);
@@ -723,8 +768,12 @@ class PartPlacing {
         any = along(p, with) || along(with, p) || any;
       }
     }
-    for (std::size_t p = 1; p < count; ++p) {
-      along(p, static_cast<std::size_t>(hangs_on_[p]));
+    for (bool any = true; any;) {
+      any = false;
+      for (std::size_t p = 1; p < count; ++p) {
+        const auto with = static_cast<std::size_t>(hangs_on_[p]);
+        any = along(p, with) || along(with, p) || any;
+      }
     }
     const Pose2 back = Inverse(shifts_.front());
     for (std::size_t k = 0; k < poses_.size(); ++k) {
@@ -765,6 +814,8 @@ class PartPlacing {
   struct Rough {
     Pose2 pose = Pose2::Zero();
     int agreeing = 0;
+    // More speaks against where the part was found than for it.
+    bool is_better = false;
   };
   std::map<int, Rough> rough_;
 };

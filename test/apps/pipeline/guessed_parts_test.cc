@@ -595,6 +595,41 @@ TEST(GuessedPartsTest, WhatIsRefutedIsPutWhereALittleOfItFits) {
   }
 }
 
+// Where it was found more contradicts than a half of what agrees, and a few
+// windows agree where little was seen, which nothing contradicts: it is put
+// there, as a guess. Where all agrees it stays.
+TEST(GuessedPartsTest, WhatIsOutweighedIsPutWhereNothingContradicts) {
+  for (const bool is_outweighed : {true, false}) {
+    SCOPED_TRACE(is_outweighed);
+    GuessedLog log;
+    log.Drive(LongHall(), -18.0, -8.0, 0.2, Pose2::Zero());
+    // Another hall, of which the one half is the same.
+    const Pose2 other(100.0, 0.0, 0.0);
+    const std::size_t same = log.scans.size();
+    log.Drive(LongHall(), 18.0, -1.5, 0.2, other);
+    log.MakeGoOn(same);
+    const std::size_t rest = log.scans.size();
+    log.Drive(is_outweighed ? MirroredHall() : LongHall(), -1.5, -18.0, 0.2,
+              other);
+    log.MakeGoOn(rest);
+    const std::size_t second = log.scans.size();
+    log.Drive(LongHall(), 17.0, -17.0, -0.2, other);
+    log.MakeFound(second, 40);
+    const std::vector<Pose2> before = log.poses;
+    EXPECT_EQ(log.Place(), is_outweighed);
+    ASSERT_EQ(log.result.loose.size(), 1u);
+    EXPECT_EQ(log.result.loose[0].found, !is_outweighed);
+    if (!is_outweighed) {
+      EXPECT_EQ(log.poses, before);
+      continue;
+    }
+    log.ExpectTrue(second, log.scans.size());
+    EXPECT_EQ(log.result.loose[0].why.substr(0, 50),
+              "scans are missing; where it went on is a guess, on");
+    EXPECT_EQ(log.result.loose[0].end, static_cast<int>(log.scans.size()) - 1);
+  }
+}
+
 // A few metres are put where all of them fit, and where they would fit in no
 // other place; still told as a guess. The first scan stays, whose part it is.
 TEST(GuessedPartsTest, AShortGuessIsPutWhereAllOfItFits) {
@@ -733,6 +768,16 @@ TEST(GuessedPartsTest, WhatHangsOnAPartGoesAlong) {
   ASSERT_EQ(log.result.loose.size(), 2u);
   EXPECT_TRUE(log.result.loose[0].found);
   EXPECT_FALSE(log.result.loose[1].found);
+}
+
+// And what a part hangs on goes along with it, if that is found nowhere itself.
+TEST(GuessedPartsTest, WhatAPartHangsOnGoesAlong) {
+  GuessedLog log;
+  log.Drive(LongHall(), -17.0, -14.0, 0.0, Pose2::Zero());
+  log.Drive(LongHall(), 17.0, -16.0, -0.2, Pose2::Zero());
+  log.Drive(LongHall(), -18.0, 18.0, 0.2, kLost);
+  ASSERT_TRUE(log.Place());
+  log.ExpectTrue(0, log.scans.size());
 }
 
 // Nothing is found in a hall that looks the same in a mirror, nor where nothing

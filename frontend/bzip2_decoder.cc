@@ -26,6 +26,8 @@ constexpr std::uint64_t kMarkBits = 48;
 constexpr std::uint64_t kMarkMask = (std::uint64_t{1} << kMarkBits) - 1;
 constexpr std::uint64_t kCrcBits = 32;
 constexpr int kInMark = 16;
+// A block has up to 900,000 symbols of 20 bits and some tables.
+constexpr std::uint64_t kMostBlockBits = std::uint64_t{8} << 22;
 // "BZh" and the size of blocks, a digit.
 constexpr std::size_t kHeadBytes = 4;
 constexpr std::size_t kOutputStep = std::size_t{1} << 20;
@@ -53,9 +55,9 @@ class StoredBits {
     return true;
   }
 
-  // The first mark that begins at `from` or later; false when the input ends
-  // before.
-  bool FindMark(std::uint64_t from, Mark* mark) {
+  // The first mark that begins at `from` or later, at `last` at the latest;
+  // false when there is none.
+  bool FindMark(std::uint64_t from, std::uint64_t last, Mark* mark) {
     while (true) {
       while (!marks_.empty() && marks_.front().bit < first_bit()) {
         marks_.pop_front();
@@ -65,8 +67,9 @@ class StoredBits {
           [from](const Mark& candidate) { return candidate.bit >= from; });
       if (found != marks_.end()) {
         *mark = *found;
-        return true;
+        return found->bit <= last;
       }
+      if (8 * scanned_ >= last + kMarkBits) return false;
       if (!Require(8 * (scanned_ + 1))) return false;
       Scan();
     }
@@ -215,6 +218,8 @@ struct Block {
   std::uint64_t end = 0;
   // Whether a mark follows, which says that the block is whole.
   bool is_whole = false;
+  // Whether no block is so long.
+  bool is_too_long = false;
   UnpackedBlock unpacked;
 };
 
@@ -282,8 +287,8 @@ class Bzip2Decoder::Decoder {
     if (!stored_.Require(at_ + 8)) return Next::kNothing;
     if (!ReadHead()) return Next::kSomethingElse;
     Mark mark;
-    if (!stored_.Require(at_ + kMarkBits) || !stored_.FindMark(at_, &mark) ||
-        mark.bit != at_) {
+    if (!stored_.Require(at_ + kMarkBits) ||
+        !stored_.FindMark(at_, at_, &mark)) {
       is_begun_ = false;
       at_ -= 8 * kHeadBytes;
       return Next::kSomethingElse;
@@ -319,8 +324,8 @@ class Bzip2Decoder::Decoder {
       return;
     }
     Mark mark;
-    if (!stored_.Require(at_ + kMarkBits) || !stored_.FindMark(at_, &mark) ||
-        mark.bit != at_) {
+    if (!stored_.Require(at_ + kMarkBits) ||
+        !stored_.FindMark(at_, at_, &mark)) {
       BreakOff(at_ + kMarkBits);
       return;
     }
@@ -348,8 +353,9 @@ class Bzip2Decoder::Decoder {
     while (static_cast<int>(blocks.size()) < std::max(1, ThreadsHere())) {
       blocks.push_back(BlockAt(begin, begin + kMarkBits + kCrcBits));
       Mark next;
-      if (!blocks.back().is_whole ||
-          !stored_.FindMark(blocks.back().end, &next) || next.is_end) {
+      const std::uint64_t end = blocks.back().end;
+      if (!blocks.back().is_whole || !stored_.FindMark(end, end, &next) ||
+          next.is_end) {
         break;
       }
       begin = next.bit;
@@ -362,8 +368,11 @@ class Bzip2Decoder::Decoder {
     Block block;
     block.begin = begin;
     Mark next;
-    block.is_whole = stored_.FindMark(least_end, &next);
-    block.end = block.is_whole ? next.bit : stored_.end();
+    const std::uint64_t last = begin + kMostBlockBits;
+    block.is_whole = stored_.FindMark(least_end, last, &next);
+    // Without it the rest of a large file would be held, for nothing.
+    block.is_too_long = !block.is_whole && stored_.end() > last;
+    block.end = block.is_whole ? next.bit : std::min(last, stored_.end());
     return block;
   }
 
@@ -383,7 +392,8 @@ class Bzip2Decoder::Decoder {
     if (!block->unpacked.bytes.empty()) {
       unpacked_.push_back(std::move(block->unpacked.bytes));
     }
-    if (!block->is_whole && block->unpacked.outcome == Outcome::kBreaksOff) {
+    if (!block->is_whole && !block->is_too_long &&
+        block->unpacked.outcome == Outcome::kBreaksOff) {
       at_ = stored_.end();
       decoded_ = State::kBreaksOff;
       return false;

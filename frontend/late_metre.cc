@@ -60,11 +60,11 @@ void CorrectMotions(const std::vector<MotionCorrection>& corrections,
     const auto end = static_cast<std::size_t>(correction.scan);
     if (end >= scans.size() || before[end].tie != TrackTie::kNone) continue;
     const double way = before[end].since_key.mean.head<2>().norm();
-    changes[end] = correction.change;
+    changes[end] += correction.change;
     for (std::size_t i = end; i-- > 0 && !before[i].is_key;) {
       const double own = before[i].since_key.mean.head<2>().norm();
-      changes[i] = Pose2(std::min(1.0, own / std::max(way, kLeastWay)) *
-                         correction.change);
+      changes[i] += Pose2(std::min(1.0, own / std::max(way, kLeastWay)) *
+                          correction.change);
     }
   }
   std::size_t key = 0;

@@ -559,11 +559,16 @@ std::vector<MissedStep> Search::Run() {
     std::vector<MotionCorrection> corrections;
     for (const MissedStep& step : found) {
       if (step.is_sure) corrections.push_back(step.correction);
-      const bool is_known =
-          std::any_of(all.begin(), all.end(), [&](const MissedStep& known) {
-            return !known.is_sure && known.end == step.end;
+      const auto known =
+          std::find_if(all.begin(), all.end(), [&](const MissedStep& other) {
+            return !other.is_sure && other.end == step.end;
           });
-      if (!is_known) all.push_back(step);
+      if (known == all.end()) {
+        all.push_back(step);
+      } else if (step.is_sure) {
+        // What was unsure on poses that have been corrected since.
+        *known = step;
+      }
     }
     if (corrections.empty()) break;
     CorrectMotions(corrections, &refined_);

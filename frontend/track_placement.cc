@@ -379,7 +379,8 @@ class Search {
     if (best == nullptr) return best;
     Candidate* other = nullptr;
     for (Candidate& candidate : judged_) {
-      if (candidate.support() >= kNearlyAsMuch * best->support() &&
+      if (candidate.agreeing > 0 &&
+          candidate.support() >= kNearlyAsMuch * best->support() &&
           (other == nullptr || candidate.support() > other->support()) &&
           &candidate != best && IsRather(&candidate, best)) {
         other = &candidate;

@@ -133,6 +133,7 @@ void Append(FirstMap* log, LogSolverResult* whole) {
   for (RefinedScan& scan : part.refined) {
     scan.pose = Compose(shift, scan.pose);
     if (scan.since >= 0) scan.since += scans;
+    if (scan.missed_since >= 0) scan.missed_since += scans;
   }
   for (KeyScanRecord& record : part.records) {
     record.scan += scans;
@@ -164,6 +165,7 @@ void Append(FirstMap* log, LogSolverResult* whole) {
   append(whole->records, part.records);
   append(whole->loose, part.loose);
   append(whole->closures, part.closures);
+  append(whole->notes, part.notes);
   append(whole->scan_seconds, part.scan_seconds);
   whole->frontend_seconds += part.frontend_seconds;
   whole->relocalization_seconds += part.relocalization_seconds;

@@ -737,6 +737,10 @@ void JoinDoorsOfPassages(const SpaceGrid& space, std::vector<PlanDoor>* doors) {
   };
   const auto are_one = [&](const PlanDoor& a, const PlanDoor& b) {
     if (side_of_passage(a) < 0 || side_of_passage(b) < 0) return false;
+    // Two doors of one room on the passage are no door of a thick wall.
+    if (std::max(a.rooms[0], a.rooms[1]) == std::max(b.rooms[0], b.rooms[1])) {
+      return false;
+    }
     const Vector2d way = middle(b) - middle(a);
     const Vector2d through = to_passage(a);
     if (through.dot(to_passage(b)) > -kFacing ||

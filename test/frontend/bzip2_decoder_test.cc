@@ -204,6 +204,25 @@ TEST(Bzip2DecoderTest, DataThatBreakOffGiveTheBlocksBefore) {
   }
 }
 
+// A block that does not end, as in a file that is zeros from some place on: not
+// all of the rest is asked for.
+TEST(Bzip2DecoderTest, NoMoreIsAskedForThanABlockMayHave) {
+  std::string packed = PackWithLibbz2(RandomText(400000, 200, 12), 1);
+  packed.resize(packed.size() / 2);
+  constexpr std::size_t kPiece = std::size_t{1} << 18;
+  const std::string zeros(kPiece, '\0');
+  std::size_t asked = 0;
+  Bzip2Decoder decoder(
+      [&] { return std::string_view(asked++ == 0 ? packed : zeros); });
+  std::vector<char> output(1 << 16);
+  while (decoder.state() == State::kGoingOn) {
+    decoder.Unpack(output.data(), output.size());
+    ASSERT_LT(asked, 100u);
+  }
+  EXPECT_EQ(decoder.state(), State::kCorrupt);
+  EXPECT_LE(asked * kPiece, std::size_t{6} << 20);
+}
+
 // Each bit of the heads and codes wrong in turn, and bits anywhere: what comes
 // out is what comes out of libbz2 for the whole, with any number of threads.
 TEST(Bzip2DecoderTest, WrongBitsAreFound) {

@@ -98,6 +98,16 @@ TEST(LateMetreTest, MotionsChangeByTheirShareAndPosesFollow) {
   }
 }
 
+// Both count, as when one is found on what the other has left.
+TEST(LateMetreTest, TwoCorrectionsOfOneMotionAddUp) {
+  std::vector<RefinedScan> scans = TwoMotionsAndATrack();
+  CorrectMotions({{2, Pose2(-0.02, 0.0, 0.0)}, {2, Pose2(-0.04, 0.0, 0.0)}},
+                 &scans);
+  EXPECT_NEAR(scans[1].since_key.mean[0], 0.47, 1e-12);
+  EXPECT_NEAR(scans[2].since_key.mean[0], 0.94, 1e-12);
+  EXPECT_NEAR(scans[3].since_key.mean[0], 0.5, 1e-12);
+}
+
 // How another track hangs on what was before is not odometry's to say.
 TEST(LateMetreTest, TheBeginOfATrackStays) {
   std::vector<RefinedScan> scans = TwoMotionsAndATrack();

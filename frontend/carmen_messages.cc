@@ -271,6 +271,12 @@ void CarmenMessages::ReadNewLaser(Kind kind, CarmenTokens tokens) {
     Skip(name + " with absurd angles: expected radians within a turn");
     return;
   }
+  if (scan.angle_step == 0.0 && count > 1 && !is_step_given_) {
+    Skip(name +
+         " whose readings have no angle between them: expected an "
+         "angular_resolution or a field_of_view, rad, or --laser_step");
+    return;
+  }
   if (!IsPlausible(laser) || !IsPlausible(scan.odometry)) {
     Skip(name + " with a pose that is not finite or absurd");
     return;

@@ -56,7 +56,8 @@ class CarmenMessages {
 
   /// Scans of one kind as their messages have them.
   struct Scans {
-    /// Scan::angle_step is 0 where the message carries no angles,
+    /// Scan::angle_step is 0 where the message carries no angles (of a message
+    /// that should, only if the step is given),
     /// Scan::maximum_range where it carries none or an absurd one.
     std::vector<Scan> scans;
     /// For each the pose of the laser by odometry; zero for kRawLaser.
@@ -68,6 +69,11 @@ class CarmenMessages {
     double timestamp;
     Pose2 pose;
   };
+
+  /// `is_step_given`: the angle between beams is known from elsewhere, so that
+  /// messages that say 0 are usable.
+  explicit CarmenMessages(bool is_step_given = false)
+      : is_step_given_(is_step_given) {}
 
   /// Takes a line in. Lines that are garbled, unknown or implausible are
   /// counted in skips(); nothing is thrown.
@@ -106,6 +112,7 @@ class CarmenMessages {
   void ReadOdom(CarmenTokens tokens);
   void ReadParameter(CarmenTokens tokens);
 
+  bool is_step_given_ = false;
   int line_number_ = 0;
   std::array<Scans, kNumKinds> scans_;
   std::vector<TimedPose> odometry_;

@@ -30,7 +30,9 @@ constexpr int kMostBeamsUsed = 10000;
 class CarmenReader {
  public:
   CarmenReader(InputStream* input, const LaserOptions& options)
-      : input_(input), options_(options) {
+      : input_(input),
+        options_(options),
+        messages_(options.laser_step.has_value()) {
     const auto refuse = [](const char* name, double value, const char* range) {
       throw PLUMBLINE_ERROR(std::string(name) + " is " + std::to_string(value),
                             range);

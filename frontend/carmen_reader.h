@@ -60,6 +60,10 @@ namespace plumbline {
 /// scan's. Where those of the other messages come more seldom than scans they
 /// are interpolated as well (SpreadSlowOdometry).
 ///
+/// A ROBOTLASER1 or RAWLASER1 whose angular resolution is 0 takes it from its
+/// field of view; where that is 0, too, it is a line that cannot be used unless
+/// LaserOptions have the step.
+///
 /// Lines that cannot be used and readings that are no distances (not a number,
 /// negative, above 1000 m) are passed over and counted in Log::skipped, as is
 /// damage to compressed data. Throws Error when the input cannot be read or

@@ -152,6 +152,35 @@ TEST(CarmenReaderTest, RobotLaserWithoutRemissionsAndResolution) {
   EXPECT_EQ(log.scans[0].timestamp_text, "12.25");
 }
 
+// Beams that all look the same way are no scan: the line alone is lost, not the
+// log, and with a step that is given not even the line.
+TEST(CarmenReaderTest, ScansWithoutAnAngleBetweenBeamsAreCounted) {
+  const std::string end =
+      "3 1 2 3 1 1 0 1 1 0 0.1 0.2 0.3 0.4 0.5 12.25 host 3\n";
+  const std::string good = "ROBOTLASER1 0 -1 2 1 8 0.01 0 " + end;
+  const std::string zero = "ROBOTLASER1 0 -1 0 0 8 0.01 0 " + end;
+  const std::string tiny = "ROBOTLASER1 0 -1 1e-999 0 8 0.01 0 " + end;
+  const std::string none = "ROBOTLASER1 0 -1 nan nan 8 0.01 0 " + end;
+  const std::string raw = "RAWLASER1 0 -1 0 0 8 0.01 0 3 1 2 3 0 9.5 h 0\n";
+  const std::string single =
+      "ROBOTLASER1 0 -1 0 0 8 0.01 0 1 1 1 1 0 1 1 0 0 0 0 0 0 13 host 3\n";
+  const Log log = ReadCarmen(good + zero + tiny + none + raw + single);
+  ASSERT_EQ(log.scans.size(), 2u);
+  EXPECT_EQ(log.scans[0].angle_step, 1.0);
+  EXPECT_EQ(log.scans[1].ranges.size(), 1u);
+  EXPECT_EQ(Skipped(log, "ROBOTLASER1 whose readings have no angle"), 2);
+  EXPECT_EQ(Skipped(log, "RAWLASER1 whose readings have no angle"), 1);
+  EXPECT_EQ(Skipped(log, "absurd angles"), 1);
+  EXPECT_THAT(log.skipped[0].first_lines, ElementsAre(2, 3));
+  EXPECT_THAT(WhyRefused(zero), HasSubstr("no angle between them"));
+
+  LaserOptions options;
+  options.laser_step = 0.5;
+  const Log given = ReadCarmen(zero, options);
+  ASSERT_EQ(given.scans.size(), 1u);
+  EXPECT_EQ(given.scans[0].angle_step, 0.5);
+}
+
 TEST(CarmenReaderTest, RawLaserIsPlacedByOdometry) {
   const std::string raw = "RAWLASER1 0 -1 2 1 8 0.01 0 3 1 2 3 0 ";
   const Log log = ReadCarmen(

@@ -1477,6 +1477,26 @@ TEST(BadBagTest, AbsurdAnglesAndPosesAreCounted) {
   EXPECT_EQ(SkippedInBag(log, "has no pose"), 1);
 }
 
+// A step of 0 is taken from the stated end; without one there is no scan.
+TEST(BadBagTest, ScansWithoutAnAngleBetweenBeamsAreCounted) {
+  std::vector<BagRecord> records = SmallDrive(kRos1);
+  const std::size_t before = ReadBytes(MakeRosbag1(records)).scans.size();
+  LaserScanMessage scan = PlainScan(kBagStart + 19 * kSecond / 20);
+  scan.angle_increment = 0.0;
+  records.push_back(Record(scan, kRos1));
+  scan = PlainScan(kBagStart + 19 * kSecond / 20);
+  scan.angle_increment = 0.0;
+  scan.angle_max = scan.angle_min;
+  records.push_back(Record(scan, kRos1));
+  scan = PlainScan(kBagStart + 19 * kSecond / 20);
+  scan.angle_increment = std::nan("");
+  records.push_back(Record(scan, kRos1));
+  const Log log = ReadBytes(MakeRosbag1(records));
+  ASSERT_EQ(log.scans.size(), before + 1);
+  EXPECT_NEAR(log.scans.back().angle_step, 0.5, 1e-6);
+  EXPECT_EQ(SkippedInBag(log, "absurd angles"), 2);
+}
+
 TEST(BadBagTest, FolderWithoutItsFiles) {
   const Folder folder;
   fs::create_directories(folder / "bag");

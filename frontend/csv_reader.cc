@@ -1,4 +1,5 @@
 #include <plumbline/core/error.h>
+#include <plumbline/frontend/carmen_messages.h>
 #include <plumbline/frontend/csv_reader.h>
 #include <plumbline/frontend/slow_odometry.h>
 
@@ -35,14 +36,34 @@ std::string_view Trimmed(std::string_view text) {
   return text;
 }
 
+// Where the cell that begins the line may end at the earliest: behind the
+// quotes, if it is in quotes, whatever stands in them. Quotes in them are
+// doubled; those that nothing closes reach to the end of the line.
+std::size_t QuotesEnd(std::string_view line, std::string_view separators) {
+  std::size_t begin = 0;
+  while (begin < line.size() && (line[begin] == ' ' || line[begin] == '\t') &&
+         separators.find(line[begin]) == std::string_view::npos) {
+    ++begin;
+  }
+  if (begin >= line.size() || line[begin] != '"') return 0;
+  std::size_t end = line.find('"', begin + 1);
+  while (end != std::string_view::npos) {
+    if (end + 1 >= line.size() || line[end + 1] != '"') return end + 1;
+    end = line.find('"', end + 2);
+  }
+  return line.size();
+}
+
 // What stands between the cells of a table with this header: a comma, or what
 // spreadsheets write where the comma stands in numbers.
 char SeparatorOf(std::string_view header) {
-  const std::size_t found = header.find_first_of(",;\t");
+  constexpr std::string_view kSeparators = ",;\t";
+  const std::size_t found =
+      header.find_first_of(kSeparators, QuotesEnd(header, kSeparators));
   return found == std::string_view::npos ? ',' : header[found];
 }
 
-// R and others put names in quotes.
+// R and others put names in quotes. Quotes in them stay doubled.
 std::string_view Unquoted(std::string_view cell) {
   cell = Trimmed(cell);
   if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') {
@@ -54,7 +75,8 @@ std::string_view Unquoted(std::string_view cell) {
 std::vector<std::string_view> Cells(std::string_view line, char separator) {
   std::vector<std::string_view> cells;
   while (true) {
-    const std::size_t end = line.find(separator);
+    const std::size_t end =
+        line.find(separator, QuotesEnd(line, {&separator, 1}));
     cells.push_back(Unquoted(line.substr(0, end)));
     if (end == std::string_view::npos) return cells;
     line.remove_prefix(end + 1);
@@ -77,20 +99,37 @@ std::string_view TakeLine(std::string_view* text) {
 
 // None when the cell is anything but a number. Where cells are not separated by
 // commas numbers may have one.
-std::optional<double> Number(std::string_view cell) {
+std::optional<double> Number(std::string_view cell, char separator) {
+  std::string with_point;
   const std::size_t comma = cell.find(',');
-  if (comma != std::string_view::npos) {
-    std::string with_point(cell);
+  if (separator != ',' && comma != std::string_view::npos) {
+    with_point = std::string(cell);
     with_point[comma] = '.';
-    return Number(with_point);
+    cell = with_point;
   }
   double value = 0.0;
-  const auto [end, error] =
-      std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc() || end != cell.data() + cell.size()) {
-    return std::nullopt;
-  }
+  if (!CarmenTokens::Parse(cell, &value)) return std::nullopt;
   return value;
+}
+
+// What R, Python and databases write for a number that is missing.
+bool IsMissing(std::string_view cell) {
+  if (cell.empty()) return true;
+  std::string word(cell.substr(0, 5));
+  std::transform(word.begin(), word.end(), word.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return word == "na" || word == "none" || word == "null";
+}
+
+// A name as it was before it was put in quotes.
+std::string WithSingleQuotes(std::string_view name) {
+  std::string text;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    text += name[i];
+    if (name.substr(i, 2) == "\"\"") ++i;
+  }
+  return text;
 }
 
 // Index of a column of ranges: "r12"; none when it is no such column.
@@ -170,7 +209,7 @@ class CsvReader {
     int num_unused = 0;
     std::map<std::size_t, std::size_t> beams;
     for (std::size_t c = 0; c < names.size(); ++c) {
-      const std::string name(names[c]);
+      const std::string name = WithSingleQuotes(names[c]);
       bool is_new = true;
       if (const auto beam = BeamOf(names[c])) {
         is_new = beams.emplace(*beam, c).second;
@@ -235,7 +274,8 @@ class CsvReader {
     const auto number = [&](const char* name, double missing) {
       const auto column = columns_.find(name);
       if (column == columns_.end()) return missing;
-      const std::optional<double> value = Number(cells[column->second]);
+      const std::optional<double> value =
+          Number(cells[column->second], separator_);
       if (value && std::isfinite(*value)) return *value;
       if (is_good) {
         Skip("line whose " + std::string(name) +
@@ -249,6 +289,7 @@ class CsvReader {
     scan.timestamp_text = std::string(cells[columns_.at("time")]);
     std::replace(scan.timestamp_text.begin(), scan.timestamp_text.end(), ',',
                  '.');
+    if (scan.timestamp_text[0] == '+') scan.timestamp_text.erase(0, 1);
     if (has_poses_) {
       scan.odometry = Pose2(number("x", 0.0), number("y", 0.0),
                             NormalizeAngle(number("theta", 0.0)));
@@ -280,18 +321,26 @@ class CsvReader {
     scan.line = line_number_;
     const std::size_t stride =
         (beams_.size() + kMostBeamsUsed - 1) / kMostBeamsUsed;
+    scan.angle_step *= static_cast<double>(stride);
+    scan.ranges.reserve(beams_.size() / stride + 1);
+    for (std::size_t i = 0; i < beams_.size(); i += stride) {
+      const std::string_view cell = cells[beams_[i]];
+      const std::optional<double> range = Number(cell, separator_);
+      if (!range && !IsMissing(cell)) {
+        // A shifted column or a damaged line: nobody saw nothing there.
+        Skip(
+            "line with a range that is text: expected a number, or an empty "
+            "cell, inf, nan, NA, none or null for no return");
+        return;
+      }
+      const bool is_return = range && *range > 0.0 &&
+                             *range < scan.maximum_range - kMaximumRangeMargin;
+      scan.ranges.push_back(is_return ? static_cast<float>(*range) : 0.0f);
+    }
     if (stride > 1) {
       Skip(
           "beams of a scan of more than 10000: every second, third, ... is "
           "used");
-    }
-    scan.angle_step *= static_cast<double>(stride);
-    scan.ranges.reserve(beams_.size() / stride + 1);
-    for (std::size_t i = 0; i < beams_.size(); i += stride) {
-      const std::optional<double> range = Number(cells[beams_[i]]);
-      const bool is_return = range && *range > 0.0 &&
-                             *range < scan.maximum_range - kMaximumRangeMargin;
-      scan.ranges.push_back(is_return ? static_cast<float>(*range) : 0.0f);
     }
     if (scan.angle_step < 0.0) {
       std::reverse(scan.ranges.begin(), scan.ranges.end());

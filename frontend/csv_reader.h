@@ -25,12 +25,14 @@ namespace plumbline {
 ///   max_range                    readings from here on are no return, m; 80
 ///                                where it is missing
 ///
-/// Other columns are not used, and Log::notes says so. A range that is empty,
-/// not a number, infinite, zero or negative is no return. Lines that begin with
-/// # are comments. A line with another number of cells than the first, or with
-/// a time, angle or pose that is not a finite number or absurd, is passed over
-/// and counted in Log::skipped. Throws Error when a column is missing or named
-/// twice, or there is no scan.
+/// Other columns are not used, and Log::notes says so. A range that is an empty
+/// cell, nan, inf, NA, none, null (in any case), zero or negative is no return.
+/// Cells may be in quotes: separators in them separate nothing, quotes in them
+/// are doubled, and they end with the line. Lines that begin with # are
+/// comments. A line with another number of cells than the first, with a range
+/// that is any other text, or with a time, angle or pose that is not a finite
+/// number or absurd, is passed over and counted in Log::skipped. Throws Error
+/// when a column is missing or named twice, or there is no scan.
 Log ReadCsvLog(InputStream* input, const LaserOptions& options);
 
 /// Whether a line that names such columns begins the text, after comments.

@@ -193,6 +193,53 @@ TEST(CsvReaderTest, QuotesSemicolonsTabsAndDecimalCommas) {
               HasSubstr("not a finite number"));
 }
 
+// A comma in quotes separates nothing, and quotes in quotes are doubled.
+TEST(CsvReaderTest, SeparatorsInQuotesSeparateNothing) {
+  const Log log = ReadCsv(
+      "\"a, b\",time,start_angle,angle_step, \"r0\" ,r1,\"the \"\"end\"\"\"\n"
+      "\"left, right\",1,-1,1,2,3,\"a \"\"b\"\", c\"\n"
+      "\"\"\"\",2,-1,1, \"2\" ,3,\"\"\n"
+      "left, right,3,-1,1,2,3,c\n"
+      "x,4,-1,1,2,3,\"not closed, c\n"
+      "x,5,-1,1,\"2,3,c\n");
+  ASSERT_EQ(log.scans.size(), 3u);
+  EXPECT_THAT(log.scans[0].ranges, ElementsAre(2.0f, 3.0f));
+  EXPECT_THAT(log.scans[1].ranges, ElementsAre(2.0f, 3.0f));
+  EXPECT_EQ(log.scans[2].timestamp, 4.0);
+  EXPECT_THAT(log.notes, ElementsAre(HasSubstr("not used: a, b, the \"end\"")));
+  ASSERT_EQ(log.skipped.size(), 1u);
+  EXPECT_THAT(log.skipped[0].reason, HasSubstr("number of cells"));
+  EXPECT_THAT(log.skipped[0].first_lines, ElementsAre(4, 6));
+
+  const Log tabs = ReadCsv(
+      "time\tr0\tnote\tstart_angle\tangle_step\n1\t2\t\"a\tb\"\t-1\t1\n"
+      "2\t2\t\t-1\t1\n");
+  EXPECT_EQ(tabs.scans.size(), 2u);
+  EXPECT_TRUE(LooksLikeCsvLog("\"x; y\",time,r0\n"));
+}
+
+// Not a reading of the laser, and not one that is missing: it cannot be told
+// what the others on the line are.
+TEST(CsvReaderTest, RangesThatAreTextAreCounted) {
+  const Log log = ReadCsv(std::string(kHeader) +
+                          "1,-1,1,2,3,4\n"
+                          "2,-1,1,abc,3,4\n"
+                          "3,-1,1,2,1.2.3,4\n"
+                          "4,-1,1,2,\"1,5\",4\n"
+                          "5,-1,1,2,none of it,4\n"
+                          "+6,-1,1,NA,+3,Null\n"
+                          "7,-1,1,-inf,1e999,N/A\n"
+                          "8,-1,1,-inf,1e999,NaN\n");
+  ASSERT_EQ(log.scans.size(), 3u);
+  EXPECT_THAT(log.scans[1].ranges, ElementsAre(0.0f, 3.0f, 0.0f));
+  EXPECT_EQ(log.scans[1].timestamp_text, "6");
+  EXPECT_THAT(log.scans[2].ranges, ElementsAre(0.0f, 0.0f, 0.0f));
+  ASSERT_EQ(log.skipped.size(), 1u);
+  EXPECT_EQ(log.skipped[0].count, 5);
+  EXPECT_THAT(log.skipped[0].reason, HasSubstr("a range that is text"));
+  EXPECT_THAT(log.skipped[0].first_lines, ElementsAre(3, 4, 5, 6, 8));
+}
+
 TEST(CsvReaderTest, IsRecognizedByItsColumns) {
   EXPECT_TRUE(LooksLikeCsvLog("# c\n\n x , time,r0\r\n"));
   EXPECT_TRUE(LooksLikeCsvLog("time,r0"));

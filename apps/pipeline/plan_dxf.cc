@@ -18,6 +18,8 @@ constexpr std::size_t kMostLines = 20000;
 constexpr double kAbsurdCoordinate = 1e7;
 constexpr double kMostLength = 1e5;  // of all lines, m
 constexpr int kShownLayers = 20;
+// A plane is the floor's whose normal is off by this, rad.
+constexpr double kMostTilt = 1e-6;
 
 // $INSUNITS in metres; 0 for what no building is drawn in.
 double Unit(int code) {
@@ -115,6 +117,11 @@ class DxfReader {
         notes->push_back(std::to_string(inserts_) +
                          " blocks of the plan are not read");
       }
+      if (tilted_ > 0) {
+        notes->push_back(
+            std::to_string(tilted_) +
+            " polylines of the plan are not read: their planes are tilted");
+      }
     }
     return std::move(lines_);
   }
@@ -183,7 +190,8 @@ class DxfReader {
   void BeginEntity(bool is_entity) {
     is_entity_ = is_entity;
     if (entity_ == "VERTEX" || entity_ == "SEQEND") return;
-    is_paper_ = is_closed_ = false;
+    is_paper_ = is_closed_ = is_of_space_ = false;
+    normal_ = Eigen::Vector3d::UnitZ();
     layer_.clear();
     points_.clear();
     bulges_.clear();
@@ -191,7 +199,13 @@ class DxfReader {
 
   void TakeGroup() {
     const bool is_vertex = entity_ == "VERTEX";
-    if (code_ == 8 && !is_vertex) layer_ = value_;
+    // What belongs to a polyline is on its layer and in its plane.
+    if (!is_vertex && entity_ != "SEQEND") {
+      if (code_ == 8) layer_ = value_;
+      if (code_ == 210) normal_.x() = Number();
+      if (code_ == 220) normal_.y() = Number();
+      if (code_ == 230) normal_.z() = Number();
+    }
     if (code_ == 67) is_paper_ = value_ == "1";
     const bool is_line = entity_ == "LINE";
     const bool is_polyline = entity_ == "LWPOLYLINE";
@@ -199,6 +213,7 @@ class DxfReader {
       int flags = 0;
       ParseNumber(std::string_view(value_), &flags);
       is_closed_ = (flags & 1) != 0;
+      is_of_space_ = entity_ == "POLYLINE" && (flags & 8) != 0;
       // A mesh is no line.
       if ((flags & 80) != 0) is_paper_ = true;
     }
@@ -216,6 +231,22 @@ class DxfReader {
     }
   }
 
+  // Points of a polyline are in the system of its plane, whose axes follow from
+  // the plane's normal by the "arbitrary axis algorithm" of the format: seen
+  // from below, as commands that mirror leave it, x points the other way. Those
+  // of a LINE, and of polylines in space, are in that of the drawing. False
+  // where the plane is not the floor's.
+  bool ToDrawing() {
+    if (entity_ == "LINE" || is_of_space_) return true;
+    if (normal_.head<2>().norm() > kMostTilt * std::abs(normal_.z())) {
+      return false;
+    }
+    if (normal_.z() < 0.0) {
+      for (Eigen::Vector2d& point : points_) point.x() = -point.x();
+    }
+    return true;
+  }
+
   // What came before the next entity is whole.
   void EndEntity() {
     if (!is_entity_) return;
@@ -223,6 +254,12 @@ class DxfReader {
     const bool is_whole =
         entity_ == "LINE" || entity_ == "LWPOLYLINE" || entity_ == "SEQEND";
     if (!is_whole || is_paper_ || points_.size() < 2) return;
+    if (!ToDrawing()) {
+      ++tilted_;
+      points_.clear();
+      bulges_.clear();
+      return;
+    }
     const bool is_closed = is_closed_ && entity_ != "LINE";
     const std::size_t count = points_.size() - (is_closed ? 0 : 1);
     auto& [lines, is_read] = found_[layer_];
@@ -278,11 +315,16 @@ class DxfReader {
   double unit_ = 1.0;
   bool has_unit_ = false;
   int inserts_ = 0;
+  int tilted_ = 0;
   // The entity that is read.
   std::string entity_;
   bool is_entity_ = false;
   bool is_paper_ = false;
   bool is_closed_ = false;
+  // In the drawing's own coordinates.
+  bool is_of_space_ = false;
+  // Of its plane ("extrusion direction"), of any length.
+  Eigen::Vector3d normal_ = Eigen::Vector3d::UnitZ();
   std::string layer_;
   std::vector<Eigen::Vector2d> points_;
   std::vector<double> bulges_;

@@ -10,8 +10,10 @@ namespace plumbline {
 
 /// Reads the straight lines of a drawing (ASCII DXF): LINE, LWPOLYLINE and
 /// POLYLINE of the model space, in metres ($INSUNITS; without a unit they are
-/// taken for metres). Pieces shorter than 0.3 m, arcs, and what is drawn by
-/// blocks are left out.
+/// taken for metres). Polylines seen from below, as a command that mirrors
+/// leaves them (extrusion 0, 0, -1), lie where the drawing shows them; those
+/// whose plane is tilted are left out. Pieces shorter than 0.3 m, arcs, and
+/// what is drawn by blocks are left out.
 ///
 /// `layers`: names of those that are read, whatever their case; a name that
 /// ends in * stands for all that begin so. Empty: those whose name begins with

@@ -78,6 +78,53 @@ TEST(PlanDxfTest, ReadsPolylines) {
   EXPECT_EQ(lines[2].end, Eigen::Vector2d(6.0, 1.0));
 }
 
+// Commands that mirror turn a polyline over: its points are in a system whose x
+// points the other way. Those of a line are in the drawing's.
+TEST(PlanDxfTest, WhatIsSeenFromBelowLiesWhereItIsDrawn) {
+  const auto normal = [](const std::string& x, const std::string& y,
+                         const std::string& z) {
+    return "210\n" + x + "\n220\n" + y + "\n230\n" + z + "\n";
+  };
+  const auto new_one = [](const std::string& plane) {
+    return "0\nLWPOLYLINE\n8\nWALLS\n10\n1\n20\n2\n10\n4\n20\n3\n" + plane;
+  };
+  const auto old_one = [](const std::string& flags, const std::string& plane) {
+    return "0\nPOLYLINE\n8\nWALLS\n70\n" + flags + "\n" + plane +
+           "0\nVERTEX\n10\n1\n20\n2\n0\nVERTEX\n10\n4\n20\n3\n0\nSEQEND\n8\n"
+           "0\n";
+  };
+  const std::string below = normal("0", "0", "-1");
+  std::vector<std::string> notes;
+  for (const std::string& polyline : {new_one(below), old_one("0", below),
+                                      new_one(normal("1e-17", "0", "-2"))}) {
+    const std::vector<PlanLine> lines =
+        ReadLines(Drawing(polyline + new_one("")), {}, &notes);
+    ASSERT_EQ(lines.size(), 2u);
+    EXPECT_EQ(lines[0].begin, Eigen::Vector2d(-1.0, 2.0));
+    EXPECT_EQ(lines[0].end, Eigen::Vector2d(-4.0, 3.0));
+    EXPECT_EQ(lines[1].begin, Eigen::Vector2d(1.0, 2.0));
+  }
+  for (const std::string& polyline :
+       {new_one(normal("0", "0", "1")), new_one(normal("0", "0", "0")),
+        old_one("8", below),
+        Line("WALLS", "1", "2", "4", "3") + normal("0", "0", "-1"),
+        Line("WALLS", "1", "2", "4", "3") + normal("0", "1", "0")}) {
+    const std::vector<PlanLine> lines =
+        ReadLines(Drawing(polyline), {}, &notes);
+    ASSERT_EQ(lines.size(), 1u);
+    EXPECT_EQ(lines[0].begin, Eigen::Vector2d(1.0, 2.0));
+    EXPECT_EQ(lines[0].end, Eigen::Vector2d(4.0, 3.0));
+  }
+  EXPECT_THAT(notes, IsEmpty());
+
+  const std::vector<PlanLine> lines =
+      ReadLines(Drawing(new_one(normal("0", "1", "0")) +
+                        old_one("0", normal("0.1", "0", "-1")) + new_one("")),
+                {}, &notes);
+  EXPECT_EQ(lines.size(), 1u);
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("2 polylines of the plan are not")));
+}
+
 TEST(PlanDxfTest, LayersAreChosen) {
   const std::string text = Drawing(
       Line("WALLS", "0", "0", "1", "0") + Line("DOORS", "0", "0", "2", "0") +

@@ -61,6 +61,7 @@ class DxfReader {
     if (text_.compare(0, 4, "AC10") == 0) {
       throw Error(name_, 0, "is a DWG", "a DXF saved as text");
     }
+    // The one that is open.
     std::string section;
     bool has_ended = false;
     while (!has_ended && Next()) {
@@ -82,6 +83,12 @@ class DxfReader {
     }
     EndEntity();
     if (!has_sections_) Refuse("has no sections", "a drawing (DXF)");
+    // What is missing may be walls.
+    if (!section.empty()) {
+      Refuse("breaks off in section " + PrintableUtf8(section.substr(0, 40)),
+             "ENDSEC, and EOF at the end of the drawing");
+    }
+    if (!has_ended) Refuse("breaks off", "EOF at the end of the drawing");
     if (lines_.empty()) {
       throw Error(
           name_, 0,

@@ -18,9 +18,10 @@ namespace plumbline {
 /// `layers`: names of those that are read, whatever their case; a name that
 /// ends in * stands for all that begin so. Empty: those whose name begins with
 /// WALL or A-WALL. `notes` (may be null) gets what was taken for granted.
-/// Throws Error with the line for what is no such drawing, for a binary one,
-/// for more than 100 km of lines, and for one without lines on these layers: it
-/// then says what layers there are.
+/// Throws Error with the line for what is no such drawing, for one that breaks
+/// off (does not end its sections with ENDSEC and itself with EOF), a binary
+/// one, for more than 100 km of lines, and for one without lines on these
+/// layers: it then says what layers there are.
 std::vector<PlanLine> ReadPlanDxf(const std::string& text,
                                   const std::string& name,
                                   const std::vector<std::string>& layers,

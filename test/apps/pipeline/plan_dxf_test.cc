@@ -160,17 +160,29 @@ TEST(PlanDxfTest, RefusesWhatIsNone) {
               HasSubstr("no unit of a building"));
 }
 
-// Cut anywhere: what is whole is read, or it is refused.
+// Cut anywhere it is refused: what is missing may be walls.
 TEST(PlanDxfTest, CutAnywhere) {
   const std::string text = Drawing(Line("WALLS", "0", "0", "5", "0") +
                                    Line("WALLS", "0", "0", "0", "5"));
-  for (std::size_t size = 0; size < text.size(); ++size) {
-    try {
-      EXPECT_LE(ReadLines(text.substr(0, size)).size(), 2u);
-    } catch (const Error&) {
-      // A refusal is an answer.
-    }
+  // The last line may be without its end.
+  for (std::size_t size = 0; size + 1 < text.size(); ++size) {
+    EXPECT_THROW(ReadLines(text.substr(0, size)), Error) << size;
   }
+  EXPECT_EQ(ReadLines(text.substr(0, text.size() - 1)).size(), 2u);
+  EXPECT_EQ(ReadLines(text + "\n\n").size(), 2u);
+}
+
+TEST(PlanDxfTest, ADrawingThatBreaksOffIsRefused) {
+  const std::string line = Line("WALLS", "0", "0", "5", "0");
+  const std::string begin = "0\nSECTION\n2\nENTITIES\n" + line;
+  EXPECT_THAT(WhyNot(begin), HasSubstr("plan.dxf:20: breaks off in section "
+                                       "ENTITIES: expected ENDSEC"));
+  EXPECT_THAT(WhyNot(begin + "0\nEOF\n"),
+              HasSubstr("plan.dxf:22: breaks off in section ENTITIES"));
+  EXPECT_THAT(WhyNot(begin + "0\nENDSEC\n"),
+              HasSubstr("plan.dxf:22: breaks off: expected EOF"));
+  EXPECT_THAT(WhyNot(begin + "0\nLINE\n8\n"), HasSubstr("breaks off"));
+  EXPECT_EQ(WhyNot(begin + "0\nENDSEC\n0\nEOF"), "accepted");
 }
 
 }  // namespace

@@ -89,12 +89,7 @@ class DxfReader {
              "ENDSEC, and EOF at the end of the drawing");
     }
     if (!has_ended) Refuse("breaks off", "EOF at the end of the drawing");
-    if (lines_.empty()) {
-      throw Error(
-          name_, 0,
-          "has no lines on the layers that are read; it has " + Layers(),
-          "--plan_layers with some of these");
-    }
+    if (lines_.empty()) RefuseWithoutLines();
     for (PlanLine& line : lines_) {
       line.begin *= unit_;
       line.end *= unit_;
@@ -254,58 +249,133 @@ class DxfReader {
     return true;
   }
 
+  // What a layer has.
+  struct Content {
+    int lines = 0;
+    int arcs = 0;
+    int blocks = 0;
+    // Polylines in a plane that is not the floor's.
+    int tilted = 0;
+    bool is_read = false;
+  };
+
+  Content& ContentOfLayer() {
+    const auto [entry, is_new] = content_.try_emplace(layer_);
+    if (is_new) {
+      entry->second.is_read = std::any_of(
+          layers_.begin(), layers_.end(),
+          [this](const std::string& p) { return Selects(p, layer_); });
+    }
+    return entry->second;
+  }
+
   // What came before the next entity is whole.
   void EndEntity() {
-    if (!is_entity_) return;
-    if (entity_ == "INSERT") ++inserts_;
-    const bool is_whole =
-        entity_ == "LINE" || entity_ == "LWPOLYLINE" || entity_ == "SEQEND";
-    if (!is_whole || is_paper_ || points_.size() < 2) return;
-    if (!ToDrawing()) {
-      ++tilted_;
+    if (!is_entity_ || is_paper_) return;
+    if (entity_ == "INSERT") {
+      ++inserts_;
+      ++ContentOfLayer().blocks;
+    } else if (entity_ == "ARC" || entity_ == "CIRCLE" ||
+               entity_ == "ELLIPSE" || entity_ == "SPLINE") {
+      ++ContentOfLayer().arcs;
+    } else if (points_.size() >= 2 &&
+               (entity_ == "LINE" || entity_ == "LWPOLYLINE" ||
+                entity_ == "SEQEND")) {
+      TakeLines(&ContentOfLayer());
       points_.clear();
       bulges_.clear();
+    }
+  }
+
+  void TakeLines(Content* content) {
+    if (!ToDrawing()) {
+      ++content->tilted;
+      if (content->is_read) ++tilted_;
       return;
     }
     const bool is_closed = is_closed_ && entity_ != "LINE";
     const std::size_t count = points_.size() - (is_closed ? 0 : 1);
-    auto& [lines, is_read] = found_[layer_];
-    if (lines == 0) {
-      is_read = std::any_of(
-          layers_.begin(), layers_.end(),
-          [this](const std::string& p) { return Selects(p, layer_); });
-    }
-    lines += static_cast<int>(count);
-    if (is_read) {
-      for (std::size_t i = 0; i < count; ++i) {
-        if (bulges_[i] != 0.0) continue;
-        PlanLine line;
-        line.begin = points_[i];
-        line.end = points_[(i + 1) % points_.size()];
-        line.layer = layer_;
-        if (line.begin.cwiseAbs().maxCoeff() * unit_ > kAbsurdCoordinate ||
-            line.end.cwiseAbs().maxCoeff() * unit_ > kAbsurdCoordinate) {
-          Refuse("a line is absurdly far away", "metres of a building");
-        }
-        lines_.push_back(std::move(line));
+    for (std::size_t i = 0; i < count; ++i) {
+      if (bulges_[i] != 0.0) {
+        ++content->arcs;
+        continue;
       }
-      if (lines_.size() > kMostLines) {
-        Refuse("has too many lines on the layers that are read",
-               "20000 at most: --plan_layers with those of walls");
+      ++content->lines;
+      if (!content->is_read) continue;
+      PlanLine line;
+      line.begin = points_[i];
+      line.end = points_[(i + 1) % points_.size()];
+      line.layer = layer_;
+      if (line.begin.cwiseAbs().maxCoeff() * unit_ > kAbsurdCoordinate ||
+          line.end.cwiseAbs().maxCoeff() * unit_ > kAbsurdCoordinate) {
+        Refuse("a line is absurdly far away", "metres of a building");
       }
+      lines_.push_back(std::move(line));
     }
-    points_.clear();
-    bulges_.clear();
+    if (lines_.size() > kMostLines) {
+      Refuse("has too many lines on the layers that are read",
+             "20000 at most: --plan_layers with those of walls");
+    }
   }
 
-  std::string Layers() const {
-    if (found_.empty()) return "no lines at all";
+  [[noreturn]] void RefuseWithoutLines() const {
+    // On all layers, and on those that are read.
+    Content all;
+    Content read;
+    for (const auto& [layer, content] : content_) {
+      Add(content, &all);
+      if (content.is_read) Add(content, &read);
+    }
+    const std::string unread = Unread(read);
+    if (all.lines > 0) {
+      throw Error(name_, 0,
+                  "has no lines on the layers that are read" +
+                      (unread.empty() ? "" : " (only " + unread + ")") +
+                      "; it has " + Layers(&Lines),
+                  "--plan_layers with some of these");
+    }
+    const std::string found = Layers(&Unread);
+    throw Error(
+        name_, 0,
+        "has no lines at all" + (found.empty() ? "" : "; it has " + found),
+        "walls that are drawn as LINE, LWPOLYLINE or POLYLINE in the model "
+        "space (blocks exploded)");
+  }
+
+  static void Add(const Content& content, Content* sum) {
+    sum->lines += content.lines;
+    sum->arcs += content.arcs;
+    sum->blocks += content.blocks;
+    sum->tilted += content.tilted;
+  }
+
+  static std::string Lines(const Content& content) {
+    return content.lines == 0 ? "" : std::to_string(content.lines) + " lines";
+  }
+
+  // What is on a layer and never read.
+  static std::string Unread(const Content& content) {
+    std::string text;
+    const auto append = [&text](int count, const char* what) {
+      if (count == 0) return;
+      text += (text.empty() ? "" : ", ") + std::to_string(count) + what;
+    };
+    append(content.arcs, " arcs");
+    append(content.blocks, " blocks");
+    append(content.tilted, " polylines in tilted planes");
+    return text;
+  }
+
+  // The layers that something can be told of.
+  std::string Layers(std::string (*tell)(const Content&)) const {
     std::string text;
     int shown = 0;
-    for (const auto& [layer, found] : found_) {
+    for (const auto& [layer, content] : content_) {
+      const std::string told = tell(content);
+      if (told.empty()) continue;
       if (++shown > kShownLayers) return text + ", ...";
-      text += (text.empty() ? "" : ", ") + PrintableUtf8(layer) + " (" +
-              std::to_string(found.first) + " lines)";
+      text +=
+          (text.empty() ? "" : ", ") + PrintableUtf8(layer) + " (" + told + ")";
     }
     return text;
   }
@@ -335,8 +405,8 @@ class DxfReader {
   std::string layer_;
   std::vector<Eigen::Vector2d> points_;
   std::vector<double> bulges_;
-  // By layer: lines, and whether they are read.
-  std::map<std::string, std::pair<int, bool>> found_;
+  // By layer.
+  std::map<std::string, Content> content_;
   std::vector<PlanLine> lines_;
 };
 

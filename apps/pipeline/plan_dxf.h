@@ -21,7 +21,8 @@ namespace plumbline {
 /// Throws Error with the line for what is no such drawing, for one that breaks
 /// off (does not end its sections with ENDSEC and itself with EOF), a binary
 /// one, for more than 100 km of lines, and for one without lines on these
-/// layers: it then says what layers there are.
+/// layers: it then says what layers with lines there are, or what there is in
+/// place of lines.
 std::vector<PlanLine> ReadPlanDxf(const std::string& text,
                                   const std::string& name,
                                   const std::vector<std::string>& layers,

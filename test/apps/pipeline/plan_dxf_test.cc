@@ -139,6 +139,29 @@ TEST(PlanDxfTest, LayersAreChosen) {
               HasSubstr("DOORS (1 lines), Door-2 (1 lines), WALLS (1 lines)"));
 }
 
+TEST(PlanDxfTest, SaysWhatThereIsInPlaceOfLines) {
+  const std::string arc = "0\nARC\n8\nWALL\n10\n1\n20\n2\n40\n1\n";
+  const std::string block = "0\nINSERT\n8\n0\n2\nroom\n";
+  // One piece, an arc.
+  const std::string bulge =
+      "0\nLWPOLYLINE\n8\nWALL\n10\n0\n20\n0\n42\n1\n10\n4\n20\n0\n";
+  const std::string tilted =
+      "0\nLWPOLYLINE\n8\nWALL\n210\n1\n10\n0\n20\n0\n10\n4\n20\n0\n";
+  EXPECT_THAT(WhyNot(Drawing(arc + bulge + block + block)),
+              HasSubstr("has no lines at all; it has 0 (2 blocks), WALL (2 "
+                        "arcs): expected walls that are drawn as LINE"));
+  EXPECT_THAT(WhyNot(Drawing(tilted)),
+              HasSubstr("WALL (1 polylines in tilted planes)"));
+  EXPECT_THAT(WhyNot(Drawing("")), HasSubstr("has no lines at all: expected"));
+  EXPECT_THAT(
+      WhyNot(Drawing(arc + Line("OTHER", "0", "0", "1", "0"))),
+      HasSubstr("on the layers that are read (only 1 arcs); it has OTHER (1 "
+                "lines): expected --plan_layers"));
+  // What is drawn on paper is none of it.
+  EXPECT_THAT(WhyNot(Drawing(arc + "67\n1\n")),
+              HasSubstr("has no lines at all: expected"));
+}
+
 TEST(PlanDxfTest, RefusesWhatIsNone) {
   EXPECT_THAT(WhyNot(""), HasSubstr("has no sections"));
   EXPECT_THAT(WhyNot("FLASER 2 1 2\n"),

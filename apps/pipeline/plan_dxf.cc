@@ -4,7 +4,6 @@
 #include <plumbline/pipeline/plan_dxf.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <map>
@@ -21,14 +20,46 @@ constexpr int kShownLayers = 20;
 // A plane is the floor's whose normal is off by this, rad.
 constexpr double kMostTilt = 1e-6;
 
+// A foot of surveys in the United States, m.
+constexpr double kSurveyFoot = 1200.0 / 3937.0;
+
 // $INSUNITS in metres; 0 for what no building is drawn in.
 double Unit(int code) {
-  constexpr std::array<double, 15> kUnits = {1.0,    0.0254, 0.3048, 0.0,  1e-3,
-                                             1e-2,   1.0,    1e3,    0.0,  0.0,
-                                             0.9144, 0.0,    1e-9,   1e-6, 0.1};
-  return code >= 0 && code < static_cast<int>(kUnits.size())
-             ? kUnits[static_cast<std::size_t>(code)]
-             : 0.0;
+  switch (code) {
+    case 0:  // none
+    case 6:
+      return 1.0;
+    case 1:  // inch
+      return 0.0254;
+    case 2:  // foot
+      return 0.3048;
+    case 4:  // millimetre
+      return 1e-3;
+    case 5:  // centimetre
+      return 1e-2;
+    case 7:  // kilometre
+      return 1e3;
+    case 10:  // yard
+      return 0.9144;
+    case 12:  // nanometre
+      return 1e-9;
+    case 13:  // micrometre
+      return 1e-6;
+    case 14:  // decimetre
+      return 0.1;
+    case 15:  // decametre
+      return 10.0;
+    case 16:  // hectometre
+      return 100.0;
+    case 21:
+      return kSurveyFoot;
+    case 22:  // inch of surveys
+      return kSurveyFoot / 12.0;
+    case 23:  // yard of surveys
+      return 3.0 * kSurveyFoot;
+    default:
+      return 0.0;
+  }
 }
 
 std::string Lower(std::string text) {
@@ -183,7 +214,8 @@ class DxfReader {
     if (!ParseNumber(std::string_view(value_), &code) || Unit(code) == 0.0) {
       Refuse("'" + PrintableUtf8(value_.substr(0, 40)) +
                  "' is no unit of a building",
-             "$INSUNITS of metres (6), millimetres (4), feet (2), ...");
+             "$INSUNITS of metres (6), millimetres (4), centimetres (5), feet "
+             "(2), inches (1), ...");
     }
     unit_ = Unit(code);
     has_unit_ = code != 0;

@@ -61,6 +61,26 @@ TEST(PlanDxfTest, ReadsLinesInMetres) {
   EXPECT_THAT(notes, ElementsAre(HasSubstr("no unit")));
 }
 
+TEST(PlanDxfTest, KnowsTheUnitsOfBuildings) {
+  const auto metres = [](const std::string& unit) {
+    return ReadLines(Drawing(Line("walls", "0", "0", "6000", "0"), unit))[0]
+        .end.x();
+  };
+  EXPECT_NEAR(metres("10"), 5486.4, 1e-9);  // yards
+  EXPECT_NEAR(metres("14"), 600.0, 1e-9);   // decimetres
+  // Feet, inches and yards of surveys in the United States.
+  EXPECT_NEAR(metres("21"), 1828.8036576, 1e-6);
+  EXPECT_NEAR(metres("22"), 152.4003048, 1e-6);
+  EXPECT_NEAR(metres("23"), 5486.4109728, 1e-6);
+  const auto refusal = [](const std::string& unit) {
+    return WhyNot(Drawing(Line("walls", "0", "0", "1", "0"), unit));
+  };
+  // Miles, angstroms, light years, and what nobody knows.
+  for (const char* unit : {"3", "11", "19", "24", "25", "-1"}) {
+    EXPECT_THAT(refusal(unit), HasSubstr("no unit of a building")) << unit;
+  }
+}
+
 TEST(PlanDxfTest, ReadsPolylines) {
   // Closed, the second side an arc; then an old one that is open.
   const std::vector<PlanLine> lines = ReadLines(

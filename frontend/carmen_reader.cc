@@ -195,16 +195,24 @@ class CarmenReader {
         0.0, rear ? kPi : 0.0);
     if (kind_ != CarmenMessages::kRawLaser) {
       const LaserMount mount = FindLaserMount(log_.scans, lasers_);
-      if (mount.is_fixed) {
+      if (mount.is_fixed && mount.is_on_robot) {
         offset = mount.pose;
       } else {
         SkipReport report;
         report.reason =
-            "laser pose that is not at a fixed place on the robot (a corrected "
-            "log?): the robot pose alone is used";
+            mount.is_fixed
+                ? "laser pose, not its scan: 5 m or more from the robot, whose "
+                  "pose alone is used"
+                : "laser pose, not its scan: at no fixed place on the robot (a "
+                  "corrected log?), whose pose alone is used";
         report.count = static_cast<std::int64_t>(log_.scans.size());
-        for (std::size_t i = 0; i < mount.apart.size() && i < 5; ++i) {
-          report.first_lines.push_back(log_.scans[mount.apart[i]].line);
+        // Too far away are all of them, also where none is apart.
+        const std::size_t places =
+            mount.is_fixed ? log_.scans.size() : mount.apart.size();
+        for (std::size_t i = 0; i < places && i < 5; ++i) {
+          const std::size_t scan =
+              mount.is_fixed ? i : static_cast<std::size_t>(mount.apart[i]);
+          report.first_lines.push_back(log_.scans[scan].line);
         }
         log_.skipped.push_back(report);
       }

@@ -51,9 +51,9 @@ namespace plumbline {
 ///
 /// The laser's place on the robot is the median over the log of the first pose
 /// seen from the second. Where that is not fixed (a "corrected" log has other
-/// poses in the first place) the first poses are passed over, the place is
-/// PARAM robot_frontlaser_offset or zero, and Log::skipped says so: corrected
-/// poses are never taken for odometry.
+/// poses in the first place), or 5 m or more from the robot, the first poses
+/// are passed over, the place is PARAM robot_frontlaser_offset or zero, and
+/// Log::skipped says so: corrected poses are never taken for odometry.
 ///
 /// RAWLASER1 scans get the odometry interpolated by time between the ODOM
 /// lines before and after, or the last one when the times do not embrace the

@@ -175,8 +175,8 @@ LaserMount FindLaserMount(const std::vector<Scan>& scans,
       mount.apart.push_back(static_cast<int>(i));
     }
   }
-  mount.is_fixed = 10 * mount.apart.size() <= offsets.size() &&
-                   median.head<2>().norm() < 5.0;
+  mount.is_fixed = 10 * mount.apart.size() <= offsets.size();
+  mount.is_on_robot = median.head<2>().norm() < 5.0;
   mount.pose = Pose2(RoundPosition(median[0]), RoundPosition(median[1]),
                      RoundMountAngle(NormalizeAngle(median[2])));
   return mount;

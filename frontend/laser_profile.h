@@ -37,8 +37,10 @@ double RepeatedRange(const std::vector<Scan>& scans);
 struct LaserMount {
   /// In the robot's frame, m and rad, to the digits that logs have.
   Pose2 pose = Pose2::Zero();
-  /// Whether nearly all scans agree on it, and it is on the robot.
+  /// Whether nearly all scans agree on it.
   bool is_fixed = false;
+  /// Whether it is less than 5 m from the robot's middle.
+  bool is_on_robot = false;
   /// Scans that do not agree.
   std::vector<int> apart;
 };

@@ -43,10 +43,11 @@ void TellOfLog(const std::string& name, const Log& log, Summary* summary) {
   for (const SkipReport& skip : log.skipped) {
     std::string places;
     for (int place : skip.first_lines) places += " " + std::to_string(place);
-    Remark("%s: %lld skipped: %s; first at %s%s", name.c_str(),
+    // Some reports are of no place.
+    if (!places.empty()) places = "; first at " + log.position_unit + places;
+    Remark("%s: %lld skipped: %s%s", name.c_str(),
            static_cast<long long>(skip.count),
-           PrintableUtf8(skip.reason).c_str(), log.position_unit.c_str(),
-           places.c_str());
+           PrintableUtf8(skip.reason).c_str(), places.c_str());
   }
   if (!log.skipped.empty() && !log.scans.empty()) {
     Remark("%s: used are %zu scans, from %.1f s to %.1f s", name.c_str(),

@@ -280,11 +280,28 @@ TEST(CarmenReaderTest, CorrectedPosesAreNotOdometry) {
   EXPECT_EQ(log.scans[9].odometry, Pose2(9, 0, 0));
   EXPECT_EQ(log.scans[9].laser_offset, Pose2(0, 0, 0));
   EXPECT_EQ(Skipped(log, "corrected log"), 10);
+  EXPECT_FALSE(log.skipped[0].first_lines.empty());
 
   // The corrected pose is not used where odometry is missing either.
   const Log none = ReadCarmen(Flaser(2, "1", "1 0 0 0 0 0", "1") +
                               Flaser(2, "1", "5 0 0 0 0 0", "2"));
   EXPECT_FALSE(none.has_odometry);
+}
+
+// All of them say the same, so that none is apart: the lines are told all the
+// same.
+TEST(CarmenReaderTest, LaserPosesFarFromTheRobotAreNotUsed) {
+  std::string text;
+  for (int i = 0; i < 8; ++i) {
+    text += Flaser(2, "1", "-1000 0 0 0 0 0", std::to_string(i));
+  }
+  const Log log = ReadCarmen(text);
+  ASSERT_EQ(log.scans.size(), 8u);
+  EXPECT_EQ(log.scans[7].laser_offset, Pose2(0, 0, 0));
+  ASSERT_EQ(log.skipped.size(), 1u);
+  EXPECT_THAT(log.skipped[0].reason, HasSubstr("5 m or more from the robot"));
+  EXPECT_EQ(log.skipped[0].count, 8);
+  EXPECT_THAT(log.skipped[0].first_lines, ElementsAre(1, 2, 3, 4, 5));
 }
 
 TEST(CarmenReaderTest, MaximumRangeFromParameter) {

@@ -99,6 +99,7 @@ TEST(LaserProfileTest, TheMountIsTheMedian) {
   lasers[7] = Pose2(50.0, 50.0, 0.0);
   const LaserMount found = FindLaserMount(scans, lasers);
   EXPECT_TRUE(found.is_fixed);
+  EXPECT_TRUE(found.is_on_robot);
   EXPECT_EQ(found.pose, mount);
   EXPECT_EQ(found.apart, std::vector<int>({7}));
 }
@@ -111,6 +112,15 @@ TEST(LaserProfileTest, AMountThatMovesIsNotFixed) {
     lasers.push_back(Pose2(static_cast<double>(i), 0.0, 0.0));
   }
   EXPECT_FALSE(FindLaserMount(scans, lasers).is_fixed);
+}
+
+TEST(LaserProfileTest, AMountMayBeFixedAndFarAway) {
+  const std::vector<Scan> scans(20);
+  const std::vector<Pose2> lasers(20, Pose2(-1000.0, 0.0, 0.0));
+  const LaserMount found = FindLaserMount(scans, lasers);
+  EXPECT_TRUE(found.is_fixed);
+  EXPECT_FALSE(found.is_on_robot);
+  EXPECT_TRUE(found.apart.empty());
 }
 
 TEST(LaserProfileTest, DenseScansAreThinned) {

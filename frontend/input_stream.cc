@@ -47,6 +47,17 @@ constexpr std::size_t kChunk = std::size_t{1} << 18;
 constexpr std::size_t kLeastChunk = std::size_t{1} << 12;
 // Pieces of a chunk that are unpacked ahead at most.
 constexpr std::size_t kMostAhead = 16;
+// Some messages of libarchive end with the end of a line.
+std::string OneLine(std::string message) {
+  const auto is_control = [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+  };
+  std::replace_if(message.begin(), message.end(), is_control, ' ');
+  // Nothing is left of blanks alone.
+  message.erase(message.find_last_not_of(' ') + 1);
+  return message;
+}
+
 // Of as many bytes at once without any other it is plain that no text comes.
 constexpr std::size_t kManyZeros = std::size_t{1} << 14;
 
@@ -376,7 +387,7 @@ class InputStream::Unpacker::Archive : public Unpacker {
     if (!reading_failed_.empty()) {
       damage_ += ": " + reading_failed_;
     } else if (const char* why = archive_error_string(archive_.get())) {
-      damage_ += std::string(": ") + why;
+      damage_ += ": " + OneLine(why);
     }
   }
 

@@ -196,6 +196,30 @@ TEST(PackedLogsTest, DamagedBytesAreSaidOrRefused) {
   }
 }
 
+// A zip of one file that is not packed and says that it is 3 bytes longer.
+TEST(PackedLogsTest, WhatIsSaidOfDamageIsOneLine) {
+  const std::string text = "FLASER 1 1 0 0 0 0 0 0 1 h 1\n";
+  std::string zip("PK\x03\x04", 4);
+  const auto append = [&zip](std::size_t value, int bytes) {
+    for (int i = 0; i < bytes; ++i) {
+      zip += static_cast<char>((value >> (8 * i)) & 0xff);
+    }
+  };
+  append(20, 2);               // version
+  append(0, 4);                // flags, method
+  append(0x21, 4);             // time, date
+  append(0, 4);                // checksum
+  append(text.size(), 4);      // packed
+  append(text.size() + 3, 4);  // unpacked
+  append(5, 4);                // length of the name, of what is extra
+  zip += "a.clf" + text;
+  InputStream input("test", zip);
+  EXPECT_LE(input.ReadRest().size(), text.size());
+  EXPECT_THAT(input.damage(), HasSubstr("wrong size"));
+  EXPECT_EQ(input.damage().back(), ')');
+  for (const char c : input.damage()) EXPECT_GE(c, ' ');
+}
+
 TEST(PackedLogsTest, OfAZipOfSeveralFilesTheFirstIsRead) {
   const std::string carmen = Logs().front().second;
   const Log log = ReadPacked(Packed("zip", {carmen, "and another"}));

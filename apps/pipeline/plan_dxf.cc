@@ -15,7 +15,6 @@ namespace {
 constexpr double kLeastLength = 0.3;
 constexpr std::size_t kMostLines = 20000;
 constexpr double kAbsurdCoordinate = 1e7;
-constexpr double kMostLength = 1e5;  // of all lines, m
 constexpr int kShownLayers = 20;
 // A plane is the floor's whose normal is off by this, rad.
 constexpr double kMostTilt = 1e-6;
@@ -133,14 +132,6 @@ class DxfReader {
     if (lines_.empty()) {
       throw Error(name_, 0, "has lines of less than 0.3 m only",
                   "walls, and the drawing's unit in $INSUNITS");
-    }
-    double length = 0.0;
-    for (const PlanLine& line : lines_) {
-      length += (line.end - line.begin).norm();
-    }
-    if (length > kMostLength) {
-      throw Error(name_, 0, "has more than 100 km of lines",
-                  "walls of a building, and the drawing's unit in $INSUNITS");
     }
     if (notes != nullptr) {
       if (!has_unit_) {
@@ -340,7 +331,8 @@ class DxfReader {
       line.layer = layer_;
       if (line.begin.cwiseAbs().maxCoeff() * unit_ > kAbsurdCoordinate ||
           line.end.cwiseAbs().maxCoeff() * unit_ > kAbsurdCoordinate) {
-        Refuse("a line is absurdly far away", "metres of a building");
+        Refuse("a line is absurdly far away",
+               "walls within 10000 km, and the drawing's unit in $INSUNITS");
       }
       lines_.push_back(std::move(line));
     }

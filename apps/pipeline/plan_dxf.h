@@ -20,9 +20,9 @@ namespace plumbline {
 /// WALL or A-WALL. `notes` (may be null) gets what was taken for granted.
 /// Throws Error with the line for what is no such drawing, for one that breaks
 /// off (does not end its sections with ENDSEC and itself with EOF), a binary
-/// one, for more than 100 km of lines, and for one without lines on these
-/// layers: it then says what layers with lines there are, or what there is in
-/// place of lines.
+/// one, for lines that are absurdly many or far away, and for one without lines
+/// on these layers: it then says what layers with lines there are, or what
+/// there is in place of lines.
 std::vector<PlanLine> ReadPlanDxf(const std::string& text,
                                   const std::string& name,
                                   const std::vector<std::string>& layers,

@@ -64,6 +64,8 @@ constexpr double kUnitRatios[] = {1000.0, 100.0, 39.37, 25.4,
                                   12.0,   10.0,  3.281, 2.54};
 constexpr double kLeastSizeRatio = 0.5;
 constexpr double kMostSizeRatio = 4.0;
+// No building has more lines, m; and the search takes memory with them.
+constexpr double kMostLineLength = 1e5;
 
 // Difference of two directions without sense, in [0, pi/2].
 double AngleBetween(double a, double b) {
@@ -482,6 +484,12 @@ double MedianLength(const std::vector<Wall>& lines) {
   return *middle;
 }
 
+double TotalLength(const std::vector<Wall>& walls) {
+  double length = 0.0;
+  for (const Wall& wall : walls) length += wall.length();
+  return length;
+}
+
 PlanPlacement Placed(const Place& place, double length) {
   return {place.pose, "the plan agrees with " + Fixed(place.agreeing, 1) +
                           " m of " + Fixed(length, 1) +
@@ -518,8 +526,7 @@ PlanPlacement PlacePlan(const KnownStructure& known,
     return {std::nullopt,
             "the plan is not used: there are no walls to compare"};
   }
-  double length = 0.0;
-  for (const Wall& wall : walls) length += wall.length();
+  const double length = TotalLength(walls);
   const std::vector<Eigen::Vector2d> middles = PartMiddles(walls);
   const std::vector<WallPoint> points = PointsOn(walls);
   const double size = Box(lines).size();
@@ -527,11 +534,17 @@ PlanPlacement PlacePlan(const KnownStructure& known,
   std::vector<Place> places;
   std::string why;
   const double usual_length = MedianLength(lines);
-  const bool is_absurd = usual_length > map_size;
-  if (is_absurd) {
+  const double line_length = TotalLength(lines);
+  const bool is_absurd =
+      usual_length > map_size || line_length > kMostLineLength;
+  if (usual_length > map_size) {
     why = "the plan is not used: half of its lines are longer than " +
           Fixed(usual_length, 1) + " m, and the whole map is only " +
           Fixed(map_size, 1) + " m large";
+  } else if (is_absurd) {
+    why = "the plan is not used: it has " + Fixed(1e-3 * line_length, 0) +
+          " km of lines, and the whole map is only " + Fixed(map_size, 1) +
+          " m large";
   } else {
     places = FindPlaces(known, walls, points, middles, lines, stop);
     why = WhyRefused(known, places, length, middles.front());
@@ -569,7 +582,8 @@ PlanPlacement PlacePlan(const KnownStructure& known,
   for (const double ratio : kUnitRatios) {
     for (const double scale : {1.0 / ratio, ratio}) {
       if (size * scale < kLeastSizeRatio * map_size ||
-          size * scale > kMostSizeRatio * map_size) {
+          size * scale > kMostSizeRatio * map_size ||
+          line_length * scale > kMostLineLength) {
         continue;
       }
       const std::vector<Place> scaled = places_of(scale, false);

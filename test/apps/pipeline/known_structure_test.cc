@@ -612,6 +612,34 @@ TEST(PlanPlacementTest, APlanInAnotherUnitIsToldAsOne) {
   }
 }
 
+// In millimetres for metres, with so many lines, and most of them so short,
+// that nothing but their sum shows that they are no building's.
+TEST(PlanPlacementTest, TooManyLinesForABuildingAreOfAnotherUnit) {
+  KnownStructure known;
+  const std::vector<PlanLine> room = UnevenRoom();
+  const std::vector<Wall> walls = WallsOf(room, Pose2(1.0, 2.0, 0.3));
+  const Eigen::Vector2d inside = 0.5 * (room.front().begin + room.front().end);
+  for (int copy = 0; copy < 5; ++copy) {
+    for (const PlanLine& wall : room) {
+      known.plan.push_back(wall);
+      PlanLine stub;
+      stub.begin = inside;
+      stub.end = inside + Eigen::Vector2d(0.003, 0.0);
+      known.plan.push_back(stub);
+      known.plan.push_back(stub);
+    }
+  }
+  for (PlanLine& line : known.plan) {
+    line.begin *= 1000.0;
+    line.end *= 1000.0;
+  }
+  const PlanPlacement placement = PlacePlan(known, walls);
+  EXPECT_FALSE(placement.map_in_plan);
+  EXPECT_THAT(placement.note, HasSubstr("km of lines"));
+  EXPECT_THAT(placement.note, HasSubstr("1000.00 times smaller"));
+  EXPECT_THAT(placement.note, HasSubstr("$INSUNITS"));
+}
+
 // A third of the walls at most can agree, but nearly all of those there.
 TEST(PlanPlacementTest, APlanOfAPartOfTheBuildingIsUsed) {
   KnownStructure known;

@@ -112,8 +112,24 @@ std::string OwnPath() {
   return error ? "plumbline_sweep" : path.string();
 }
 
+// The working folder may have been removed.
+[[noreturn]] void FailWithoutWorkingFolder(const std::string& place,
+                                           const std::error_code& error) {
+  throw Error(place, 0,
+              "the working folder is not there (" + error.message() + ")",
+              "a working folder");
+}
+
+fs::path Absolute(const std::string& place, const std::string& path) {
+  std::error_code error;
+  fs::path absolute = fs::absolute(path, error);
+  if (error) FailWithoutWorkingFolder(place, error);
+  return absolute;
+}
+
 bool IsProgram(const fs::path& path) {
-  return fs::is_regular_file(path) && access(path.c_str(), X_OK) == 0;
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored) && access(path.c_str(), X_OK) == 0;
 }
 
 // Absolute path of a program: with a slash from here, otherwise beside this
@@ -121,14 +137,17 @@ bool IsProgram(const fs::path& path) {
 std::string FindProgram(const std::string& name) {
   std::vector<fs::path> places;
   if (name.find('/') != std::string::npos) {
-    places.push_back(fs::absolute(name));
+    places.push_back(Absolute(name, name));
   } else {
     places.push_back(fs::path(OwnPath()).parent_path() / name);
     const char* const path = std::getenv("PATH");
     std::istringstream folders(path == nullptr ? "" : path);
     std::string folder;
     while (std::getline(folders, folder, ':')) {
-      places.push_back(fs::absolute(folder.empty() ? "." : folder) / name);
+      std::error_code error;
+      const fs::path place =
+          fs::absolute(folder.empty() ? "." : folder, error) / name;
+      if (!error) places.push_back(place);
     }
   }
   for (const fs::path& place : places) {
@@ -176,7 +195,9 @@ SweepDefinition DefinitionFromFlags(const std::vector<std::string>& command) {
   definition.command = command;
   definition.command[0] = FindProgram(command[0]);
   definition.evaluate = EvaluateCommand();
-  definition.working_directory = fs::current_path().string();
+  std::error_code error;
+  definition.working_directory = fs::current_path(error).string();
+  if (error) FailWithoutWorkingFolder("plumbline_sweep", error);
   if (const char* datasets = std::getenv("PLUMBLINE_DATASETS")) {
     definition.environment.emplace_back("PLUMBLINE_DATASETS", datasets);
   }
@@ -537,7 +558,7 @@ int Run(const std::vector<std::string>& command) {
     return UsageError("--minimize and --maximize: expected one of them");
   }
   const std::string folder =
-      fs::absolute(FLAGS_output_dir).lexically_normal().string();
+      Absolute("--output_dir", FLAGS_output_dir).lexically_normal().string();
   if (!FLAGS_run.empty()) return RunOne(folder);
   if (!FLAGS_grid.empty() && command.empty()) {
     return UsageError("--grid without a command: expected it behind --");

@@ -109,11 +109,17 @@ bool MoveFile(const fs::path& from, const fs::path& target) {
 }
 
 // Those of a folder and the folders that it lies in that are not there, the
-// innermost first.
+// innermost first. Throws Error when the working folder was removed, from which
+// a relative path would lead nowhere.
 std::vector<fs::path> MissingFolders(const fs::path& folder) {
   std::vector<fs::path> missing;
   std::error_code error;
   fs::path path = fs::absolute(folder, error).lexically_normal();
+  if (error) {
+    throw Error(folder.string(), 0,
+                "the working folder is not there (" + error.message() + ")",
+                "a working folder, or a path from the root on");
+  }
   // "out/" is "out".
   if (path.filename().empty()) path = path.parent_path();
   while (fs::symlink_status(path, error).type() == fs::file_type::not_found) {

@@ -255,8 +255,8 @@ std::unique_ptr<EarlierMap> EarlierMapFromFlags(const Registry& registry) {
   ReadGraphJson(input, FLAGS_map, registry, &map->graph);
   std::error_code error;
   if (std::filesystem::equivalent(
-          std::filesystem::absolute(FLAGS_map).parent_path(), FLAGS_output_dir,
-          error)) {
+          std::filesystem::absolute(FLAGS_map, error).parent_path(),
+          FLAGS_output_dir, error)) {
     throw Error("--output_dir", 0, "is the folder of --map", "another folder");
   }
   return map;

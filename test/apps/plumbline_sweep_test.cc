@@ -457,6 +457,16 @@ TEST_F(SweepBinaryTest, RefusesWhatMakesNoSweep) {
   EXPECT_EQ(Run(out + "--run=x=1", &output), 2);
   EXPECT_THAT(output, HasSubstr("holds no sweep"));
   EXPECT_EQ(Run("--output_dir=/dev/null/x -- " + program_, &output), 2);
+  // A working folder that was removed.
+  for (const std::string& folder : {std::string("out"), folder_ + "/out"}) {
+    const std::string gone = folder_ + "/gone";
+    EXPECT_EQ(RunInShell("mkdir " + gone + " && cd " + gone + " && rmdir " +
+                             gone + " && " + binary_ + " --output_dir=" +
+                             folder + " --grid=x=1 -- " + program_,
+                         &output),
+              2);
+    EXPECT_THAT(output, HasSubstr("the working folder is not there"));
+  }
   EXPECT_FALSE(fs::exists(folder_ + "/out"));
 
   ASSERT_EQ(Run(out + "--grid=x=1 -- " + program_, &output), 0) << output;

@@ -321,6 +321,28 @@ TEST_F(OutputFolderTest, AFailedRunChangesNothing) {
   EXPECT_EQ(Files(), (Names{"a.txt", "summary.json"}));
 }
 
+// In a process of its own, whose working folder is removed.
+TEST_F(OutputFolderTest, ARelativeFolderNeedsAWorkingFolder) {
+  const fs::path gone = root_ / "gone";
+  fs::create_directories(gone);
+  const pid_t child = fork();
+  if (child == 0) {
+    alarm(60);
+    if (chdir(gone.c_str()) != 0 || rmdir(gone.c_str()) != 0) _exit(9);
+    try {
+      const OutputFolder out("out", kOwn, {});
+      _exit(1);
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      _exit(what.find("out: the working folder is not there") == 0 ? 0 : 2);
+    }
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
 TEST_F(OutputFolderTest, AFolderThatVanishedIsMadeAgain) {
   OutputFolder out(folder_, kOwn, {});
   fs::remove_all(folder_);

@@ -104,7 +104,10 @@ void KeepMemory() {
 #endif
 }
 
-void CatchInterrupts(bool end_at_once) {
+void CatchSignals(bool end_at_once) {
+  // A write beyond the limit on the size of files (ulimit -f) then fails as one
+  // on a full disk does, in place of ending the process half way.
+  std::signal(SIGXFSZ, SIG_IGN);
   has_terminal = isatty(STDERR_FILENO);
   struct sigaction action = {};
   action.sa_handler = end_at_once ? EndAtInterrupt : HandleInterrupt;
@@ -366,7 +369,7 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc,
     static const std::string name = info.name;
     google::InitGoogleLogging(name.c_str());
   }
-  CatchInterrupts(info.interrupts_end_it);
+  CatchSignals(info.interrupts_end_it);
   return arguments;
 }
 

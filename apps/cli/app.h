@@ -66,7 +66,8 @@ struct AppInfo {
 };
 
 /// Parses the command line (and --flagfile, command_line.h; --fromenv), starts
-/// glog (warnings and worse, on stderr only) and catches Ctrl-C and SIGTERM.
+/// glog (warnings and worse, on stderr only) and catches Ctrl-C and SIGTERM; a
+/// write beyond the limit on the size of files is an error like any other.
 /// Returns the arguments that are no flags.
 ///
 /// Ends the process: with status 0 after --help and --version, and after

@@ -681,6 +681,70 @@ bool IsOurBag(const fs::path& folder, const std::string& database) {
           digests.count(Sha256OfFile((folder / database).string())) > 0);
 }
 
+// Folders on the way to one, itself included, that are not there yet, the
+// innermost first.
+std::vector<fs::path> MissingFolders(const fs::path& folder) {
+  std::vector<fs::path> missing;
+  std::error_code error;
+  fs::path path = folder.lexically_normal();
+  // "bag/" is "bag".
+  if (path.filename().empty()) path = path.parent_path();
+  while (!path.empty() && !fs::exists(fs::symlink_status(path, error))) {
+    missing.push_back(path);
+    path = path.parent_path();
+  }
+  return missing;
+}
+
+// Takes back what was begun of a bag unless it is done: the description that
+// was there before, or none, and no folder that was made for it.
+class BeginningOfBag {
+ public:
+  BeginningOfBag(const fs::path& folder, const std::string& database)
+      : metadata_(folder / kMetadata),
+        database_(folder / database),
+        made_(MissingFolders(folder)) {
+    std::error_code error;
+    has_old_ = fs::exists(metadata_, error);
+    has_old_database_ = fs::exists(database_, error);
+    if (!has_old_) return;
+    std::ifstream file(metadata_, std::ios::binary);
+    old_.assign(std::istreambuf_iterator<char>(file), {});
+  }
+  ~BeginningOfBag() {
+    if (is_done_) return;
+    std::error_code ignored;
+    if (!has_old_database_) fs::remove(database_, ignored);
+    if (!has_old_) {
+      fs::remove(metadata_, ignored);
+    } else if (!is_old_replaced_) {
+      try {
+        WriteFileAtomically(metadata_.string(),
+                            [this](std::ostream& out) { out << old_; });
+      } catch (const Error&) {
+        // The description that says nothing but whose the bag is stays.
+      }
+    }
+    // Only those that are empty go.
+    for (const fs::path& folder : made_) fs::remove(folder, ignored);
+  }
+  BeginningOfBag(const BeginningOfBag&) = delete;
+  BeginningOfBag& operator=(const BeginningOfBag&) = delete;
+
+  // The new database is there, which an older description is not of.
+  void DatabaseIsWritten() { is_old_replaced_ = has_old_database_; }
+  void Done() { is_done_ = true; }
+
+ private:
+  fs::path metadata_, database_;
+  std::vector<fs::path> made_;
+  std::string old_;
+  bool has_old_ = false;
+  bool has_old_database_ = false;
+  bool is_old_replaced_ = false;
+  bool is_done_ = false;
+};
+
 // What LaserScan and MultiEchoLaserScan begin with.
 void EncodeScanUpToRanges(const LaserScanMessage& message, Encoder* encoder) {
   encoder->Header(message.header);
@@ -846,6 +910,7 @@ void WriteRosbag2(const std::vector<BagRecord>& records,
                 "a new or empty folder, or a ROS 2 bag that was simulated "
                 "there and not changed");
   }
+  BeginningOfBag beginning(path, file);
   fs::create_directories(path, error);
   if (error) {
     throw Error(folder, 0, "cannot be made: " + error.message(),
@@ -866,6 +931,7 @@ void WriteRosbag2(const std::vector<BagRecord>& records,
   if (fs::exists(whole, error)) digests.insert(Sha256OfFile(whole));
   write(metadata, SignedMetadata(digests, ""));
   write(whole, database);
+  beginning.DatabaseIsWritten();
   std::vector<std::int64_t> counts(topics.size(), 0);
   for (const std::size_t topic : topic_of) ++counts[topic];
   std::int64_t begin = records.empty() ? 0 : records.front().time;
@@ -901,6 +967,7 @@ void WriteRosbag2(const std::vector<BagRecord>& records,
           "  relative_file_paths:\n    - "
        << file << '\n';
   write(metadata, SignedMetadata({digest}, text.str()));
+  beginning.Done();
 }
 
 std::vector<BagRecord> SimulatedMessages(const Simulation& simulation,

@@ -61,7 +61,10 @@ std::string MakeMcap(const std::vector<BagRecord>& records,
 
 /// Writes a ROS 2 bag, a folder with metadata.yaml and a .db3, with these
 /// messages, packed as CDR. Until both are there, metadata.yaml names no file.
-/// Throws Error when it cannot, or when there is something at `folder` that is
+/// Throws Error when it cannot, and then leaves what was there before, or
+/// nothing (only where the new database could be written and its description
+/// could not, in the place of an older bag: a metadata.yaml that names no
+/// file); or when there is something at `folder` that is
 /// not provably, by the digests in its metadata.yaml, a bag that this wrote and
 /// nobody changed.
 void WriteRosbag2(const std::vector<BagRecord>& records,

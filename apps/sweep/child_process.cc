@@ -58,6 +58,7 @@ int OpenInput(const std::string& text) {
   signal(SIGINT, SIG_DFL);
   signal(SIGTERM, SIG_DFL);
   signal(SIGPIPE, SIG_DFL);
+  signal(SIGXFSZ, SIG_DFL);
   dup2(input, STDIN_FILENO);
   if (output >= 0) {
     dup2(output, STDOUT_FILENO);

@@ -106,29 +106,52 @@ TEST_F(WriteRosbag2Test, ABagThatWasChangedStays) {
   }
 }
 
-// A run that ends between the files, as here by a limit on their size, says so
-// and can be repeated.
-TEST_F(WriteRosbag2Test, HalfABagIsReplaced) {
-  WriteRosbag2(Messages(3), bag_);
-  const std::string old = Files().at("bag_0.db3");
+// The message of writing so many messages with a limit on the size of files.
+std::string WhyNotWithin(rlim_t limit, const std::vector<BagRecord>& messages,
+                         const fs::path& bag) {
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   rlimit before;
   getrlimit(RLIMIT_FSIZE, &before);
   rlimit small = before;
-  small.rlim_cur = 4096;
+  small.rlim_cur = limit;
   setrlimit(RLIMIT_FSIZE, &small);
   std::string what;
   try {
-    WriteRosbag2(Messages(500), bag_);
+    WriteRosbag2(messages, bag);
   } catch (const Error& error) {
     what = error.what();
   }
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
-  EXPECT_THAT(what, HasSubstr("File too large"));
-  EXPECT_EQ(Files().at("bag_0.db3"), old);
-  EXPECT_THAT(Files().at("metadata.yaml"),
-              ::testing::Not(HasSubstr("relative_file_paths")));
+  return what;
+}
+
+TEST_F(WriteRosbag2Test, ABagThatCannotBeWrittenLeavesTheOneBefore) {
+  WriteRosbag2(Messages(3), bag_);
+  const std::map<std::string, std::string> old = Files();
+  EXPECT_THAT(WhyNotWithin(4096, Messages(500), bag_),
+              HasSubstr("File too large"));
+  EXPECT_EQ(Files(), old);
+  WriteRosbag2(Messages(5), bag_);
+  EXPECT_THAT(Files().at("metadata.yaml"), HasSubstr("message_count: 5"));
+}
+
+TEST_F(WriteRosbag2Test, ABagThatCannotBeWrittenLeavesNothingOfItself) {
+  EXPECT_THAT(WhyNotWithin(4096, Messages(500), bag_ / "deep" / "bag"),
+              HasSubstr("File too large"));
+  EXPECT_FALSE(fs::exists(bag_));
+  // A folder that was there stays.
+  fs::create_directories(bag_);
+  EXPECT_THAT(WhyNotWithin(4096, Messages(500), bag_),
+              HasSubstr("File too large"));
+  EXPECT_TRUE(Files().empty());
+}
+
+// The description that a run leaves that is killed between the files tells no
+// more than whose they are.
+TEST_F(WriteRosbag2Test, HalfABagIsReplaced) {
+  WriteRosbag2(Messages(3), bag_);
+  fs::remove(bag_ / "bag_0.db3");
   WriteRosbag2(Messages(5), bag_);
   EXPECT_THAT(Files().at("metadata.yaml"), HasSubstr("message_count: 5"));
 }

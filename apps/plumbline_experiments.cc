@@ -55,12 +55,14 @@ namespace {
 std::vector<std::string> SelectedExperiments() {
   const std::vector<std::string>& names = ExperimentNames();
   if (FLAGS_experiment == "all") return names;
+  const char* const expected =
+      "S1, S2, S3, S4, S5, S6, R1, R2, B1, B2, N1 or all";
+  if (FLAGS_experiment.empty()) {
+    throw FlagError("experiment", "it is missing", expected);
+  }
   if (std::find(names.begin(), names.end(), FLAGS_experiment) == names.end()) {
     throw Error("--experiment", 0,
-                FLAGS_experiment.empty()
-                    ? "it is missing"
-                    : "there is no experiment '" + FLAGS_experiment + "'",
-                "S1, S2, S3, S4, S5, S6, R1, R2, B1, B2, N1 or all");
+                "there is no experiment '" + FLAGS_experiment + "'", expected);
   }
   return {FLAGS_experiment};
 }
@@ -117,7 +119,7 @@ void CheckFolder(const std::string& folder) {
 int Run() {
   const std::vector<std::string> selected = SelectedExperiments();
   if (FLAGS_output_dir.empty()) {
-    throw Error("--output_dir", 0, "it is missing", "a folder");
+    throw FlagError("output_dir", "it is missing", "a folder");
   }
   std::error_code error;
   std::filesystem::create_directories(FLAGS_output_dir, error);

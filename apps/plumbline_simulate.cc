@@ -307,8 +307,9 @@ void CheckCompression() {
 
 int Run() {
   if (FLAGS_world.empty() || FLAGS_output.empty()) {
-    throw Error("plumbline_simulate", 0, "a flag is missing",
-                "--world and --output (--help explains them)");
+    throw FlagError(FLAGS_world.empty() ? "world" : "output", "it is missing",
+                    FLAGS_world.empty() ? "a world (--help lists them)"
+                                        : "a file to write");
   }
   const bool is_file = !IsSynthetic(FLAGS_world) && !IsBuiltIn(FLAGS_world) &&
                        !IsBent(FLAGS_world);

@@ -4,6 +4,7 @@
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/detector.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/number_text.h>
 #include <plumbline/core/parallel_for.h>
 #include <plumbline/detectors/structure_prior.h>
 #include <plumbline/pipeline/plan_dxf.h>
@@ -139,10 +140,11 @@ DEFINE_string(detector_parameters, "",
               "detector.name=value, separated by commas; they come before the "
               "flags that say the same");
 DEFINE_string(allowed_angles, "0,45,90,135",
-              "Angles between orientations that are looked for, degrees");
+              "Angles between orientations that are looked for, degrees from "
+              "-360 to 360, separated by commas");
 DEFINE_double(angle_resolution, 0.0,
               "Look for all multiples of this angle in place of "
-              "--allowed_angles, degrees; 0: not set");
+              "--allowed_angles, degrees, at least 0.01; 0: not set");
 PLUMBLINE_FLAG_RANGE(angle_resolution, 0.0, 90.0);
 DEFINE_string(structure_prior, "",
               "File that says which relations and angles are expected, and how "
@@ -256,6 +258,8 @@ namespace {
 
 // Bytes.
 constexpr std::size_t kLargestPrior = std::size_t{1} << 24;
+// Degrees; as orientation_relation has it.
+constexpr double kSmallestResolution = 0.01;
 
 std::optional<double> ParseOptional(const std::string& flag,
                                     const std::string& text) {
@@ -265,7 +269,7 @@ std::optional<double> ParseOptional(const std::string& flag,
       std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc() || result.ptr != text.data() + text.size() ||
       !std::isfinite(value)) {
-    throw Error("--" + flag, 0, "cannot read '" + text + "'", "a number");
+    throw FlagError(flag, "cannot read '" + text + "'", "a number");
   }
   return value;
 }
@@ -273,7 +277,7 @@ std::optional<double> ParseOptional(const std::string& flag,
 // Throws unless a flag's value is what was expected.
 void Require(const std::string& flag, const std::string& value, bool is_so,
              const std::string& expected) {
-  if (!is_so) throw Error("--" + flag, 0, "is " + value, expected);
+  if (!is_so) throw FlagError(flag, "is " + value, expected);
 }
 
 std::vector<double> ParseList(const std::string& flag,
@@ -285,8 +289,8 @@ std::vector<double> ParseList(const std::string& flag,
     if (end == std::string::npos) end = text.size();
     const auto value = ParseOptional(flag, text.substr(begin, end - begin));
     if (!value) {
-      throw Error("--" + flag, 0, "an empty entry in '" + text + "'",
-                  "numbers separated by commas");
+      throw FlagError(flag, "an empty entry in '" + text + "'",
+                      "numbers separated by commas");
     }
     values.push_back(*value);
     begin = end + 1;
@@ -333,11 +337,19 @@ std::map<std::string, DetectorParameters> DetectorParametersFromFlags(
   set("same_wall", "sigma_offset", FLAGS_structure_sigma_same_wall);
   set("same_wall", "sigma_angle_deg", FLAGS_structure_sigma_same_wall_angle);
   if (FLAGS_angle_resolution > 0.0) {
+    std::string value;
+    AppendNumber(FLAGS_angle_resolution, &value);
+    Require("angle_resolution", value,
+            FLAGS_angle_resolution >= kSmallestResolution,
+            "0, or 0.01 to 90 degrees");
     set("orientation_relation", "resolution_deg", FLAGS_angle_resolution);
   } else {
     const std::vector<double> angles =
         ParseList("allowed_angles", FLAGS_allowed_angles);
     for (std::size_t i = 0; i < angles.size(); ++i) {
+      Require("allowed_angles", "'" + FLAGS_allowed_angles + "'",
+              std::abs(angles[i]) <= 360.0,
+              "degrees within a turn, separated by commas");
       set("orientation_relation", "angle_" + std::to_string(i), angles[i]);
     }
   }
@@ -510,8 +522,8 @@ void TakeKnownStructureFlags(LogSolverOptions* options) {
     if (!FLAGS_plan_pose.empty()) {
       const std::vector<double> pose = ParseList("plan_pose", FLAGS_plan_pose);
       if (pose.size() != 3) {
-        throw Error("--plan_pose", 0, "'" + FLAGS_plan_pose + "'",
-                    "x,y,degrees: 3.5,-1,90");
+        throw FlagError("plan_pose", "is '" + FLAGS_plan_pose + "'",
+                        "x,y,degrees: 3.5,-1,90");
       }
       known.plan_pose =
           Pose2(pose[0], pose[1], NormalizeAngle(DegToRad(pose[2])));

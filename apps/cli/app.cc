@@ -398,6 +398,9 @@ int RunMain(const std::function<int()>& run) {
   } catch (const Interruption&) {
     std::fprintf(stderr, "interrupted\n");
     status = kExitInterrupted;
+  } catch (const FlagError& error) {
+    std::fprintf(stderr, "%s\n", PrintableLines(error.what()).c_str());
+    status = kExitUsage;
   } catch (const Error& error) {
     std::fprintf(stderr, "%s\n", PrintableLines(error.what()).c_str());
     status = kExitInput;

@@ -20,8 +20,8 @@ enum ExitStatus {
   /// that does not parse or is out of its range, a flag that is missing.
   kExitUsage = 1,
   /// Whatever an Error says: wrong input, a flag that only a closer look shows
-  /// to be wrong (names, lists, flags that do not go together, files that are
-  /// not there), output that cannot be written.
+  /// to be wrong (names, lists of names, flags that do not go together, files
+  /// that are not there), output that cannot be written.
   kExitInput = 2,
   /// Any other exception.
   kExitInternal = 3,
@@ -83,9 +83,9 @@ std::vector<std::string> ParseFlags(const AppInfo& info, int argc, char** argv);
 bool OnlyChecksFlags();
 
 /// Runs a binary's work and returns the process's exit status: what `run`
-/// returns; kExitInput when it throws an Error (its message goes to stderr);
-/// kExitInternal for any other exception; kExitInterrupted when it succeeded
-/// but was cut short by Ctrl-C.
+/// returns; kExitUsage when it throws a FlagError and kExitInput for any other
+/// Error (their messages go to stderr); kExitInternal for any other exception;
+/// kExitInterrupted when it succeeded but was cut short by Ctrl-C.
 int RunMain(const std::function<int()>& run);
 
 /// Thrown when the user pressed Ctrl-C before there was anything to write:
@@ -96,6 +96,16 @@ struct Interruption {};
 /// Interruption at Ctrl-C while it waits for a pipe.
 std::string ReadTextInput(const std::string& path, std::size_t limit);
 
+/// What is wrong with a command line by itself: a flag that is missing, a value
+/// that cannot be read or is out of its range. RunMain then returns kExitUsage.
+class FlagError : public Error {
+ public:
+  /// `flag` without dashes.
+  FlagError(const std::string& flag, const std::string& what_is_wrong,
+            const std::string& expected)
+      : Error("--" + flag, 0, what_is_wrong, expected) {}
+};
+
 /// Does what the value of a flag says. What a library finds wrong with it is
 /// then said of the flag: "--hierarchy: unknown detector ...".
 template <typename Function>
@@ -103,6 +113,8 @@ auto ForFlag(const std::string& name, const Function& function)
     -> decltype(function()) {
   try {
     return function();
+  } catch (const FlagError&) {
+    throw;
   } catch (const Error& error) {
     throw error.WithPlace("--" + name);
   }

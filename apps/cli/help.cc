@@ -165,7 +165,8 @@ std::map<int, std::string> Statuses(const AppInfo& info) {
        "missing"},
       {kExitInput,
        "Wrong input; a flag that only a closer look shows to be wrong (names, "
-       "lists, flags that do not go together, files that are not there); or "
+       "lists of names, flags that do not go together, files that are not "
+       "there); or "
        "output that cannot be written"},
       {kExitInternal, "Any other failure, such as a lack of memory"},
       {kExitInterrupted,

@@ -151,13 +151,13 @@ TEST_F(ExperimentsBinaryTest, SaysWhatItSkips) {
 TEST_F(ExperimentsBinaryTest, RefusesWrongFlags) {
   std::string output;
   const std::string good = " --output_dir=" + folder_;
-  EXPECT_EQ(Run("plumbline_experiments" + good, &output), 2);
+  EXPECT_EQ(Run("plumbline_experiments" + good, &output), 1);
   EXPECT_THAT(output, HasSubstr("--experiment: it is missing"));
   EXPECT_EQ(Run("plumbline_experiments --experiment=S9" + good, &output), 2);
   EXPECT_THAT(output,
               HasSubstr("S1, S2, S3, S4, S5, S6, R1, R2, B1, B2, N1 or all"));
-  EXPECT_EQ(Run("plumbline_experiments --experiment=S6", &output), 2);
-  EXPECT_THAT(output, HasSubstr("--output_dir"));
+  EXPECT_EQ(Run("plumbline_experiments --experiment=S6", &output), 1);
+  EXPECT_THAT(output, HasSubstr("--output_dir: it is missing"));
   EXPECT_EQ(
       Run("plumbline_experiments --experiment=S6 --trials=0" + good, &output),
       1);
@@ -208,6 +208,15 @@ TEST_F(ExperimentsBinaryTest, SimulateWritesTheGraphOfAWorld) {
   }
   EXPECT_EQ(graph.GetConstraint(77).expected,
             world.graph->GetConstraint(77).expected);
+}
+
+TEST_F(ExperimentsBinaryTest, SimulateNeedsAWorldAndAPlaceToWrite) {
+  std::string output;
+  EXPECT_EQ(Run("plumbline_simulate --world=office", &output), 1);
+  EXPECT_THAT(output, HasSubstr("--output: it is missing"));
+  EXPECT_EQ(Run("plumbline_simulate --output=" + folder_ + "/a.clf", &output),
+            1);
+  EXPECT_THAT(output, HasSubstr("--world: it is missing"));
 }
 
 TEST_F(ExperimentsBinaryTest, SimulateRefusesWhatAGraphHasNot) {

@@ -2237,14 +2237,36 @@ TEST_F(SolveTest, Usage) {
 TEST_F(SolveTest, AbsurdFlags) {
   const std::string log = Write("office.log", Join(OfficeLines(20)));
   std::string output;
-  for (const char* flag :
-       {"--delta_threshold=2", "--delta_threshold=nan", "--delta_threshold=x",
-        "--delta_mode=sometimes", "--link_radius=0", "--link_radius=-1",
-        "--link_radius=inf", "--association_depth=0", "--em_every=-1",
-        "--em_max_iterations=0", "--num_threads=-1", "--num_threads=1e9",
-        "--seed=-1", "--angle_resolution=-5", "--usable_range=0",
-        "--structure_sigma_segment_orientation=0", "--refine=perhaps",
-        "--no_such_flag=1", "argument"}) {
+  for (const char* flag : {"--delta_threshold=2",
+                           "--delta_threshold=nan",
+                           "--delta_threshold=x",
+                           "--delta_mode=sometimes",
+                           "--link_radius=0",
+                           "--link_radius=-1",
+                           "--link_radius=inf",
+                           "--association_depth=0",
+                           "--em_every=-1",
+                           "--em_max_iterations=0",
+                           "--num_threads=-1",
+                           "--num_threads=1e9",
+                           "--seed=-1",
+                           "--angle_resolution=-5",
+                           "--usable_range=0",
+                           "--structure_sigma_segment_orientation=0",
+                           "--refine=perhaps",
+                           "--allowed_angles=x",
+                           "--allowed_angles=nan",
+                           "--allowed_angles=0,,90",
+                           "--allowed_angles=1e9",
+                           "--allowed_angles=",
+                           "--angle_resolution=1e-6",
+                           "--laser_start_angle=x",
+                           "--laser_start_angle=361",
+                           "--laser_step=nan",
+                           "--laser_step=0",
+                           "--laser_max_range=-1",
+                           "--no_such_flag=1",
+                           "argument"}) {
     EXPECT_EQ(Solve(log, "out", flag, &output), 1) << flag;
     std::string name = flag;
     name = name.substr(0, name.find('='));
@@ -2256,18 +2278,18 @@ TEST_F(SolveTest, AbsurdFlags) {
   EXPECT_THAT(output, StartsWith("--delta_threshold=-0.1: out of range"));
   EXPECT_EQ(Solve(log, "out", "--seed=-5", &output), 1);
   EXPECT_THAT(output, StartsWith("--seed=-5: cannot be read: expected"));
+  EXPECT_EQ(Solve(log, "out", "--angle_resolution=1e-9", &output), 1);
+  EXPECT_THAT(output, StartsWith("--angle_resolution: is 1e-09: expected 0, or "
+                                 "0.01 to 90 degrees"));
   // Those that only a closer look shows to be wrong.
   for (const char* flag :
        {"--hierarchy=no_such_detector",
         "--hierarchy=orientation_relation/orientation_mixture",
-        "--allowed_angles=x", "--allowed_angles=0,,90", "--allowed_angles=1e9",
-        "--allowed_angles=", "--angle_resolution=1e-6", "--laser_start_angle=x",
         "--detector_parameters=sigma",
         "--detector_parameters=no_such_detector.sigma=1",
         "--detector_parameters=orientation_mixture.no_such=1",
         "--detector_parameters=orientation_mixture.sigma_deg=-1",
-        "--log_reader=no_such_reader", "--outputs=no_such_file",
-        "--laser_step=nan", "--laser_step=0", "--laser_max_range=-1"}) {
+        "--log_reader=no_such_reader", "--outputs=no_such_file"}) {
     EXPECT_EQ(Solve(log, "out", flag, &output), 2) << flag << "\n" << output;
     EXPECT_THAT(output, HasSubstr(": expected ")) << flag;
     // Under the name of the flag, and no source file's.

@@ -19,6 +19,7 @@
 #include <plumbline/apps/figures/line_plot.h>
 #include <plumbline/core/atomic_file.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/number_text.h>
 #include <plumbline/core/utf8.h>
 
 #include <algorithm>
@@ -105,19 +106,37 @@ using Json = nlohmann::ordered_json;
 // So few of the poses match by coincidence, too.
 constexpr double kSmallShare = 0.1;
 
+// A figure that is of something; null else: the errors of what was not found
+// are not 0, and a share of nothing is not 1.
+Json Known(double value, bool is_known) {
+  return is_known ? Json(value) : Json(nullptr);
+}
+
+// The same for people, with as many digits behind the point.
+std::string KnownText(double value, bool is_known, int decimals) {
+  if (!is_known) return "-";
+  std::string text;
+  AppendFixed(value, decimals, &text);
+  return text;
+}
+
 Json ToJson(const ErrorStatistics& statistics) {
-  return Json{{"mean", statistics.mean},
-              {"std", statistics.standard_deviation},
-              {"max", statistics.maximum},
+  const bool is_known = statistics.count > 0;
+  return Json{{"mean", Known(statistics.mean, is_known)},
+              {"std", Known(statistics.standard_deviation, is_known)},
+              {"max", Known(statistics.maximum, is_known)},
               {"n", statistics.count}};
 }
 
 void PrintRow(const std::string& name, const std::string& unit,
               const ErrorStatistics& statistics) {
-  std::printf("%-28s %-6s mean %10.4f  std %10.4f  max %10.4f  n %zu\n",
-              name.c_str(), unit.c_str(), statistics.mean,
-              statistics.standard_deviation, statistics.maximum,
-              statistics.count);
+  const auto text = [&statistics](double value) {
+    return KnownText(value, statistics.count > 0, 4);
+  };
+  std::printf("%-28s %-6s mean %10s  std %10s  max %10s  n %zu\n", name.c_str(),
+              unit.c_str(), text(statistics.mean).c_str(),
+              text(statistics.standard_deviation).c_str(),
+              text(statistics.maximum).c_str(), statistics.count);
 }
 
 Json EvaluateAgainstRelations(const std::vector<TimedPose>& trajectory) {
@@ -339,9 +358,12 @@ Json TellPoses(const PoseErrors& errors) {
 void PrintMap(const MapTruthEvaluation& evaluation, std::size_t found) {
   PrintRow("wall direction error", "deg", evaluation.direction_error_deg);
   PrintRow("wall offset error", "m", evaluation.offset_error);
-  std::printf("walls: %zu of %zu found; recall %.4f, precision %.4f (length)\n",
-              found, evaluation.walls.size(), evaluation.recall,
-              evaluation.precision);
+  std::printf(
+      "walls: %zu of %zu found; recall %s, precision %s (length)\n", found,
+      evaluation.walls.size(),
+      KnownText(evaluation.recall, evaluation.asked_length > 0.0, 4).c_str(),
+      KnownText(evaluation.precision, evaluation.judged_length > 0.0, 4)
+          .c_str());
   std::printf("missed walls: %zu", evaluation.missed_walls.size());
   PrintIds(evaluation.missed_walls);
   std::printf("false walls: %zu", evaluation.false_walls.size());
@@ -351,7 +373,9 @@ void PrintMap(const MapTruthEvaluation& evaluation, std::size_t found) {
   PrintAngles("false orientations", evaluation.false_orientations_deg);
   std::printf("duplicate orientations: %d\n",
               evaluation.duplicate_orientations);
-  std::printf("bend error: %.3f deg", evaluation.bend_error_deg);
+  std::printf("bend error: %s deg", KnownText(evaluation.bend_error_deg,
+                                              !evaluation.directions.empty(), 3)
+                                        .c_str());
   const char* separator = " (";
   for (const DirectionResult& direction : evaluation.directions) {
     std::printf("%s%.2f %+.3f", separator, direction.angle_deg,
@@ -408,38 +432,48 @@ Json TellClosures(const ClosureEvaluation& closures) {
 Json TellRooms(const RoomEvaluation& rooms) {
   std::printf(
       "rooms: %d of %d found, %d of %d drawn are none of the true; mean IoU "
-      "%.3f, precision %.3f, recall %.3f\n",
-      rooms.found, rooms.asked, rooms.not_true, rooms.drawn, rooms.mean_iou,
-      rooms.precision, rooms.recall);
-  return Json{{"asked", rooms.asked},       {"found", rooms.found},
-              {"drawn", rooms.drawn},       {"not_true", rooms.not_true},
-              {"mean_iou", rooms.mean_iou}, {"precision", rooms.precision},
-              {"recall", rooms.recall},     {"iou", rooms.iou}};
+      "%s, precision %s, recall %s\n",
+      rooms.found, rooms.asked, rooms.not_true, rooms.drawn,
+      KnownText(rooms.mean_iou, rooms.asked > 0, 3).c_str(),
+      KnownText(rooms.precision, rooms.judged > 0, 3).c_str(),
+      KnownText(rooms.recall, rooms.asked > 0, 3).c_str());
+  return Json{{"asked", rooms.asked},
+              {"found", rooms.found},
+              {"drawn", rooms.drawn},
+              {"not_true", rooms.not_true},
+              {"mean_iou", Known(rooms.mean_iou, rooms.asked > 0)},
+              {"precision", Known(rooms.precision, rooms.judged > 0)},
+              {"recall", Known(rooms.recall, rooms.asked > 0)},
+              {"iou", rooms.iou}};
 }
 
 // Prints a plan against the truth and returns it.
 Json TellPlan(const PlanEvaluation& plan) {
   Json result{{"file", FLAGS_plan}, {"rooms", TellRooms(plan.rooms)}};
   std::printf(
-      "doors driven through: %d of %d found, width error %.3f m; %d of %d "
+      "doors driven through: %d of %d found, width error %s m; %d of %d "
       "drawn are none\n",
-      plan.doors_found, plan.doors_asked, plan.door_width_error,
+      plan.doors_found, plan.doors_asked,
+      KnownText(plan.door_width_error, plan.doors_found > 0, 3).c_str(),
       plan.doors_false, plan.doors_drawn);
   std::printf(
-      "walls of the plan: completeness %.3f, correctness %.3f; %d of %d ends "
+      "walls of the plan: completeness %s, correctness %s; %d of %d ends "
       "free, %d drawn twice\n",
-      plan.wall_completeness, plan.wall_correctness, plan.free_ends, plan.ends,
-      plan.double_walls);
-  result["doors"] = Json{{"asked", plan.doors_asked},
-                         {"found", plan.doors_found},
-                         {"drawn", plan.doors_drawn},
-                         {"false", plan.doors_false},
-                         {"width_error_m", plan.door_width_error}};
-  result["walls"] = Json{{"completeness", plan.wall_completeness},
-                         {"correctness", plan.wall_correctness},
-                         {"ends", plan.ends},
-                         {"free_ends", plan.free_ends},
-                         {"drawn_twice", plan.double_walls}};
+      KnownText(plan.wall_completeness, plan.has_seen_walls, 3).c_str(),
+      KnownText(plan.wall_correctness, plan.has_walls, 3).c_str(),
+      plan.free_ends, plan.ends, plan.double_walls);
+  result["doors"] = Json{
+      {"asked", plan.doors_asked},
+      {"found", plan.doors_found},
+      {"drawn", plan.doors_drawn},
+      {"false", plan.doors_false},
+      {"width_error_m", Known(plan.door_width_error, plan.doors_found > 0)}};
+  result["walls"] =
+      Json{{"completeness", Known(plan.wall_completeness, plan.has_seen_walls)},
+           {"correctness", Known(plan.wall_correctness, plan.has_walls)},
+           {"ends", plan.ends},
+           {"free_ends", plan.free_ends},
+           {"drawn_twice", plan.double_walls}};
   return result;
 }
 
@@ -456,11 +490,13 @@ Json EvaluateAgainstRooms() {
   const TracedEvaluation result =
       ForFlag("grid", [&] { return EvaluateTracedRooms(plan, rooms, space); });
   std::printf(
-      "rooms of %s: %d of %d seen, %d of them found; %d drawn; mean IoU %.3f, "
-      "precision %.3f, recall %.3f\n",
+      "rooms of %s: %d of %d seen, %d of them found; %d drawn; mean IoU %s, "
+      "precision %s, recall %s\n",
       PrintableUtf8(rooms.name).c_str(), result.seen, result.traced,
-      result.found, result.drawn, result.mean_iou, result.precision,
-      result.recall);
+      result.found, result.drawn,
+      KnownText(result.mean_iou, result.seen > 0, 3).c_str(),
+      KnownText(result.precision, result.judged > 0, 3).c_str(),
+      KnownText(result.recall, result.seen > 0, 3).c_str());
   const TracedPlacement& placement = result.placement;
   std::printf(
       "placed: overlap with free space %.3f, turned by %.1f degrees, scale "
@@ -479,9 +515,9 @@ Json EvaluateAgainstRooms() {
               {"seen", result.seen},
               {"found", result.found},
               {"drawn", result.drawn},
-              {"mean_iou", result.mean_iou},
-              {"precision", result.precision},
-              {"recall", result.recall},
+              {"mean_iou", Known(result.mean_iou, result.seen > 0)},
+              {"precision", Known(result.precision, result.judged > 0)},
+              {"recall", Known(result.recall, result.seen > 0)},
               {"iou", iou},
               {"placement",
                {{"overlap", placement.overlap},
@@ -519,29 +555,32 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
     plan =
         TellPlan(EvaluatePlan(ReadBuildingPlan(FLAGS_plan), truth, alignment));
   }
-  return Json{{"file", FLAGS_truth},
-              {"plan", plan},
-              {"poses", poses},
-              {"map", FLAGS_map},
-              {"alignment",
-               {evaluation.alignment[0], evaluation.alignment[1],
-                evaluation.alignment[2]}},
-              {"walls_found", found},
-              {"walls_asked", evaluation.walls.size()},
-              {"recall", evaluation.recall},
-              {"precision", evaluation.precision},
-              {"direction_error_deg", ToJson(evaluation.direction_error_deg)},
-              {"offset_error_m", ToJson(evaluation.offset_error)},
-              {"missed_walls", evaluation.missed_walls},
-              {"false_walls", evaluation.false_walls},
-              {"doubled_length_m", evaluation.doubled_length},
-              {"missed_orientations_deg", evaluation.missed_orientations_deg},
-              {"false_orientations_deg", evaluation.false_orientations_deg},
-              {"duplicate_orientations", evaluation.duplicate_orientations},
-              {"directions", DirectionsToJson(evaluation.directions)},
-              {"bend_error_deg", evaluation.bend_error_deg},
-              {"closures", closures},
-              {"walls", WallsToJson(evaluation.walls)}};
+  return Json{
+      {"file", FLAGS_truth},
+      {"plan", plan},
+      {"poses", poses},
+      {"map", FLAGS_map},
+      {"alignment",
+       {evaluation.alignment[0], evaluation.alignment[1],
+        evaluation.alignment[2]}},
+      {"walls_found", found},
+      {"walls_asked", evaluation.walls.size()},
+      {"recall", Known(evaluation.recall, evaluation.asked_length > 0.0)},
+      {"precision",
+       Known(evaluation.precision, evaluation.judged_length > 0.0)},
+      {"direction_error_deg", ToJson(evaluation.direction_error_deg)},
+      {"offset_error_m", ToJson(evaluation.offset_error)},
+      {"missed_walls", evaluation.missed_walls},
+      {"false_walls", evaluation.false_walls},
+      {"doubled_length_m", evaluation.doubled_length},
+      {"missed_orientations_deg", evaluation.missed_orientations_deg},
+      {"false_orientations_deg", evaluation.false_orientations_deg},
+      {"duplicate_orientations", evaluation.duplicate_orientations},
+      {"directions", DirectionsToJson(evaluation.directions)},
+      {"bend_error_deg",
+       Known(evaluation.bend_error_deg, !evaluation.directions.empty())},
+      {"closures", closures},
+      {"walls", WallsToJson(evaluation.walls)}};
 }
 
 int UsageError(const std::string& message) {

@@ -246,12 +246,17 @@ const std::string& Objective() {
 }
 
 // Throws unless a run that is done has the figure to choose by; true when there
-// was one to ask.
+// was one to ask. One that knows of the figure and does not know it (null, as
+// errors of walls of which it found none) says nothing.
 bool CheckObjective(const std::vector<SweepRun>& runs,
                     const std::string& folder) {
   for (const SweepRun& run : runs) {
     const std::optional<RunRecord> record = ReadRecord(RunFolder(folder, run));
-    if (!record || record->status != RunStatus::kDone) continue;
+    if (!record || record->status != RunStatus::kDone ||
+        std::count(record->unknown.begin(), record->unknown.end(),
+                   Objective()) > 0) {
+      continue;
+    }
     std::vector<std::string> names;
     for (const Figure& figure : record->figures) {
       if (figure.first == Objective()) return true;
@@ -440,7 +445,8 @@ void TellBest(const SweepResult& result, bool may_write,
   const std::string figure = minimize ? FLAGS_minimize : FLAGS_maximize;
   const std::optional<BestSetting> best = FindBest(result, figure, minimize);
   if (!best) {
-    std::printf("best: no setting has all its runs done\n");
+    std::printf("best: no setting has all its runs done with a figure '%s'\n",
+                figure.c_str());
     return;
   }
   const std::vector<SweepSetting> settings = Settings(result);

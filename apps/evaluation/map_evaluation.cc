@@ -214,6 +214,7 @@ void MatchMap(const StraightMap& map, const MapTruthOptions& options,
       evaluation->false_walls.push_back(segment.id);
     }
   }
+  evaluation->judged_length = map_length;
   if (map_length > 0.0) evaluation->precision = right_length / map_length;
 }
 
@@ -252,6 +253,7 @@ void JudgeWalls(const MapTruth& truth, const MapTruthOptions& options,
     }
     evaluation->walls.push_back(result);
   }
+  evaluation->asked_length = seen_length;
   if (seen_length > 0.0) evaluation->recall = found_length / seen_length;
   evaluation->direction_error_deg = ComputeStatistics(direction_errors);
   evaluation->offset_error = ComputeStatistics(offset_errors);

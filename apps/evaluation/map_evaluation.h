@@ -76,6 +76,9 @@ struct MapTruthEvaluation {
   /// there is nothing to find.
   double recall = 1.0;
   double precision = 1.0;
+  /// The lengths that these are parts of, m: 0 when there is nothing to find.
+  double asked_length = 0.0;
+  double judged_length = 0.0;
   /// Angles (degrees, in the world frame) of orientation features that match
   /// no direction, and directions, with at least one wall asked for, that no
   /// orientation feature matches.

@@ -56,6 +56,12 @@ double ShareNear(const std::vector<StraightPiece>& pieces,
   return all > 0.0 ? near / all : 1.0;
 }
 
+bool HasLength(const std::vector<StraightPiece>& pieces) {
+  return std::any_of(pieces.begin(), pieces.end(), [](const auto& piece) {
+    return (piece.second - piece.first).norm() > 0.0;
+  });
+}
+
 double Overlap(const Polygon& a, const Polygon& b) {
   double area = 0.0;
   for (const Polygon& part : IntersectionOf(a, b)) area += part.Area();
@@ -206,6 +212,8 @@ void EvaluateWalls(const BuildingPlan& plan, const MapTruth& truth,
   }
   result->wall_completeness = ShareNear(seen, sides);
   result->wall_correctness = ShareNear(faces, there);
+  result->has_seen_walls = HasLength(seen);
+  result->has_walls = HasLength(faces);
   for (std::size_t i = 0; i < plan.walls.size(); ++i) {
     const PlanWall& wall = plan.walls[i];
     for (const Vector2d& end : {wall.begin, wall.end}) {
@@ -331,7 +339,6 @@ RoomEvaluation EvaluateRooms(const std::vector<Polygon>& plan,
     result.mean_iou /= result.asked;
     result.recall /= result.asked;
   }
-  int with_partner = 0;
   for (std::size_t i = 0; i < plan.size(); ++i) {
     ++result.drawn;
     result.not_true += !is_partner[i];
@@ -342,10 +349,10 @@ RoomEvaluation EvaluateRooms(const std::vector<Polygon>& plan,
       is_asked = is_asked || (asked[j] && common[i][j] > kLeastCommon);
     }
     if (!is_asked) continue;
-    ++with_partner;
+    ++result.judged;
     result.precision += best / plan[i].Area();
   }
-  if (with_partner > 0) result.precision /= with_partner;
+  if (result.judged > 0) result.precision /= result.judged;
   return result;
 }
 

@@ -35,6 +35,8 @@ struct RoomEvaluation {
   /// 2016).
   double precision = 0.0;
   double recall = 0.0;
+  /// Rooms of the plan that `precision` is the mean over.
+  int judged = 0;
   /// Overlap over union of every true room that was asked for.
   std::vector<double> iou;
 };
@@ -64,6 +66,10 @@ struct PlanEvaluation {
   /// the ISPRS benchmark on indoor modelling).
   double wall_completeness = 1.0;
   double wall_correctness = 1.0;
+  /// Whether there are walls that were seen, and walls in the plan: what these
+  /// are shares of.
+  bool has_seen_walls = false;
+  bool has_walls = false;
   /// Ends of the plan's walls, and those that meet no other wall and no door.
   int ends = 0;
   int free_ends = 0;

@@ -541,6 +541,7 @@ TracedEvaluation EvaluateTracedRooms(const BuildingPlan& plan,
   result.mean_iou = Mean(ious);
   result.recall = Mean(recalls);
   result.precision = Mean(precisions);
+  result.judged = static_cast<int>(precisions.size());
   return result;
 }
 

@@ -68,6 +68,8 @@ struct TracedEvaluation {
   /// means.
   double precision = 0.0;
   double recall = 0.0;
+  /// Rooms of the plan that `precision` is the mean over.
+  int judged = 0;
   /// Overlap over union of every traced room, -1 for those not seen.
   std::vector<double> iou;
 };

@@ -139,13 +139,14 @@ std::string RunName(const SweepDefinition& definition, const SweepRun& run) {
 }
 
 void AddNumbers(const Json& json, const std::string& name, bool count_lists,
-                std::vector<Figure>* figures) {
+                std::vector<Figure>* figures,
+                std::vector<std::string>* unknown) {
   const auto inner = [&](const std::string& key) {
     return name.empty() ? key : name + "." + key;
   };
   if (json.is_object()) {
     for (const auto& [key, value] : json.items()) {
-      AddNumbers(value, inner(key), count_lists, figures);
+      AddNumbers(value, inner(key), count_lists, figures, unknown);
     }
   } else if (json.is_array()) {
     if (count_lists) {
@@ -153,12 +154,15 @@ void AddNumbers(const Json& json, const std::string& name, bool count_lists,
       return;
     }
     for (std::size_t i = 0; i < json.size(); ++i) {
-      AddNumbers(json[i], inner(std::to_string(i)), count_lists, figures);
+      AddNumbers(json[i], inner(std::to_string(i)), count_lists, figures,
+                 unknown);
     }
   } else if (json.is_boolean()) {
     figures->emplace_back(name, json.get<bool>() ? 1.0 : 0.0);
   } else if (json.is_number()) {
     figures->emplace_back(name, json.get<double>());
+  } else if (json.is_null() && unknown != nullptr) {
+    unknown->push_back(name);
   }
 }
 
@@ -209,7 +213,8 @@ void WriteRecord(const RunRecord& record, const std::string& run_folder) {
   WriteJson({{"status", RunStatusName(record.status)},
              {"reason", record.reason},
              {"seconds", record.seconds},
-             {"figures", std::move(figures)}},
+             {"figures", std::move(figures)},
+             {"unknown", record.unknown}},
             run_folder + "/run.json");
 }
 
@@ -272,15 +277,19 @@ class FiguresBefore {
 
 // Reads the run's figures; what is wrong with them otherwise.
 std::string ReadFigures(const SweepDefinition& definition,
-                        const FiguresBefore& before,
-                        std::vector<Figure>* figures) {
+                        const FiguresBefore& before, RunRecord* record) {
   std::string text;
   if (!before.ReadSummary(&text)) return "no summary.json";
   try {
-    *figures = Numbers(text, false, "summary.json");
+    record->figures = Numbers(text, false, "summary.json", &record->unknown);
     if (!definition.evaluate.empty() && before.ReadEvaluation(&text)) {
-      for (Figure& figure : Numbers(text, true, "evaluation.json")) {
-        figures->emplace_back("evaluation." + figure.first, figure.second);
+      std::vector<std::string> unknown;
+      for (Figure& figure : Numbers(text, true, "evaluation.json", &unknown)) {
+        record->figures.emplace_back("evaluation." + figure.first,
+                                     figure.second);
+      }
+      for (const std::string& name : unknown) {
+        record->unknown.push_back("evaluation." + name);
       }
     }
   } catch (const Error& error) {
@@ -558,6 +567,10 @@ std::optional<RunRecord> ReadRecord(const std::string& run_folder) {
       record.figures.emplace_back(figure.at(0).get<std::string>(),
                                   figure.at(1).get<double>());
     }
+    // Records of older versions have none.
+    if (json.contains("unknown")) {
+      record.unknown = json.at("unknown").get<std::vector<std::string>>();
+    }
     return record;
   } catch (const std::exception&) {
     // Somebody else's: the run is done anew.
@@ -574,7 +587,8 @@ void RecordLoss(const std::string& run_folder) {
 }
 
 std::vector<Figure> Numbers(const std::string& text, bool count_lists,
-                            const std::string& path) {
+                            const std::string& path,
+                            std::vector<std::string>* unknown) {
   Json json;
   try {
     json = Json::parse(text);
@@ -584,7 +598,7 @@ std::vector<Figure> Numbers(const std::string& text, bool count_lists,
   }
   if (!json.is_object()) throw Error(path, 0, "is no object", "{...}");
   std::vector<Figure> figures;
-  AddNumbers(json, "", count_lists, &figures);
+  AddNumbers(json, "", count_lists, &figures, unknown);
   return figures;
 }
 
@@ -646,10 +660,13 @@ std::optional<RunRecord> ExecuteRun(const SweepDefinition& definition,
     if (!take(command, "evaluation: ")) return std::nullopt;
   }
   if (record.reason.empty()) {
-    record.reason = ReadFigures(definition, before, &record.figures);
+    record.reason = ReadFigures(definition, before, &record);
     if (record.reason.empty()) record.status = RunStatus::kDone;
   }
-  if (record.status != RunStatus::kDone) record.figures.clear();
+  if (record.status != RunStatus::kDone) {
+    record.figures.clear();
+    record.unknown.clear();
+  }
   record.seconds = watch.Seconds();
   WriteRecord(record, run_folder);
   return record;

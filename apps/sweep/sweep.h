@@ -116,6 +116,9 @@ struct RunRecord {
   /// Every number of summary.json, then, as "evaluation.*", of
   /// evaluation.json; empty unless it is done.
   std::vector<Figure> figures;
+  /// Names of what is null there: figures that there are, and that are not
+  /// known of this run.
+  std::vector<std::string> unknown;
 };
 
 /// Path of a run's folder in the sweep's folder.
@@ -135,10 +138,12 @@ void CheckFlagsOfRuns(const SweepDefinition& definition);
 
 /// Every number of a JSON document, in its order, by its path: {"a": {"b": [1,
 /// true]}} gives a.b.0 = 1 and a.b.1 = 1 (false is 0). With `count_lists` a
-/// list gives its size in place of its entries: a.b = 2. Words and null are
-/// passed over. Throws Error, naming `path`, when the text is no JSON object.
+/// list gives its size in place of its entries: a.b = 2. Words are passed over;
+/// the paths of what is null go to `unknown`. Throws Error, naming `path`, when
+/// the text is no JSON object.
 std::vector<Figure> Numbers(const std::string& text, bool count_lists,
-                            const std::string& path);
+                            const std::string& path,
+                            std::vector<std::string>* unknown = nullptr);
 
 /// Does a run: empties its folder, runs command and evaluation there with what
 /// they print in log.txt, reads summary.json and evaluation.json, writes and

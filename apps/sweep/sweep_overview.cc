@@ -30,8 +30,7 @@ class Overview {
       : result(result), options(options), settings(Settings(result)) {
     const std::vector<std::string> names = FigureNames(result);
     for (const std::string& figure : options.figures) {
-      if (!names.empty() &&
-          std::find(names.begin(), names.end(), figure) == names.end()) {
+      if (!names.empty() && !IsFigure(result, figure)) {
         throw Error("--figures", 0, "no run has a figure '" + figure + "'",
                     "columns of sweep.csv");
       }

@@ -136,11 +136,21 @@ Estimate MeanOfNumbers(const std::vector<double>& values) {
   return MeanEstimate(numbers);
 }
 
+bool IsFigure(const SweepResult& result, const std::string& figure) {
+  const std::vector<std::string> names = FigureNames(result);
+  return std::find(names.begin(), names.end(), figure) != names.end() ||
+         std::any_of(result.records.begin(), result.records.end(),
+                     [&](const std::optional<RunRecord>& record) {
+                       return record &&
+                              std::count(record->unknown.begin(),
+                                         record->unknown.end(), figure) > 0;
+                     });
+}
+
 std::optional<BestSetting> FindBest(const SweepResult& result,
                                     const std::string& figure, bool minimize) {
   const std::vector<std::string> names = FigureNames(result);
-  if (!names.empty() &&
-      std::find(names.begin(), names.end(), figure) == names.end()) {
+  if (!names.empty() && !IsFigure(result, figure)) {
     std::string known;
     for (const std::string& name : names) {
       known += (known.empty() ? "" : ", ") + name;

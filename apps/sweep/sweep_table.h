@@ -76,9 +76,13 @@ struct BestSetting {
   std::vector<std::size_t> equals;
 };
 
+/// Whether a figure is one that runs tell of, if only to say that they do not
+/// know it (null).
+bool IsFigure(const SweepResult& result, const std::string& figure);
+
 /// Settings of which a run is not done or has no such figure do not take part;
-/// none when that is true of all. Throws Error for a figure that no run has,
-/// when there are runs that are done.
+/// none when that is true of all. Throws Error for what is no figure
+/// (IsFigure), when there are runs that are done.
 std::optional<BestSetting> FindBest(const SweepResult& result,
                                     const std::string& figure, bool minimize);
 

@@ -135,6 +135,45 @@ TEST_F(EvaluateTest, Truth) {
   }
 }
 
+// A map without walls has no errors, which are not errors of 0.
+TEST_F(EvaluateTest, FiguresOfNothingAreNotKnown) {
+  Write("truth.json",
+        R"({"format":"plumbline-truth","version":1,"orientations_deg":[0],
+            "walls":[{"id":0,"x1":0,"y1":0,"x2":4,"y2":0,"orientation":0,
+                      "seen":[[0,4]]}],
+            "poses":[[1,0,0,0],[2,4,4,0]]})");
+  Write("map.json", R"({"features":[],"constraints":[]})");
+  Write("plan.geojson", R"({"features":[]})");
+  std::string output;
+  ASSERT_EQ(Run(Flag("truth", "truth.json") + Flag("map", "map.json") +
+                    Flag("plan", "plan.geojson") + Flag("output", "eval.json"),
+                &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("mean          -  std          -  max          "
+                                "-  n 0\n"));
+  EXPECT_THAT(output, HasSubstr("recall 0.0000, precision - (length)"));
+  EXPECT_THAT(output, HasSubstr("bend error: - deg"));
+  EXPECT_THAT(output, HasSubstr("mean IoU -, precision -, recall -\n"));
+  EXPECT_THAT(output, HasSubstr("width error - m"));
+  EXPECT_THAT(output, HasSubstr("completeness 0.000, correctness -;"));
+  const nlohmann::json truth =
+      nlohmann::json::parse(Read("eval.json")).at("truth");
+  for (const char* figure : {"direction_error_deg", "offset_error_m"}) {
+    for (const char* name : {"mean", "std", "max"}) {
+      EXPECT_TRUE(truth.at(figure).at(name).is_null()) << figure << name;
+    }
+    EXPECT_EQ(truth.at(figure).at("n"), 0);
+  }
+  EXPECT_EQ(truth.at("recall"), 0.0);
+  EXPECT_TRUE(truth.at("precision").is_null());
+  EXPECT_TRUE(truth.at("bend_error_deg").is_null());
+  EXPECT_TRUE(truth.at("plan").at("rooms").at("recall").is_null());
+  EXPECT_TRUE(truth.at("plan").at("doors").at("width_error_m").is_null());
+  EXPECT_EQ(truth.at("plan").at("walls").at("completeness"), 0.0);
+  EXPECT_TRUE(truth.at("plan").at("walls").at("correctness").is_null());
+}
+
 TEST_F(EvaluateTest, Reference) {
   // The path, turned by 180 degrees and shifted, and one pose a metre off.
   Write("est.tum",

@@ -176,6 +176,36 @@ TEST_F(SweepBinaryTest, ATableOfAllRuns) {
   EXPECT_EQ(Read("out/best.flags"), "--x=1\n");
 }
 
+// Errors of walls of which a run found none are null, and no least errors.
+TEST_F(SweepBinaryTest, AFigureThatIsNotKnownIsNotTheBest) {
+  const std::string program = folder_ + "/unknown.sh";
+  std::ofstream(program) << R"(#!/bin/sh
+for flag; do
+  case $flag in
+    --output_dir=*) out=${flag#*=};;
+    --x=*) x=${flag#*=};;
+  esac
+done
+y=$x
+if [ $x -lt 3 ]; then y=null; fi
+echo "{\"y\": $y, \"z\": null, \"input\": \"i\"}" > $out/summary.json
+)";
+  fs::permissions(program, fs::perms::owner_all);
+  std::string output;
+  ASSERT_EQ(Run("--grid=x=1,2,3,4 --jobs=1 --minimize=y --output_dir=" +
+                    folder_ + "/out -- " + program,
+                &output),
+            0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("best: --x=3: y = 3\n"));
+  EXPECT_EQ(Read("out/best.flags"), "--x=3\n");
+  // Known of none.
+  ASSERT_EQ(Run("--minimize=z --output_dir=" + folder_ + "/out", &output), 0)
+      << output;
+  EXPECT_THAT(output, HasSubstr("no setting has all its runs done with a "
+                                "figure 'z'"));
+}
+
 TEST_F(SweepBinaryTest, FilesOfOthersAreNeitherReplacedNorRemoved) {
   const std::string command =
       "--grid=x=1,2 --output_dir=" + folder_ + "/out -- " + program_;

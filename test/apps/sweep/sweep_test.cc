@@ -254,6 +254,9 @@ TEST_F(SweepTest, NumbersHaveTheirPaths) {
                   Pair("d", 0.0), Pair("seed", 3.0)));
   EXPECT_THAT(Numbers(text, true, "f"),
               ElementsAre(Pair("a.b", 3.0), Pair("d", 0.0), Pair("seed", 3.0)));
+  std::vector<std::string> unknown;
+  Numbers(R"({"a": null, "b": {"c": null, "d": 1}})", true, "f", &unknown);
+  EXPECT_THAT(unknown, ElementsAre("a", "b.c"));
   EXPECT_THAT(Numbers("{}", false, "f"), IsEmpty());
   EXPECT_THROW(Numbers("[1]", false, "f"), Error);
   EXPECT_THROW(Numbers("{\"a\": ", false, "f"), Error);
@@ -266,13 +269,15 @@ TEST_F(SweepTest, ARunGivesItsFiguresAndItsLog) {
   definition_.axes = {{"x", {"1.25"}}};
   definition_.first_seed = 4;
   definition_.evaluate = {"/bin/sh", "-c",
-                          "echo '{\"list\": [5, 6]}' > {}/evaluation.json; "
+                          "echo '{\"list\": [5, 6], \"no\": null}' > "
+                          "{}/evaluation.json; "
                           "test {} = \"$0\"",
                           "{}"};
   const RunRecord record = Execute();
   EXPECT_EQ(record.status, RunStatus::kDone) << record.reason;
   EXPECT_THAT(record.figures, ElementsAre(Pair("x", 1.25), Pair("seed", 4.0),
                                           Pair("evaluation.list", 2.0)));
+  EXPECT_THAT(record.unknown, ElementsAre("evaluation.no"));
   EXPECT_THAT(Log(), HasSubstr("$ " + folder_ + "/program.sh 'two words'"));
   EXPECT_THAT(Log(), HasSubstr("says two words\nwarns\n"));
 
@@ -281,6 +286,7 @@ TEST_F(SweepTest, ARunGivesItsFiguresAndItsLog) {
   ASSERT_TRUE(read);
   EXPECT_EQ(read->status, RunStatus::kDone);
   EXPECT_EQ(read->figures, record.figures);
+  EXPECT_EQ(read->unknown, record.unknown);
   EXPECT_EQ(read->seconds, record.seconds);
 }
 

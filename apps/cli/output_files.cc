@@ -10,16 +10,35 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// What a link points at, if only at a file that is not there yet: once that is
+// written, the link leads to it.
+fs::path BehindLinks(fs::path path) {
+  constexpr int kMostLinks = 40;
+  std::error_code error;
+  for (int i = 0; i < kMostLinks && fs::is_symlink(path, error); ++i) {
+    const fs::path target = fs::read_symlink(path, error);
+    if (error) break;
+    // An absolute one takes the place of all.
+    path = path.parent_path() / target;
+  }
+  return path;
+}
+
 bool AreTheSame(const fs::path& a, const fs::path& b) {
   std::error_code error;
   if (fs::exists(a, error) && fs::exists(b, error)) {
     return (fs::is_regular_file(a, error) || fs::is_directory(a, error)) &&
            fs::equivalent(a, b, error);
   }
-  // One that is not there yet, perhaps through a link to its folder.
-  const fs::path first = fs::weakly_canonical(fs::absolute(a, error), error);
-  return !error &&
-         first == fs::weakly_canonical(fs::absolute(b, error), error) && !error;
+  // One that is not there yet, perhaps through a link to it or its folder.
+  const auto place = [&error](const fs::path& path) {
+    const fs::path absolute = fs::absolute(path, error);
+    // Without a working folder.
+    if (error) return absolute;
+    return fs::weakly_canonical(BehindLinks(absolute), error);
+  };
+  const fs::path first = place(a);
+  return !error && first == place(b) && !error;
 }
 
 }  // namespace

@@ -66,6 +66,22 @@ TEST_F(OutputFilesTest, TwoOutputsAreTwoFiles) {
         HasSubstr("is written for --output already"))
         << name;
   }
+  // Links to a file that is not there yet, one of them by way of another.
+  fs::create_symlink("new.csv", folder_ / "link.csv");
+  fs::create_symlink(folder_ / "link.csv", folder_ / "chain.csv");
+  fs::create_symlink("loop.csv", folder_ / "loop.csv");
+  for (const char* name : {"link.csv", "chain.csv"}) {
+    EXPECT_THAT(
+        Refusal({}, {{"output", Path("new.csv")}, {"truth", Path(name)}}),
+        HasSubstr("is written for --output already"))
+        << name;
+    EXPECT_EQ(
+        Refusal({}, {{"output", Path("other.csv")}, {"truth", Path(name)}}), "")
+        << name;
+  }
+  EXPECT_EQ(
+      Refusal({}, {{"output", Path("new.csv")}, {"truth", Path("loop.csv")}}),
+      "");
   EXPECT_EQ(Refusal({{"world", "/dev/null"}},
                     {{"output", "/dev/null"}, {"truth", "/dev/null"}}),
             "");

@@ -169,6 +169,15 @@ World LoadWorld() {
     BentOptions options =
         FLAGS_world == "bent" ? BentOptions() : NichesOptions();
     options.bend_deg = FLAGS_bend_deg;
+    if (options.length.low * FLAGS_size < kLeastCorridorLength) {
+      std::ostringstream least;
+      least << kLeastCorridorLength / options.length.low;
+      std::ostringstream size;
+      size << FLAGS_size;
+      throw Error("--size", 0,
+                  size.str() + " is too small for --world=" + FLAGS_world,
+                  "at least " + least.str());
+    }
     options.length.low *= FLAGS_size;
     options.length.high *= FLAGS_size;
     return MakeBentWorld(options, FLAGS_seed);

@@ -84,8 +84,8 @@ BentOptions NichesOptions() {
 
 World MakeBentWorld(const BentOptions& options, std::uint64_t seed) {
   Check(std::abs(options.bend_deg) <= 60.0, "bad bend", "-60 to 60 degrees");
-  Check(options.length.low >= 5.0 && options.width.low >= 1.0 &&
-            options.joint_length >= 0.0,
+  Check(options.length.low >= kLeastCorridorLength &&
+            options.width.low >= 1.0 && options.joint_length >= 0.0,
         "bad dimensions of a bent building",
         "corridors of at least 5 by 1 m, a joint of no negative length");
   Check(options.joint_length == 0.0 || options.joint_length >= 1.0,

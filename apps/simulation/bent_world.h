@@ -26,6 +26,9 @@ struct BentOptions {
   double niche_depth = 0.0;
 };
 
+/// What the length of corridors has to be at least, m.
+constexpr double kLeastCorridorLength = 5.0;
+
 /// Options of corridors with niches, joined by a piece of 1.6 m at half the
 /// angle.
 BentOptions NichesOptions();

@@ -219,6 +219,23 @@ TEST_F(ExperimentsBinaryTest, SimulateNeedsAWorldAndAPlaceToWrite) {
   EXPECT_THAT(output, HasSubstr("--world: it is missing"));
 }
 
+TEST_F(ExperimentsBinaryTest, SimulateNamesTheSizeThatIsTooSmall) {
+  std::string output;
+  for (const char* world : {"bent", "bent_niches"}) {
+    EXPECT_EQ(Run(std::string("plumbline_simulate --size=0.1 --world=") +
+                      world + " --output=" + folder_ + "/a.clf",
+                  &output),
+              2);
+    EXPECT_EQ(output, std::string("--size: 0.1 is too small for --world=") +
+                          world + ": expected at least 0.25\n");
+  }
+  EXPECT_EQ(Run("plumbline_simulate --size=0.25 --world=bent --output=" +
+                    folder_ + "/a.clf",
+                &output),
+            0)
+      << output;
+}
+
 TEST_F(ExperimentsBinaryTest, SimulateRefusesWhatAGraphHasNot) {
   std::string output;
   EXPECT_EQ(Run("plumbline_simulate --world=S1 --output=" + folder_ +

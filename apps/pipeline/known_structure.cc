@@ -1,10 +1,14 @@
 #include <plumbline/core/constraint.h>
+#include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/error.h>
+#include <plumbline/core/information.h>
 #include <plumbline/core/number_text.h>
 #include <plumbline/core/wall.h>
+#include <plumbline/factors/chi_square.h>
 #include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/plan_placement.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -49,6 +53,13 @@ constexpr double kSmallTurn = 1e-4;
 // A line that lies this far in front of a wall, m, more than the map may be
 // off, was looked through by who saw the wall.
 constexpr double kInFront = 0.1;
+// A hard statement is told when what the map alone would say is so unlikely
+// beside it. Rarer than what breaks: a map is off by more than its covariances
+// say, and tolerances of what is hard are small.
+constexpr double kContradicted = 1e-4;
+// Share of a statement's variance that is left for others to be checked by:
+// less is not known from numbers like these.
+constexpr double kLeastRedundancy = 1e-6;
 // Lines of the plan that notes list, longest first.
 constexpr std::size_t kShownLines = 8;
 
@@ -622,7 +633,32 @@ void KnownStructureBinder::NoteLinesLetGo(
   }
 }
 
-std::vector<std::string> KnownStructureBinder::Notes() const {
+// A tight statement pulls the walls to where it says, and its residual is small
+// whatever the measurements say. How far it had to pull shows beside how much
+// of the map it tells by itself: with the whitened residual r and the
+// covariance C of what the map says by now, whitened the same way, r' (I -
+// C)^-1 r is the chi-square of the statement against the map without it.
+bool KnownStructureBinder::IsContradicted(const Constraint& statement,
+                                          Marginals* marginals) const {
+  const Graph& graph = *graph_;
+  const auto cost = MakeCost(statement, SqrtInformation(statement.information),
+                             FeaturesOf(graph, statement));
+  const LinearizedConstraint at = Linearize(graph, statement, *cost);
+  // Of parallel walls nothing is said but the angle.
+  const int rank = InformationRank(statement.information);
+  if (ChiSquarePValue(at.residual.squaredNorm(), rank) < known_.break_below) {
+    return true;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> by_map(
+      marginals->PropagatedCovariance(statement.features, at.jacobians));
+  const Eigen::Array2d parts =
+      (by_map.eigenvectors().transpose() * at.residual).array().square();
+  const Eigen::Array2d left =
+      (1.0 - by_map.eigenvalues().array()).max(kLeastRedundancy);
+  return ChiSquarePValue((parts / left).sum(), rank) < kContradicted;
+}
+
+std::vector<std::string> KnownStructureBinder::Notes(bool is_solved) const {
   std::vector<std::string> notes = notes_;
   std::set<std::size_t> kept;
   std::set<FeatureId> tied;
@@ -642,11 +678,19 @@ std::vector<std::string> KnownStructureBinder::Notes() const {
                     Fixed(RadToDeg(plan.parameters[2]), 3) + " degrees");
   }
   NoteLinesLetGo(LinesLetGo(kept, tied), &notes);
+  // Made for the first hard statement: most files have none.
+  std::optional<Marginals> marginals;
   for (std::size_t i = 0; i < statements_.size(); ++i) {
     if (statements_[i] == kNoId) continue;
     const Constraint* constraint =
         std::as_const(*graph_).FindConstraint(statements_[i]);
     if (constraint != nullptr && constraint->state == ConstraintState::kLive) {
+      if (!known_.statements[i].is_hard || !is_solved) continue;
+      if (!marginals) marginals.emplace(std::as_const(*graph_));
+      if (IsContradicted(*constraint, &*marginals)) {
+        notes.push_back(known_.statements[i].place +
+                        ": measurements contradict it, it is hard and holds");
+      }
       continue;
     }
     notes.push_back(known_.statements[i].place +

@@ -4,6 +4,7 @@
 #include <plumbline/core/constraint.h>
 #include <plumbline/core/feature.h>
 #include <plumbline/core/graph.h>
+#include <plumbline/core/marginals.h>
 #include <plumbline/core/registry.h>
 #include <plumbline/core/wall.h>
 #include <plumbline/factors/pose2.h>
@@ -128,8 +129,10 @@ class KnownStructureBinder {
   /// Returns how many.
   int TieToPlan(const std::function<bool()>& stop = nullptr);
 
-  /// What became of it, for people: sentences without a full stop.
-  std::vector<std::string> Notes() const;
+  /// What became of it, for people: sentences without a full stop. Whether
+  /// measurements contradict what is hard shows only in a graph that
+  /// `is_solved` to its least cost.
+  std::vector<std::string> Notes(bool is_solved = true) const;
 
  private:
   struct MapWall;
@@ -161,6 +164,9 @@ class KnownStructureBinder {
   // that hold.
   std::map<std::size_t, LetGo> LinesLetGo(
       const std::set<std::size_t>& kept, const std::set<FeatureId>& tied) const;
+  // Whether measurements, or other statements that are hard, contradict one
+  // that is, and held all the same.
+  bool IsContradicted(const Constraint& statement, Marginals* marginals) const;
   // Adds what is to be said of them.
   void NoteLinesLetGo(const std::map<std::size_t, LetGo>& let_go,
                       std::vector<std::string>* notes) const;

@@ -876,7 +876,7 @@ void LogSolver::TieToPlan(KnownStructureBinder* known, Context* context) {
     if (known->TieToPlan(context->control.stop) == 0) break;
     RunEm(context);
   }
-  for (std::string& note : known->Notes()) {
+  for (std::string& note : known->Notes(!context->IsStopped())) {
     context->result.notes.push_back(std::move(note));
   }
 }

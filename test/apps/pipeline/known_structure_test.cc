@@ -161,8 +161,42 @@ TEST_F(StatementTest, WhatMeasurementsContradictBreaksUnlessItIsHard) {
   EXPECT_THAT(Solve("distance 0,0 0,5 6\n"),
               Contains(HasSubstr("walls.txt:1: measurements contradict")));
   EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 5.0, 1e-3);
-  EXPECT_TRUE(Solve("distance 0,0 0,5 6 hard sigma=0.001\n").empty());
+  Solve("distance 0,0 0,5 6 hard sigma=0.001\n");
   EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 6.0, 0.01);
+}
+
+// However tight it is, and so however small what is left of the contradiction.
+TEST_F(StatementTest, WhatMeasurementsContradictIsToldWhereItIsHard) {
+  const std::vector<Pose2> walls = {Pose2(0.0, 0.0, 0.0), Pose2(0.0, 5.0, 0.0),
+                                    Pose2(7.0, 0.0, 0.5 * kPi)};
+  for (const char* const text :
+       {"distance 0,0 0,5 6 hard\n", "distance 0,0 0,5 6 hard sigma=0.001\n",
+        "distance 0,0 0,5 20 hard sigma=0.0001\n",
+        "right_angle 0,0 0,5 hard sigma_deg=0.001\n",
+        "same 0,0 0,5 hard sigma=0.001\n",
+        "parallel 0,0 7,0 hard sigma_deg=0.01\n"}) {
+    MakeWalls(walls, 0.02);
+    EXPECT_THAT(Solve(text), ::testing::ElementsAre(HasSubstr(
+                                 "walls.txt:1: measurements contradict it, it "
+                                 "is hard and holds")))
+        << text;
+  }
+  // Two that contradict each other, where measurements are too coarse to tell.
+  MakeWalls(walls, 2.0);
+  EXPECT_THAT(Solve("distance 0,0 0,5 5 hard\ndistance 0,0 0,5 6 hard\n"),
+              ::testing::ElementsAre(HasSubstr("walls.txt:1: measurements"),
+                                     HasSubstr("walls.txt:2: measurements")));
+  // What agrees with them, or tells what they leave open, is not told.
+  for (const char* const text :
+       {"distance 0,0 0,5 5 hard\n",
+        "distance 0,0 0,5 5.04 hard sigma=0.0001\n",
+        "parallel 0,0 0,5 hard sigma_deg=0.001\n",
+        "right_angle 0,0 7,0 hard sigma_deg=0.001\n"}) {
+    MakeWalls(walls, 0.02);
+    EXPECT_TRUE(Solve(text).empty()) << text;
+  }
+  MakeWalls(walls, 2.0);
+  EXPECT_TRUE(Solve("distance 0,0 0,5 6 hard sigma=0.001\n").empty());
 }
 
 // Whatever is said of them, and whether it holds.

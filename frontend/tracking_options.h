@@ -40,9 +40,10 @@ struct TrackingOptions {
   double max_blind_way = 1.5;
   double max_blind_turn = DegToRad(40.0);
   /// A tie by odometry alone is accepted when there was neither a gap nor a
-  /// contradiction and its standard deviations, for odometry as it was on this
-  /// log so far, are no larger than these, m and rad.
-  double max_odometry_sigma = 0.75;
+  /// contradiction, or odometry went on over them, and its standard deviations,
+  /// for odometry as it was on this log so far, are no larger than these, m and
+  /// rad. A guess may be put into any place that looks alike.
+  double max_odometry_sigma = 1.5;
   double max_odometry_angle = DegToRad(20.0);
   /// From this way without any match on it is reported, m.
   double max_silent_way = 3.0;

@@ -33,9 +33,6 @@ constexpr double kSameTurn = DegToRad(8.0);
 // A rival lies farther off than this, m or rad.
 constexpr double kRivalDistance = 2.0;
 constexpr double kRivalTurn = DegToRad(15.0);
-// A contradicting window speaks against a place like so many agreeing ones for
-// it.
-constexpr double kContradictionWeight = 2.0;
 // A window is where the track has it when it lies no farther from there, m. It
 // is asked so often again, and agrees as well elsewhere with this share of its
 // quality.

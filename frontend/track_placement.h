@@ -13,6 +13,10 @@
 
 namespace plumbline {
 
+/// A window that contradicts a place speaks against it like so many that agree
+/// speak for it.
+constexpr double kContradictionWeight = 2.0;
+
 /// Where a track lies in a map.
 struct TrackPlacement {
   bool found = false;

@@ -62,12 +62,10 @@ constexpr int kMoreToMove = 2;
 constexpr int kRivalSearches = 8;
 // So many windows that contradict, more than agree, refute that.
 constexpr int kLeastRefuting = 2;
-// A window that contradicts weighs as much as so many that agree.
-constexpr int kContradictionWeight = 2;
 // Windows that have to agree, less those that contradict by their weight, at a
 // place where a part is put, as a guess, in place of one that more speaks
 // against than for.
-constexpr int kLeastBetter = 2;
+constexpr double kLeastBetter = 2.0;
 // How far they may lie from where such a part has them (RMS), m: parts that
 // were never compared are bent.
 constexpr double kMostBetterMisfit = 0.5;

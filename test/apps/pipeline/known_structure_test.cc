@@ -656,11 +656,11 @@ TEST(PlanPlacementTest, TooManyLinesForABuildingAreOfAnotherUnit) {
   for (int copy = 0; copy < 5; ++copy) {
     for (const PlanLine& wall : room) {
       known.plan.push_back(wall);
-      PlanLine stub;
-      stub.begin = inside;
-      stub.end = inside + Eigen::Vector2d(0.003, 0.0);
-      known.plan.push_back(stub);
-      known.plan.push_back(stub);
+      // Two for each wall: what the walls are is not the usual length.
+      PlanLine tick;
+      tick.begin = inside;
+      tick.end = inside + Eigen::Vector2d(0.003, 0.0);
+      known.plan.insert(known.plan.end(), 2, tick);
     }
   }
   for (PlanLine& line : known.plan) {

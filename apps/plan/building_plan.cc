@@ -581,22 +581,36 @@ void ReadLine(const DrawnLine& on, const Sides& sides, const SpaceGrid& space,
 }
 
 // Walls that end within a room and divide nothing: thin, and seen from both
-// sides, while the edge of a piece of furniture is seen from one.
-void AddStandingWalls(const DrawnLine& on, const Sides& sides,
-                      const SpaceGrid& space, BuildingPlan* plan) {
-  const WallProfile& profile = on.profile;
-  const auto stands_at = [&](int i) {
-    return profile.At(i) == Mark::kWall &&
-           profile.in_row[static_cast<std::size_t>(i)] &&
-           sides.left[static_cast<std::size_t>(i)] == Sides::kNone;
+// sides, while the edge of a piece of furniture is seen from one. `lines`: of
+// one wall, in their order.
+void AddStandingWalls(const std::vector<std::size_t>& lines,
+                      const std::vector<DrawnLine>& drawn,
+                      const std::vector<Sides>& sides, const SpaceGrid& space,
+                      BuildingPlan* plan) {
+  struct Sample {
+    std::size_t line;
+    int i;
+  };
+  std::vector<Sample> samples;
+  for (const std::size_t line : lines) {
+    for (int i = 0; i < drawn[line].profile.size(); ++i) {
+      samples.push_back({line, i});
+    }
+  }
+  const auto stands_at = [&](const Sample& at) {
+    const WallProfile& profile = drawn[at.line].profile;
+    return profile.At(at.i) == Mark::kWall &&
+           profile.in_row[static_cast<std::size_t>(at.i)] &&
+           sides[at.line].left[static_cast<std::size_t>(at.i)] == Sides::kNone;
   };
   // The room on one side (1: left), -1 when there is no free floor before the
   // face that is deeper than a cupboard.
-  const auto room_beside = [&](int i, int side) {
-    const double face = side > 0 ? on.line.high : -on.line.low;
+  const auto room_beside = [&](const Sample& at, int side) {
+    const WallLine& line = drawn[at.line].line;
+    const double face = side > 0 ? line.high : -line.low;
     const auto before = [&](double depth) {
-      return Vector2d(on.line.At(profile.MiddleOf(i)) +
-                      side * (face + depth) * on.line.normal());
+      return Vector2d(line.At(drawn[at.line].profile.MiddleOf(at.i)) +
+                      side * (face + depth) * line.normal());
     };
     if (space.At(before(kBeforeFace)) != Space::kFree ||
         space.At(before(kBeforeCupboard)) != Space::kFree) {
@@ -610,17 +624,25 @@ void AddStandingWalls(const DrawnLine& on, const Sides& sides,
     }
     return -1;
   };
-  for (int i = 0; i < profile.size();) {
-    int j = i;
-    while (j < profile.size() && stands_at(j)) ++j;
+  for (std::size_t i = 0; i < samples.size();) {
+    std::size_t j = i;
     int seen = 0;
-    for (int k = i; k < j; ++k) {
-      const int left = room_beside(k, 1);
-      seen += left >= 0 && left == room_beside(k, -1);
+    for (; j < samples.size() && stands_at(samples[j]); ++j) {
+      const int left = room_beside(samples[j], 1);
+      seen += left >= 0 && left == room_beside(samples[j], -1);
     }
-    if ((j - i) * WallProfile::kStep >= kLeastStanding &&
-        seen >= kSeenFromBoth * (j - i)) {
-      plan->walls.push_back(WallBetween(on, sides, i, j, space));
+    const auto size = static_cast<double>(j - i);
+    if (size * WallProfile::kStep >= kLeastStanding &&
+        seen >= kSeenFromBoth * size) {
+      for (std::size_t first = i; first < j;) {
+        std::size_t last = first;
+        const std::size_t line = samples[first].line;
+        while (last < j && samples[last].line == line) ++last;
+        plan->walls.push_back(WallBetween(drawn[line], sides[line],
+                                          samples[first].i,
+                                          samples[last - 1].i + 1, space));
+        first = last;
+      }
     }
     i = std::max(j, i + 1);
   }
@@ -855,8 +877,8 @@ Rooms FindRooms(std::vector<WallLine> lines, const SpaceGrid& space,
   const std::vector<double> wall = WallOfChains(lines, options.min_wall);
   std::vector<WallLine> long_lines, short_lines;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    (wall[i] >= options.min_wall ? long_lines : short_lines)
-        .push_back(lines[i]);
+    const bool is_long = wall[i] >= options.min_wall || lines[i].curve >= 0;
+    (is_long ? long_lines : short_lines).push_back(lines[i]);
   }
   lines = std::move(long_lines);
   std::vector<DrawnLine> drawn_lines = DrawAndMeasure(lines, space, options);
@@ -1015,10 +1037,12 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
     DropUnreached(arrangement, &plan.rooms, &room_of_face);
   }
   const std::vector<Sides> sides = SidesOf(arrangement, room_of_face, drawn);
-  for (std::size_t i = 0; i < drawn.size(); ++i) {
-    ReadLine(drawn[i], sides[i], space, options, &plan);
-    if (drawn[i].line.is_wall) {
-      AddStandingWalls(drawn[i], sides[i], space, &plan);
+  for (const std::vector<std::size_t>& lines : LinesOfWalls(drawn)) {
+    for (const std::size_t line : lines) {
+      ReadLine(drawn[line], sides[line], space, options, &plan);
+    }
+    if (drawn[lines.front()].line.is_wall) {
+      AddStandingWalls(lines, drawn, sides, space, &plan);
     }
   }
   const std::size_t of_rooms = plan.walls.size();

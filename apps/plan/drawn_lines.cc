@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <tuple>
 #include <utility>
 
@@ -91,8 +92,9 @@ void DrawOn(double reach, double beyond_other, std::vector<DrawnLine>* drawn) {
     ends[i] = {(*drawn)[i].line.begin, (*drawn)[i].line.end};
   }
   const auto stretch = [&](std::size_t i, double t) {
-    ends[i].first = std::min(ends[i].first, t);
-    ends[i].second = std::max(ends[i].second, t);
+    const WallLine& line = (*drawn)[i].line;
+    if (!line.begins_in_corner) ends[i].first = std::min(ends[i].first, t);
+    if (!line.ends_in_corner) ends[i].second = std::max(ends[i].second, t);
   };
   for (std::size_t i = 0; i < size; ++i) {
     const WallLine& line = (*drawn)[i].line;
@@ -151,8 +153,9 @@ void DrawOn(double reach, double beyond_other, std::vector<DrawnLine>* drawn) {
   }
   // A little more, so that rounding leaves no gap.
   for (std::size_t i = 0; i < size; ++i) {
-    (*drawn)[i].from = ends[i].first - 0.01;
-    (*drawn)[i].to = ends[i].second + 0.01;
+    const WallLine& line = (*drawn)[i].line;
+    (*drawn)[i].from = ends[i].first - (line.begins_in_corner ? 0.0 : 0.01);
+    (*drawn)[i].to = ends[i].second + (line.ends_in_corner ? 0.0 : 0.01);
   }
 }
 
@@ -163,7 +166,8 @@ std::vector<DrawnLine> Caps(const std::vector<DrawnLine>& drawn, double reach) {
   for (std::size_t i = 0; i < drawn.size(); ++i) {
     const WallLine& line = drawn[i].line;
     for (const double end : {line.begin, line.end}) {
-      bool is_met = false;
+      bool is_met =
+          end == line.begin ? line.begins_in_corner : line.ends_in_corner;
       for (std::size_t j = 0; j < drawn.size() && !is_met; ++j) {
         double t, t_other;
         if (j == i || !Crossing(line, drawn[j].line, &t, &t_other)) continue;
@@ -221,22 +225,26 @@ Mark MarkAt(const WallLine& line, double t, const SpaceGrid& space) {
   return free >= 0.7 * all ? Mark::kOpen : Mark::kUnknown;
 }
 
-// Which samples are in rows of occupied cells along the line, not only beside
-// some furniture.
-void FindRows(const SpaceGrid& space, DrawnLine* drawn) {
-  const WallLine& line = drawn->line;
-  WallProfile& profile = drawn->profile;
+// Which samples are in rows of occupied cells along a wall, not only beside
+// some furniture. `lines`: the wall's, one after the other, as its profile.
+void FindRows(const SpaceGrid& space, const std::vector<DrawnLine*>& lines,
+              WallProfile* whole) {
+  WallProfile& profile = *whole;
+  const WallLine& first = lines.front()->line;
   const int count = profile.size();
   profile.in_row.assign(profile.marks.size(), false);
   std::vector<bool> before(profile.marks.size(), false);
-  for (double v = line.low - kBeside; v <= line.high + kBeside + 1e-9;
+  for (double v = first.low - kBeside; v <= first.high + kBeside + 1e-9;
        v += space.resolution) {
     std::vector<bool> here(profile.marks.size(), false);
-    for (int i = 0; i < count; ++i) {
-      if (profile.marks[static_cast<std::size_t>(i)] != Mark::kWall) continue;
-      here[static_cast<std::size_t>(i)] =
-          space.At(Vector2d(line.At(profile.MiddleOf(i)) +
-                            v * line.normal())) == Space::kOccupied;
+    std::size_t at = 0;
+    for (const DrawnLine* drawn : lines) {
+      const WallLine& line = drawn->line;
+      for (int i = 0; i < drawn->profile.size(); ++i, ++at) {
+        if (profile.marks[at] != Mark::kWall) continue;
+        here[at] = space.At(Vector2d(line.At(drawn->profile.MiddleOf(i)) +
+                                     v * line.normal())) == Space::kOccupied;
+      }
     }
     int begin = -1;
     int last = -1;
@@ -262,7 +270,7 @@ void FindRows(const SpaceGrid& space, DrawnLine* drawn) {
   }
 }
 
-// What lies along a line as the raster has it.
+// What lies along a line as the raster has it, without rows.
 void Measure(const SpaceGrid& space, DrawnLine* drawn) {
   WallProfile& profile = drawn->profile;
   profile.begin = drawn->from;
@@ -273,7 +281,6 @@ void Measure(const SpaceGrid& space, DrawnLine* drawn) {
     profile.marks[static_cast<std::size_t>(i)] =
         MarkAt(drawn->line, profile.MiddleOf(i), space);
   }
-  FindRows(space, drawn);
 }
 
 // Share of wall within `reach` of a place on a line.
@@ -318,7 +325,9 @@ Crossings WallCrossings(const std::vector<DrawnLine>& drawn,
   Crossings crossings;
   for (std::size_t j = 0; j < drawn.size(); ++j) {
     double t, t_other;
+    const int curve = drawn[line].line.curve;
     if (j == line || !drawn[j].line.is_wall ||
+        (curve >= 0 && curve == drawn[j].line.curve) ||
         !Crossing(drawn[line].line, drawn[j].line, &t, &t_other) ||
         t < drawn[line].from || t > drawn[line].to || t_other < drawn[j].from ||
         t_other > drawn[j].to) {
@@ -338,6 +347,58 @@ Crossings WallCrossings(const std::vector<DrawnLine>& drawn,
     }
   }
   return crossings;
+}
+
+// The profiles of a wall's lines one after the other, which begin where the
+// first one does.
+WallProfile WholeProfile(const std::vector<DrawnLine*>& lines) {
+  WallProfile whole;
+  whole.begin = lines.front()->profile.begin;
+  for (const DrawnLine* line : lines) {
+    const std::vector<Mark>& marks = line->profile.marks;
+    whole.marks.insert(whole.marks.end(), marks.begin(), marks.end());
+  }
+  return whole;
+}
+
+// Gives each line its part of the profile of its wall.
+void TakeProfile(const WallProfile& whole,
+                 const std::vector<DrawnLine*>& lines) {
+  std::ptrdiff_t first = 0;
+  for (DrawnLine* line : lines) {
+    WallProfile& profile = line->profile;
+    const std::ptrdiff_t last = first + profile.size();
+    const auto part = [&](const auto& all, auto* own) {
+      own->assign(all.begin() + first, all.begin() + last);
+    };
+    part(whole.marks, &profile.marks);
+    part(whole.holds, &profile.holds);
+    part(whole.in_row, &profile.in_row);
+    part(whole.is_seen_open, &profile.is_seen_open);
+    first = last;
+  }
+}
+
+// Where walls cross a wall, along its whole profile.
+Crossings CrossingsOfWall(const std::vector<DrawnLine>& drawn,
+                          const std::vector<WallProfile>& shut,
+                          const std::vector<std::size_t>& lines) {
+  Crossings whole;
+  double begin = drawn[lines.front()].profile.begin;
+  for (const std::size_t line : lines) {
+    const WallProfile& profile = drawn[line].profile;
+    const double shift = begin - profile.begin;
+    const Crossings own = WallCrossings(drawn, shut, line);
+    const auto add = [&](const std::vector<double>& from,
+                         std::vector<double>* to) {
+      for (const double t : from) to->push_back(t + shift);
+    };
+    add(own.all, &whole.all);
+    add(own.drawn, &whole.drawn);
+    add(own.straight_on, &whole.straight_on);
+    begin += profile.size() * kStep;
+  }
+  return whole;
 }
 
 // What is in no row of cells is furniture, unless another wall crosses there.
@@ -586,6 +647,23 @@ Partitions FindPartitions(const std::vector<WallLine>& lines,
   return found;
 }
 
+std::vector<std::vector<std::size_t>> LinesOfWalls(
+    const std::vector<DrawnLine>& drawn) {
+  std::vector<std::vector<std::size_t>> walls;
+  std::map<int, std::size_t> curves;
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    const int curve = drawn[i].line.curve;
+    const auto known = curve < 0 ? curves.end() : curves.find(curve);
+    if (known != curves.end()) {
+      walls[known->second].push_back(i);
+      continue;
+    }
+    if (curve >= 0) curves[curve] = walls.size();
+    walls.push_back({i});
+  }
+  return walls;
+}
+
 std::vector<DrawnLine> DrawLines(const std::vector<WallLine>& lines,
                                  double reach, double beyond) {
   std::vector<DrawnLine> drawn;
@@ -609,17 +687,22 @@ void MeasureLines(const SpaceGrid& space, const DoorOptions& options,
   for (const DrawnLine& line : *drawn) {
     shut.push_back(WithDoorsShut(line.profile, options.narrow));
   }
-  std::vector<Crossings> crossings(drawn->size());
-  for (std::size_t i = 0; i < drawn->size(); ++i) {
-    crossings[i] = WallCrossings(*drawn, shut, i);
+  const std::vector<std::vector<std::size_t>> walls = LinesOfWalls(*drawn);
+  std::vector<Crossings> crossings(walls.size());
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    crossings[i] = CrossingsOfWall(*drawn, shut, walls[i]);
   }
-  for (std::size_t i = 0; i < drawn->size(); ++i) {
-    WallProfile& profile = (*drawn)[i].profile;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    std::vector<DrawnLine*> lines;
+    for (const std::size_t line : walls[i]) lines.push_back(&(*drawn)[line]);
+    WallProfile profile = WholeProfile(lines);
+    FindRows(space, lines, &profile);
     DropSpecks(crossings[i].all, &profile);
     for (const Mark mark : profile.marks) {
       profile.is_seen_open.push_back(mark == Mark::kOpen);
     }
-    Weigh(options, (*drawn)[i].line.is_wall, crossings[i], &profile);
+    Weigh(options, lines.front()->line.is_wall, crossings[i], &profile);
+    TakeProfile(profile, lines);
   }
 }
 

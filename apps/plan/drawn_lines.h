@@ -89,6 +89,11 @@ Partitions FindPartitions(const std::vector<WallLine>& lines,
                           const std::vector<DrawnLine>& drawn,
                           const SpaceGrid& space, double reach);
 
+/// The lines of each wall, as indices into `drawn`: one, or the edges of a
+/// curved wall in their order.
+std::vector<std::vector<std::size_t>> LinesOfWalls(
+    const std::vector<DrawnLine>& drawn);
+
 /// Fills the profiles of all lines.
 ///
 /// A sample is wall where a row of occupied cells runs along the line (legs of

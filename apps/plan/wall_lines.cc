@@ -1,4 +1,5 @@
 #include <plumbline/core/disjoint_sets.h>
+#include <plumbline/plan/curved_walls.h>
 #include <plumbline/plan/wall_lines.h>
 
 #include <algorithm>
@@ -542,6 +543,41 @@ void JoinThickWalls(const SpaceGrid& space, const WallLineOptions& options,
   }
 }
 
+// The edges of curved walls as lines.
+std::vector<WallLine> EdgesOf(const std::vector<CurvedWall>& walls) {
+  std::vector<WallLine> edges;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    const std::vector<Vector2d>& corners = walls[i].corners;
+    for (std::size_t k = 0; k + 1 < corners.size(); ++k) {
+      WallLine edge;
+      const Vector2d way = corners[k + 1] - corners[k];
+      edge.origin = corners[k];
+      edge.along = way.normalized();
+      edge.end = way.norm();
+      edge.low = walls[i].low;
+      edge.high = walls[i].high;
+      edge.weight = edge.end;
+      edge.curve = static_cast<int>(i);
+      edge.begins_in_corner = k > 0 || walls[i].is_closed();
+      edge.ends_in_corner = k + 2 < corners.size() || walls[i].is_closed();
+      edges.push_back(edge);
+    }
+  }
+  return edges;
+}
+
+// Both faces of a line's wall.
+std::vector<Face> FacesOf(const WallLine& line) {
+  std::vector<Face> faces;
+  for (const double across : {line.low, line.high}) {
+    Face face;
+    face.begin = line.At(line.begin) + across * line.normal();
+    face.end = line.At(line.end) + across * line.normal();
+    faces.push_back(face);
+  }
+  return faces;
+}
+
 // Whether one line goes on where the other one ends, as chords of a curved wall
 // do.
 bool GoesOn(const WallLine& a, const WallLine& b) {
@@ -571,14 +607,20 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
   const std::vector<Vector2d> all =
       AllDirections(directions, options.same_direction);
   Returns returns(space, options);
-  std::vector<Face> faces;
+  std::vector<KnownWall> straight;
   for (const KnownWall& piece : pieces) {
+    if (piece.begin == piece.end) continue;
+    if (returns.Support(piece.begin, piece.end)) straight.push_back(piece);
+  }
+  const std::vector<WallLine> edges =
+      EdgesOf(TakeCurvedWalls(space, options, {}, &straight));
+  std::vector<Face> faces;
+  for (const KnownWall& piece : straight) {
     Face face;
     face.begin = piece.begin;
     face.end = piece.end;
     const double length = face.length();
     if (!(length >= options.min_length)) continue;
-    if (!returns.Support(face.begin, face.end)) continue;
     Vector2d along = (face.end - face.begin) / length;
     for (std::size_t i = 0; i < all.size(); ++i) {
       const double cosine = along.dot(all[i]);
@@ -593,6 +635,7 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
     faces.push_back(face);
   }
   returns.Explain(faces);
+  for (const WallLine& edge : edges) returns.Explain(FacesOf(edge));
   for (std::size_t i = 0; i < all.size(); ++i) {
     const std::vector<Face> rows =
         returns.TakeRows(all[i], static_cast<int>(i));
@@ -634,8 +677,9 @@ std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
   JoinInLine(options, &groups);
   JoinThickWalls(space, options, &groups);
   std::vector<WallLine> lines;
-  lines.reserve(groups.size());
+  lines.reserve(groups.size() + edges.size());
   for (const Group& group : groups) lines.push_back(group.line);
+  lines.insert(lines.end(), edges.begin(), edges.end());
   return lines;
 }
 

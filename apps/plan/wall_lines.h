@@ -54,6 +54,12 @@ struct WallLine {
   bool is_wall = true;
   /// Its direction is exactly one of the building's.
   bool is_aligned = false;
+  /// The curved wall that it is an edge of, -1 for none. The edges of one
+  /// follow each other, each from where the one before ends.
+  int curve = -1;
+  /// Another edge of that wall begins there: the line ends in that corner.
+  bool begins_in_corner = false;
+  bool ends_in_corner = false;
 
   /// Unit vector to the left of `along`.
   Eigen::Vector2d normal() const { return {-along[1], along[0]}; }
@@ -70,7 +76,7 @@ struct WallLine {
 /// Lines of walls from pieces that are known and from rows of occupied cells
 /// along `directions` (rad, modulo pi, the most important first) and across
 /// them. Pieces within WallLineOptions::same_direction of one of these get
-/// exactly that direction.
+/// exactly that direction. Edges of curved walls (curved_walls.h) come last.
 std::vector<WallLine> FindWallLines(const std::vector<KnownWall>& pieces,
                                     const std::vector<double>& directions,
                                     const SpaceGrid& space,

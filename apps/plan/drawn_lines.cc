@@ -48,6 +48,11 @@ constexpr double kWallThere = 0.6;
 constexpr int kHiddenBeside = 20;
 // So many of them may look open: laser points go astray.
 constexpr int kStraySamples = 2;
+// A wall ends where one crosses it and so many samples, from so many behind the
+// crossing on, are free, by this share.
+constexpr int kBehindCrossing = 4;
+constexpr int kBeyondWall = 20;
+constexpr double kFreeBeyond = 0.9;
 // It goes straight on when that holds on both sides, within this, m.
 constexpr double kStraightOn = 1.5;
 // What stands before a wall in a corridor is no deeper than this, m.
@@ -472,6 +477,38 @@ std::vector<Passage> PassagesOf(const std::vector<Mark>& marks, double begin,
   return passages;
 }
 
+// How far a wall that has an opening goes on from there, sample `from`, up to
+// sample `to`: it ends where another wall crosses it and nothing but free space
+// lies in line with it beyond.
+int EndOfWall(const WallProfile& profile, const Crossings& crossings, int from,
+              int to) {
+  const int step = to < from ? -1 : 1;
+  int end = to;
+  for (const double crossing : crossings.all) {
+    const int at = profile.IndexOf(crossing);
+    if (step * (at - from) < 0 || step * (at - end) >= 0) continue;
+    if (std::any_of(crossings.straight_on.begin(), crossings.straight_on.end(),
+                    [&](double t) {
+                      return std::abs(t - crossing) <= kBesideCrossing;
+                    })) {
+      continue;
+    }
+    int open = 0;
+    int all = 0;
+    for (int i = at + step * kBehindCrossing;
+         step * (i - to) < 0 && all < kBeyondWall; i += step) {
+      const int sample = step > 0 ? i : i - 1;
+      ++all;
+      open += profile.At(sample) == Mark::kOpen;
+    }
+    if (all == kBeyondWall && open >= kFreeBeyond * all) {
+      end = at + step * kBehindCrossing;
+      if (step * (end - to) > 0) end = to;
+    }
+  }
+  return end;
+}
+
 // Finds doors, openings with wall on both sides, and what each place holds.
 void Weigh(const DoorOptions& options, bool is_wall, const Crossings& crossings,
            WallProfile* profile) {
@@ -517,8 +554,10 @@ void Weigh(const DoorOptions& options, bool is_wall, const Crossings& crossings,
     }
     const int size = whole.last - whole.first;
     const double width = size * kStep;
-    const int first = std::max(0, whole.first - around);
-    const int last = std::min(count, whole.last + around);
+    const int first = EndOfWall(*profile, crossings, whole.first,
+                                std::max(0, whole.first - around));
+    const int last = EndOfWall(*profile, crossings, whole.last,
+                               std::min(count, whole.last + around));
     const int seen = between(seen_before, first, last) -
                      between(seen_before, whole.first, whole.last);
     const int unseen = last - first - size - seen;

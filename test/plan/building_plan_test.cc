@@ -1117,5 +1117,72 @@ TEST(BuildingPlanTest, AlleysBetweenHousesAreNoRooms) {
             3u);
 }
 
+// Three rooms with six sides of 2.7 m around a corner, with a door of 0.9 m in
+// each wall between two of them: in line with a wall lies the next room.
+TEST(BuildingPlanTest, RoomsWithSixSides) {
+  constexpr double kSide = 2.7;
+  const double apothem = 0.5 * std::sqrt(3.0) * kSide;
+  const Vector2d corner(6.0, 6.0);
+  const auto at = [](double degrees) {
+    return Vector2d(std::cos(DegToRad(degrees)), std::sin(DegToRad(degrees)));
+  };
+  std::vector<Vector2d> centers;
+  for (const double angle : {90.0, 210.0, 330.0}) {
+    centers.push_back(corner + kSide * at(angle));
+  }
+  SpaceGrid space = Drawing(12.0, 12.0).space();
+  // How far a point lies within the nearest room, m.
+  const auto inside = [&](const Vector2d& p) {
+    double most = -1e9;
+    for (const Vector2d& center : centers) {
+      double least = 1e9;
+      for (int side = 0; side < 6; ++side) {
+        least =
+            std::min(least, apothem - 0.06 - (p - center).dot(at(60.0 * side)));
+      }
+      most = std::max(most, least);
+    }
+    return most;
+  };
+  const auto is_in_door = [&](const Vector2d& p) {
+    for (const double angle : {30.0, 150.0, 270.0}) {
+      const Vector2d q = p - corner;
+      const double along = q.dot(at(angle));
+      const double across = q.dot(at(angle + 90.0));
+      if (std::abs(across) < 0.12 && std::abs(along - 0.5 * kSide) < 0.45) {
+        return true;
+      }
+    }
+    return false;
+  };
+  for (int row = 0; row < space.height; ++row) {
+    for (int column = 0; column < space.width; ++column) {
+      const double depth = inside(space.Middle(column, row));
+      const bool is_open = is_in_door(space.Middle(column, row));
+      if (depth < -0.04 && !is_open) continue;
+      space.cells[static_cast<std::size_t>(row) * space.width + column] =
+          depth > 0.0 || is_open ? Space::kFree : Space::kOccupied;
+    }
+  }
+  std::vector<KnownWall> walls;
+  for (const Vector2d& center : centers) {
+    for (int side = 0; side < 6; ++side) {
+      const Vector2d middle = center + (apothem - 0.06) * at(60.0 * side);
+      const Vector2d along = at(60.0 * side + 90.0);
+      const bool has_door = is_in_door(middle + 0.06 * at(60.0 * side));
+      if (!has_door) {
+        walls.push_back({middle - 1.25 * along, middle + 1.25 * along});
+        continue;
+      }
+      walls.push_back({middle - 1.25 * along, middle - 0.47 * along});
+      walls.push_back({middle + 0.47 * along, middle + 1.25 * along});
+    }
+  }
+  const BuildingPlan plan = MakeBuildingPlan(
+      walls, {DegToRad(0.0), DegToRad(60.0), DegToRad(120.0)}, space, {});
+  EXPECT_EQ(plan.rooms.size(), 3u);
+  EXPECT_EQ(plan.doors.size(), 3u);
+}
+
 }  // namespace
 }  // namespace plumbline

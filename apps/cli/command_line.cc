@@ -92,7 +92,8 @@ bool CanRead(const gflags::CommandLineFlagInfo& flag,
 }
 
 // What the name of a flag that is not known may have been meant for, for
-// people: " (--input?)", or nothing.
+// people: " (--input?)", or nothing. Whoever writes --output may mean --outputs
+// as well as --output_dir.
 std::string Guess(const std::string& name) {
   std::vector<gflags::CommandLineFlagInfo> flags;
   gflags::GetAllFlags(&flags);
@@ -103,7 +104,14 @@ std::string Guess(const std::string& name) {
   }
   std::sort(names.begin(), names.end());
   const std::string nearest = NearestWord(name, names);
-  return nearest.empty() ? "" : " (--" + nearest + "?)";
+  if (nearest.empty()) return "";
+  const auto longer =
+      std::find_if(names.begin(), names.end(), [&](const std::string& other) {
+        return other.compare(0, name.size() + 1, name + "_") == 0;
+      });
+  const std::string or_longer =
+      longer == names.end() || *longer == nearest ? "" : " or --" + *longer;
+  return " (--" + nearest + or_longer + "?)";
 }
 
 // --flagfile takes files; gflags knows it as a flag like any other.

@@ -12,6 +12,7 @@
 DEFINE_uint64(test_number, 1, "For a test");
 DEFINE_bool(test_switch, false, "For a test");
 DEFINE_bool(test_other, false, "For a test");
+DEFINE_string(test_words_file, "", "");
 DEFINE_string(test_word, "", "For a test");
 
 namespace plumbline {
@@ -153,6 +154,14 @@ TEST_F(CommandLineTest, WordsOfTheCommandLine) {
   EXPECT_THAT(problems({"--test_word", "-1", "--test_number", "7",
                         "--notest_switch", "word", "-"}),
               IsEmpty());
+}
+
+TEST_F(CommandLineTest, WhatAFlagMayHaveBeen) {
+  EXPECT_THAT(ReadCommandLine({"--test_numbr=1"}).problems,
+              ElementsAre(HasSubstr("no such flag (--test_number?)")));
+  EXPECT_THAT(ReadCommandLine({"--test_words=1"}).problems,
+              ElementsAre(HasSubstr(
+                  "no such flag (--test_word or --test_words_file?)")));
 }
 
 }  // namespace

@@ -13,6 +13,8 @@ namespace {
 
 // A wall that long should have a direction of the building, m.
 constexpr double kLongWall = 5.0;
+// A way outside of all rooms is told from this on, m.
+constexpr double kLongOutside = 5.0;
 // So many rooms are named.
 constexpr int kMostNamed = 5;
 
@@ -149,6 +151,13 @@ std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {
   const BuildingPlan* const plan = outcome.BuildingIfMade();
   const std::string rooms = plan == nullptr ? "" : RoomsWithoutDoor(*plan);
   if (!rooms.empty()) Append(rooms, &list);
+  if (summary.plan && summary.plan->rooms > 0 &&
+      summary.plan->way_outside >= kLongOutside) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.0f m of the way lie in no room",
+                  summary.plan->way_outside);
+    Append(text, &list);
+  }
   return list;
 }
 

@@ -322,6 +322,11 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
   if (summary.scans > 0) {
     json["frontend"] = FrontendToJson(summary);
     json["tracking"] = TrackingToJson(summary.tracking);
+    if (summary.plan) {
+      json["plan"] = {{"rooms", summary.plan->rooms},
+                      {"doors", summary.plan->doors},
+                      {"way_outside_m", summary.plan->way_outside}};
+    }
     if (summary.alignment) {
       const Pose2& by = *summary.alignment;
       json["alignment"] = {{"kind", "building"},

@@ -84,6 +84,15 @@ struct Summary {
   };
   Closures closures;
 
+  /// Of a log whose plan was made (BuildingPlan): rooms, doors, and how far the
+  /// robot went outside of all rooms, m.
+  struct Plan {
+    std::int64_t rooms = 0;
+    std::int64_t doors = 0;
+    double way_outside = 0.0;
+  };
+  std::optional<Plan> plan;
+
   /// Sums of squared whitened residuals (CostReport): before anything was
   /// optimized, and at the end.
   double initial_cost = 0.0;
@@ -252,7 +261,9 @@ std::string CountsAsJson(const Summary& summary);
 /// and by how much the robot drove to the left of where its laser looks),
 /// open_way_m (along which nothing tells how far the robot went; of logs
 /// without odometry), format, scans, odometry (names; of logs that tell), notes
-/// [text]}, tracking {pieces, loose [{begin, end, why}]}, where the outputs
+/// [text]}, tracking {pieces, loose [{begin, end, why}]}, where a plan was made
+/// plan {rooms, doors, way_outside_m (of the robot, in no room; stretches of
+/// over 2 m)}, where the outputs
 /// were moved alignment {kind, x, y, theta_deg} (m and degrees), and where
 /// there were several logs
 /// [{input, trajectory (or null), scans, map, parts, agreeing, contradicting,

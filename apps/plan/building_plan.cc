@@ -70,6 +70,9 @@ constexpr double kLongOutside = 10.0;
 constexpr double kOftenOutside = 0.05;
 constexpr double kFarther = 2.0;
 constexpr double kLessOutside = 0.5;
+// In a doorway the robot is outside of the rooms on both sides for no more than
+// this, m.
+constexpr double kDoorway = 2.0;
 // What is a room then has so much wall around it, and lies open for no more.
 constexpr double kClosedHall = 0.6;
 constexpr double kOpenHall = 0.2;
@@ -833,6 +836,38 @@ WayInRooms MarkEntered(const std::vector<Pose2>& path,
   return way;
 }
 
+// How far the robot went outside of all rooms, m, but for doorways.
+double WayOutside(const std::vector<Pose2>& path,
+                  const std::vector<PlanRoom>& rooms) {
+  double all = 0.0;
+  double stretch = 0.0;
+  Vector2d before = Vector2d::Constant(std::nan(""));
+  std::size_t last = 0;
+  for (const Pose2& pose : path) {
+    const Vector2d here = pose.head<2>();
+    if (!here.allFinite()) {
+      // Another log begins.
+      before = here;
+      continue;
+    }
+    bool is_inside = false;
+    for (std::size_t i = 0; i < rooms.size() && !is_inside; ++i) {
+      const std::size_t which = (last + i) % rooms.size();
+      is_inside = rooms[which].outline.Contains(here);
+      if (is_inside) last = which;
+    }
+    const double step = before.allFinite() ? (here - before).norm() : 0.0;
+    before = here;
+    if (!is_inside) {
+      stretch += step;
+      continue;
+    }
+    if (stretch > kDoorway) all += stretch;
+    stretch = 0.0;
+  }
+  return stretch > kDoorway ? all + stretch : all;
+}
+
 // Which doors the robot drove through, and which rooms are neighbors.
 void TakePath(const std::vector<Pose2>& path, BuildingPlan* plan) {
   for (std::size_t i = 0; i < path.size(); ++i) {
@@ -1056,6 +1091,7 @@ BuildingPlan MakeBuildingPlan(const std::vector<KnownWall>& walls,
   JoinDoorsOfPassages(space, &plan.doors);
   TakePath(path, &plan);
   for (PlanRoom& room : plan.rooms) room.kind = KindOf(room);
+  plan.way_outside = WayOutside(path, plan.rooms);
   return plan;
 }
 

@@ -101,6 +101,9 @@ struct BuildingPlan {
   std::vector<PlanRoom> rooms;
   std::vector<PlanDoor> doors;
   std::vector<PlanWall> walls;
+  /// How far the robot went outside of all rooms, m, in stretches of over 2 m:
+  /// there is a space that is not on the plan.
+  double way_outside = 0.0;
 };
 
 /// Makes the plan of a building from what a robot saw.

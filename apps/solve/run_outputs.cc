@@ -188,6 +188,11 @@ void WriteOutputs(SolveOutcome* outcome, RunClock* clock,
     if (written.is_cut) outcome->summary.partial = true;
     outcome->summary.files = std::move(written.files);
     outcome->summary.digests = written.digests;
+    if (const BuildingPlan* plan = outcome->BuildingIfMade()) {
+      outcome->summary.plan = {static_cast<std::int64_t>(plan->rooms.size()),
+                               static_cast<std::int64_t>(plan->doors.size()),
+                               plan->way_outside};
+    }
     outcome->summary.write_seconds = watch.Seconds();
     clock->Read(&outcome->summary);
     outcome->summary.peak_memory_bytes = PeakMemoryBytes();

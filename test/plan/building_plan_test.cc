@@ -89,6 +89,20 @@ TEST(BuildingPlanTest, RoomsAndDoorsOfACorridor) {
   EXPECT_EQ(entered, 2);
 }
 
+// The robot drives out of the last room for 6 m, in steps of 0.1 m; what it
+// drives in a doorway does not count.
+TEST(BuildingPlanTest, AWayOutsideOfAllRooms) {
+  std::vector<Pose2> path;
+  for (double y = 2.0; y < 6.0; y += 0.1) path.emplace_back(2.4, y, 0.0);
+  EXPECT_EQ(PlanOf(TwoRooms(), path).way_outside, 0.0);
+  for (double y = 6.0; y < 14.05; y += 0.1) path.emplace_back(2.4, y, 0.0);
+  EXPECT_NEAR(PlanOf(TwoRooms(), path).way_outside, 6.0, 0.2);
+  // The next log, elsewhere outside.
+  path.emplace_back(Pose2::Constant(std::nan("")));
+  path.emplace_back(40.0, 40.0, 0.0);
+  EXPECT_NEAR(PlanOf(TwoRooms(), path).way_outside, 6.0, 0.2);
+}
+
 // A corridor of 2 by 8 m runs into a hall of 6 by 8 m; `room_width` makes the
 // hall narrower.
 BuildingPlan CorridorIntoHall(double room_width) {

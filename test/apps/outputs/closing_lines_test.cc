@@ -105,6 +105,17 @@ TEST_F(ClosingLinesTest, WhatMayBeAnotherBuildingAndLengthsThatAreOpen) {
             "worth a look: 1 log may be of another building");
 }
 
+TEST_F(ClosingLinesTest, AWayThroughWhatIsOnNoPlan) {
+  outcome_.summary.plan = Summary::Plan{3, 2, 4.0};
+  EXPECT_EQ(ClosingLines(outcome_, "out").size(), 1u);
+  outcome_.summary.plan->way_outside = 23.4;
+  EXPECT_EQ(ClosingLines(outcome_, "out")[1],
+            "worth a look: 23 m of the way lie in no room");
+  // Outdoors there are none.
+  outcome_.summary.plan->rooms = 0;
+  EXPECT_EQ(ClosingLines(outcome_, "out").size(), 1u);
+}
+
 TEST_F(ClosingLinesTest, LogsThatWereKeptApart) {
   outcome_.summary.logs.resize(4);
   outcome_.summary.logs[1].why_apart = "it fits in two places";

@@ -194,6 +194,7 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
   summary.skipped = {{"too short", 2, {7, 9}}};
   summary.tracking.loose = {{2.5, 7.25, "a gap"}};
   summary.tracking.pieces = 2;
+  summary.plan = Summary::Plan{4, 3, 6.5};
   for (int i = 0; i < 20; ++i) summary.scan_seconds.push_back(i);
   std::ostringstream output;
   WriteSummary(summary, output);
@@ -205,7 +206,9 @@ TEST(SummaryTest, HasTheKeysOfTheContract) {
             (std::vector<std::string>{
                 "input", "seed", "flags", "counts", "cost", "em", "time_s",
                 "peak_memory_bytes", "orthogonality_deg", "closures", "version",
-                "files", "sha256", "partial", "frontend", "tracking"}));
+                "files", "sha256", "partial", "frontend", "tracking", "plan"}));
+  EXPECT_EQ(json["plan"].dump(),
+            R"({"rooms":4,"doors":3,"way_outside_m":6.5})");
   EXPECT_EQ(json["tracking"].dump(),
             R"({"pieces":2,"loose":[{"begin":2.5,"end":7.25,"why":"a gap"}]})");
   EXPECT_EQ(json["input"], "a\xEF\xBF\xBD.clf");

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -181,6 +182,39 @@ bool AreNeighbors(const Face& a, const Face& b) {
   return false;
 }
 
+// Of each face the others whose box is no farther from its own than `gap`, m.
+std::vector<std::vector<std::size_t>> NearFaces(const std::vector<Face>& faces,
+                                                double gap) {
+  std::vector<std::size_t> order(faces.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  const auto low = [&](std::size_t i) {
+    return Vector2d(faces[i].begin.cwiseMin(faces[i].end));
+  };
+  const auto high = [&](std::size_t i) {
+    return Vector2d(faces[i].begin.cwiseMax(faces[i].end));
+  };
+  std::stable_sort(
+      order.begin(), order.end(),
+      [&](std::size_t a, std::size_t b) { return low(a)[0] < low(b)[0]; });
+  std::vector<std::vector<std::size_t>> near(faces.size());
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    const std::size_t i = order[place];
+    const Vector2d from = low(i);
+    const Vector2d to = high(i);
+    for (std::size_t next = place + 1; next < order.size(); ++next) {
+      const std::size_t j = order[next];
+      if (low(j)[0] > to[0] + gap) break;
+      if (low(j)[1] > to[1] + gap || high(j)[1] < from[1] - gap) continue;
+      near[i].push_back(j);
+      near[j].push_back(i);
+    }
+  }
+  for (std::vector<std::size_t>& list : near) {
+    std::sort(list.begin(), list.end());
+  }
+  return near;
+}
+
 class CurveFinder {
  public:
   CurveFinder(const SpaceGrid& space, const WallLineOptions& lines,
@@ -189,13 +223,15 @@ class CurveFinder {
         lines_(lines),
         options_(options),
         faces_(std::move(faces)),
+        near_(NearFaces(faces_, std::max(options.max_gap, kNeighborGap) +
+                                    options.on_circle)),
         is_taken_(faces_.size(), false) {}
 
   std::vector<CurvedWall> Find() {
     std::vector<Arc> candidates;
     for (std::size_t i = 0; i < faces_.size(); ++i) {
-      for (std::size_t j = i + 1; j < faces_.size(); ++j) {
-        if (!AreNeighbors(faces_[i], faces_[j])) continue;
+      for (const std::size_t j : near_[i]) {
+        if (j <= i || !AreNeighbors(faces_[i], faces_[j])) continue;
         Arc arc;
         if (Grow(i, j, &arc)) candidates.push_back(std::move(arc));
       }
@@ -269,11 +305,7 @@ class CurveFinder {
     const Vector2d way = faces_[first].middle() - arc->circle.center;
     arc->from = std::atan2(way[1], way[0]) - kPi;
     std::vector<Piece> pieces;
-    for (std::size_t i = 0; i < faces_.size(); ++i) {
-      if (is_taken_[i] ||
-          !LiesOn(faces_[i], arc->circle, 0.0, 0.0, options_.on_circle)) {
-        continue;
-      }
+    for (const std::size_t i : FacesOn(arc->circle, first)) {
       const double middle = arc->AngleOf(faces_[i].middle());
       const double half = 0.5 * faces_[i].length() / arc->circle.radius;
       pieces.push_back({middle - half, middle + half, i});
@@ -313,6 +345,25 @@ class CurveFinder {
     std::sort(arc->faces.begin(), arc->faces.end());
     // All around.
     if (arc->from + 2.0 * kPi <= arc->to + gap) arc->to = arc->from + 2.0 * kPi;
+  }
+
+  // The faces on a circle that are reached from one of them, each near to one
+  // before.
+  std::vector<std::size_t> FacesOn(const Circle& circle,
+                                   std::size_t first) const {
+    std::vector<std::size_t> found;
+    std::set<std::size_t> seen = {first};
+    const auto lies_on = [&](std::size_t face) {
+      return !is_taken_[face] &&
+             LiesOn(faces_[face], circle, 0.0, 0.0, options_.on_circle);
+    };
+    if (lies_on(first)) found.push_back(first);
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      for (const std::size_t face : near_[found[k]]) {
+        if (seen.insert(face).second && lies_on(face)) found.push_back(face);
+      }
+    }
+    return found;
   }
 
   bool IsCurve(const Arc& arc) const {
@@ -675,6 +726,8 @@ class CurveFinder {
   const WallLineOptions& lines_;
   const CurvedWallOptions& options_;
   const std::vector<Face> faces_;
+  // Of each face those that a curve may go on with.
+  const std::vector<std::vector<std::size_t>> near_;
   std::vector<bool> is_taken_;
 };
 
@@ -688,7 +741,8 @@ std::vector<CurvedWall> TakeCurvedWalls(const SpaceGrid& space,
   std::vector<std::size_t> piece_of;
   for (std::size_t i = 0; i < pieces->size(); ++i) {
     const Face face{(*pieces)[i].begin, (*pieces)[i].end};
-    if (!(face.length() >= kShortest)) continue;
+    if (!(face.length() >= kShortest) || !std::isfinite(face.length()))
+      continue;
     faces.push_back(face);
     piece_of.push_back(i);
   }

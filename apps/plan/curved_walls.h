@@ -47,8 +47,8 @@ struct CurvedWall {
 /// Walls along circles among known faces: at least three faces of different
 /// directions, which meet nearly, all of them on the circle. Two faces of one
 /// wall make one. Known faces that
-/// lie on one are taken from `pieces`. Deterministic; cost grows with the
-/// number of pairs of neighbouring faces times that of all faces.
+/// lie on one are taken from `pieces`. Deterministic; places that are far apart
+/// cost nothing together.
 ///
 /// Method: circles through pairs of neighbouring faces, grown by what lies on
 /// them (a geometric least squares fit of the circle), the one with most wall

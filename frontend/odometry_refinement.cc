@@ -89,6 +89,22 @@ constexpr double kLeastKnown = 0.8;
 // Standard deviations of odometry within which a place is looked for that it
 // leads to over a gap.
 constexpr double kNearSigmas = 2.0;
+// Within so many a place that fits a scan by this share as well, and lies so
+// far from the match, m, looks alike. Places are tried so far apart, m, where
+// the scan fits by a share of that without being moved.
+constexpr double kAlikeSigmas = 3.0;
+constexpr double kAlikeShare = 0.8;
+constexpr double kLeastAlike = 0.3;
+constexpr double kAlikeStep = 0.1;
+constexpr double kAlikeToTry = 0.6;
+// A match that leaves odometry by no more standard deviations stays. Where
+// places look alike it is held by this where odometry leads, m.
+constexpr double kOffAlike = 1.5;
+constexpr double kHeldWhereAlike = 0.02;
+// It fits there as well where so much of what it sees is known, and no more of
+// that, by this share, has come in between.
+constexpr double kKnownWhereAlike = 0.6;
+constexpr double kAsWell = 0.02;
 // Standard deviations of a tie: m and rad, and those that grow with the way.
 constexpr double kTieSigma = 0.03;
 constexpr double kTieAngle = DegToRad(0.5);
@@ -511,6 +527,77 @@ MatchResult OdometryRefiner::MatchNearOdometry(const MatchPrior& prior,
              : there;
 }
 
+bool OdometryRefiner::LooksAlikeNear(const MatchPrior& prior,
+                                     const MatchResult& match,
+                                     const Eigen::Vector2d& laser) const {
+  const ScanMatcher& matcher = track_.matcher;
+  MatchPrior held = prior;
+  held.is_heavy_tailed = false;
+  const auto quality_at = [&](const Pose2& pose) {
+    return matcher.Compare(points_, pose, laser).Quality();
+  };
+  const double alike = kAlikeShare * quality_at(match.pose);
+  const Eigen::Matrix2d covariance =
+      prior.information.inverse().topLeftCorner<2, 2>();
+  const Eigen::Matrix2d within = covariance.inverse();
+  const double farthest =
+      std::min(kAlikeSigmas * std::sqrt(covariance.diagonal().maxCoeff()),
+               options_.max_search_translation);
+  const int steps = static_cast<int>(farthest / kAlikeStep);
+  for (int i = -steps; i <= steps; ++i) {
+    for (int k = -steps; k <= steps; ++k) {
+      Pose2 there = prior.pose;
+      there.head<2>() += kAlikeStep * Eigen::Vector2d(i, k);
+      there[2] = match.pose[2];
+      const Eigen::Vector2d left = there.head<2>() - prior.pose.head<2>();
+      const auto is_elsewhere = [&](const Pose2& pose) {
+        return (pose - match.pose).head<2>().norm() >= kLeastAlike;
+      };
+      if (left.dot(within * left) > Square(kAlikeSigmas) ||
+          !is_elsewhere(there) || quality_at(there) < kAlikeToTry * alike) {
+        continue;
+      }
+      const MatchResult refined = matcher.Refine(points_, there, held);
+      if (is_elsewhere(refined.pose) && quality_at(refined.pose) >= alike) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+bool OdometryRefiner::StayWhereAlike(const MatchPrior& prior,
+                                     const Eigen::Vector2d& laser,
+                                     double seen_through,
+                                     MatchResult* match) const {
+  const Eigen::Vector2d way = (match->pose - prior.pose).head<2>();
+  if (SquaredInnovation(*match, prior) <= Square(kOffAlike) ||
+      way.norm() < kLeastAlike) {
+    return true;
+  }
+  const ScanMatcher& matcher = track_.matcher;
+  const Eigen::Vector3d along(way[0] / way.norm(), way[1] / way.norm(), 0.0);
+  MatchPrior held = prior;
+  held.is_heavy_tailed = false;
+  held.information += along * along.transpose() / Square(kHeldWhereAlike);
+  MatchResult there = matcher.Refine(points_, prior.pose, held);
+  const ScanAgreement agreement = matcher.Compare(points_, there.pose, laser);
+  const bool fits = !Contradicts(agreement, seen_through);
+  const bool fits_as_well =
+      fits && agreement.hits >= options_.tracking.min_hits &&
+      agreement.KnownShare() >= kKnownWhereAlike &&
+      agreement.Support() >=
+          matcher.Compare(points_, match->pose, laser).Support() - kAsWell;
+  if (!fits_as_well && !LooksAlikeNear(prior, *match, laser)) return true;
+  if (trace_) trace_(fits ? "alike: where odometry leads" : "alike: nowhere");
+  if (!fits) return false;
+  const Eigen::Matrix3d aside =
+      Eigen::Matrix3d::Identity() - along * along.transpose();
+  there.information = (aside * there.information * aside).eval();
+  *match = there;
+  return true;
+}
+
 bool OdometryRefiner::Contradicts(const ScanAgreement& agreement,
                                   double seen_through) const {
   const TrackingOptions& tracking = options_.tracking;
@@ -587,13 +674,16 @@ bool OdometryRefiner::StandsUpTo(const Scan& scan, const MatchPrior& prior,
   double least = options_.minimum_inlier_ratio;
   if (!agrees || track_.after_gap) least = tracking.min_ratio_after_gap;
   if (!agrees && track_.after_gap) least = options_.good_inlier_ratio;
-  const bool believed =
+  bool believed =
       ratio >= least && match->inliers >= options_.minimum_points &&
       (agrees || here.hits >= tracking.min_hits) &&
       (agrees || !track_.after_gap ||
        (!goes_on && here.Support() >= tracking.min_unexpected_support &&
         here.KnownShare() >= kLeastKnown)) &&
       !((track_.after_gap || !agrees) && Contradicts(here, before));
+  if (believed && goes_on) {
+    believed = StayWhereAlike(prior, laser, before, match);
+  }
   if (!believed && (track_.after_gap || Contradicts(there, before))) {
     outcome->verdict = Outcome::Verdict::kContradicted;
     outcome->why = track_.after_gap

@@ -393,6 +393,16 @@ class OdometryRefiner {
   MatchResult MatchNearOdometry(const MatchPrior& prior,
                                 const Eigen::Vector2d& laser,
                                 double seen_through) const;
+  // Whether the scan fits about as well elsewhere within what odometry leaves
+  // open: places look alike. `laser`: in the robot's frame.
+  bool LooksAlikeNear(const MatchPrior& prior, const MatchResult& match,
+                      const Eigen::Vector2d& laser) const;
+  // Takes a match over a gap that leaves odometry back to where that leads when
+  // the scan fits there as well, or other places look like that of the match,
+  // which then tells nothing of how far the robot went. False when it does not
+  // fit there, and may be at any of these. `seen_through`: see Contradicts.
+  bool StayWhereAlike(const MatchPrior& prior, const Eigen::Vector2d& laser,
+                      double seen_through, MatchResult* match) const;
   // Whether more is intruding or seen through than may be; `seen_through`:
   // share that was before.
   bool Contradicts(const ScanAgreement& agreement, double seen_through) const;

@@ -1334,6 +1334,59 @@ TEST(OdometryRefinerTest, OdometryTellsTheWayOverALongGap) {
             std::string::npos);
 }
 
+// Ribs every 0.6 m on both sides, 0.1 m wide and 0.08 m deep: over a gap a scan
+// fits the ones before as well, against odometry.
+TEST(OdometryRefinerTest, OdometryOverAGapTellsRibsApart) {
+  std::vector<WallEnds> walls = {{{0.0, -1.0}, {0.0, 1.0}},
+                                 {{30.0, -1.0}, {30.0, 1.0}}};
+  for (const double side : {-1.0, 1.0}) {
+    walls.push_back({{0.0, side}, {30.0, side}});
+    for (int i = 1; i < 50; ++i) {
+      const double x = 0.6 * i;
+      const double front = 0.89 * side;
+      walls.push_back({{x - 0.05, front}, {x + 0.05, front}});
+      walls.push_back({{x - 0.05, front}, {x - 0.05, side}});
+      walls.push_back({{x + 0.05, front}, {x + 0.05, side}});
+    }
+  }
+  Laser laser;
+  laser.maximum_range = 6.5;
+  laser.sigma = 0.01;
+  for (const double missing : {2.24, 3.64}) {
+    Noise noise(4);
+    OdometryRefiner refiner(RefinerOptions());
+    std::vector<Pose2> truths;
+    std::vector<Pose2> odometry = {Pose2::Zero()};
+    std::vector<RefinedScan> refined;
+    double time = 100.0;
+    double way = 0.0;
+    for (int i = 0; i < 85; ++i) {
+      const bool is_gap = i == 70;
+      const double step = i == 0 ? 0.0 : is_gap ? missing : 0.14;
+      way += step;
+      time += is_gap ? missing / 0.7 : 0.2;
+      truths.push_back({1.0 + way, 0.0, 0.0});
+      // By 1 % too long.
+      odometry.push_back(
+          Compose(odometry.back(), Pose2(1.01 * step, 0.0, 0.0)));
+      Scan scan = MakeScan(walls, truths.back(), laser, &noise);
+      scan.timestamp = time;
+      scan.odometry = odometry.back();
+      refiner.Process(scan);
+      refined = TakeAll(&refiner, std::move(refined));
+    }
+    refiner.Finish();
+    refined = TakeAll(&refiner, std::move(refined));
+    ASSERT_EQ(refined.size(), truths.size());
+    for (std::size_t i = 0; i < truths.size(); ++i) {
+      EXPECT_LT(
+          PositionError(refined[i].pose, Between(truths.front(), truths[i])),
+          0.3)
+          << missing << " m missing, scan " << i;
+    }
+  }
+}
+
 // Scans are missing again before it is known where a robot was carried to,
 // which is found out then: what odometry says of the second gap counts from
 // where the robot is found to have been.

@@ -74,6 +74,12 @@ constexpr double kLeastWayAhead = 0.02;
 constexpr double kSays = 0.5;
 constexpr double kThing = 1.0;
 constexpr double kOfOneThing = 0.8;
+// What speaks for one of two poses is nearer to what was seen there by so large
+// a share of what lies between them. For wheels at least so many that lie apart
+// have to, and this share of those that speak for the match.
+constexpr double kSpeaks = 0.5;
+constexpr int kLeastForWheels = 4;
+constexpr double kShareForWheels = 0.5;
 // The usual time between scans follows with this share.
 constexpr double kUsualShare = 0.05;
 // Share by which the noise of the laser has to change before it is followed.
@@ -184,6 +190,23 @@ int CountApart(const std::vector<ScanPoint>& points) {
     ++count;
   }
   return count;
+}
+
+// Where the stretch of kThing begins that has nearly all of these depths; none
+// where there is no such.
+std::optional<double> OneThing(std::vector<double> depths) {
+  std::sort(depths.begin(), depths.end());
+  std::size_t most = 0;
+  double begin = 0.0;
+  for (std::size_t first = 0, end = 0; first < depths.size(); ++first) {
+    while (end < depths.size() && depths[end] <= depths[first] + kThing) ++end;
+    if (end - first > most) {
+      most = end - first;
+      begin = depths[first];
+    }
+  }
+  if (most == 0 || most < kOfOneThing * depths.size()) return std::nullopt;
+  return begin;
 }
 
 // Cauchy's loss: wheels slip more often than a normal distribution says.
@@ -400,10 +423,14 @@ void OdometryRefiner::MatchAsWheelsSay(const Scan& scan,
     return;
   }
   const Pose2 guess(by_wheels[0], by_wheels[1], match->pose[2]);
-  const std::vector<ScanPoint> standing =
-      WithoutOneThing(PoseTransform(Inverse(guess))
-                          .Direction((match->pose - by_wheels).head<2>())
-                          .normalized());
+  const Eigen::Vector2d direction =
+      PoseTransform(Inverse(guess))
+          .Direction((match->pose - by_wheels).head<2>())
+          .normalized();
+  std::vector<ScanPoint> standing = WithoutOneThing(direction);
+  if (standing.empty()) {
+    standing = WithoutWhatGoes(direction, guess, match->pose);
+  }
   if (standing.empty()) return;
   MatchPrior wheels;
   wheels.pose = guess;
@@ -465,25 +492,49 @@ std::vector<ScanPoint> OdometryRefiner::WithoutOneThing(
   for (const ScanPoint& point : points_) {
     if (says(point)) depths.push_back(point.position.dot(direction));
   }
-  std::sort(depths.begin(), depths.end());
-  std::size_t most = 0;
-  double begin = 0.0;
-  for (std::size_t first = 0, end = 0; first < depths.size(); ++first) {
-    while (end < depths.size() && depths[end] <= depths[first] + kThing) ++end;
-    if (end - first > most) {
-      most = end - first;
-      begin = depths[first];
-    }
-  }
+  const std::optional<double> thing = OneThing(std::move(depths));
   std::vector<ScanPoint> rest;
-  if (most == 0 || most < kOfOneThing * depths.size()) return rest;
+  if (!thing) return rest;
   for (const ScanPoint& point : points_) {
     const double depth = point.position.dot(direction);
-    if (!says(point) || depth < begin || depth > begin + kThing) {
+    if (!says(point) || depth < *thing || depth > *thing + kThing) {
       rest.push_back(point);
     }
   }
   return rest;
+}
+
+// A vehicle in an aisle has more returns than the corners of all shelves, and
+// takes the match along. Wheels that slip have next to nothing on their side,
+// and all that stands against them.
+std::vector<ScanPoint> OdometryRefiner::WithoutWhatGoes(
+    const Eigen::Vector2d& direction, const Pose2& by_wheels,
+    const Pose2& matched) const {
+  const std::vector<double> there = track_.matcher.Errors(points_, by_wheels);
+  const std::vector<double> here = track_.matcher.Errors(points_, matched);
+  const double apart = (matched - by_wheels).head<2>().norm();
+  std::vector<ScanPoint> rest;
+  std::vector<ScanPoint> for_wheels;
+  std::vector<ScanPoint> for_match;
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const ScanPoint& point = points_[i];
+    const double says = std::abs(point.normal.dot(direction));
+    const double least = kSpeaks * says * apart;
+    if (says >= kSays && here[i] + least < there[i]) {
+      for_match.push_back(point);
+      depths.push_back(point.position.dot(direction));
+      continue;
+    }
+    if (says >= kSays && there[i] + least < here[i]) {
+      for_wheels.push_back(point);
+    }
+    rest.push_back(point);
+  }
+  const int wheels = CountApart(for_wheels);
+  const bool many = wheels >= kLeastForWheels &&
+                    wheels >= kShareForWheels * CountApart(for_match);
+  return many || OneThing(std::move(depths)) ? rest : std::vector<ScanPoint>();
 }
 
 void OdometryRefiner::MatchWithoutIntruders(const std::vector<bool>& intruders,

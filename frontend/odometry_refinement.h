@@ -361,8 +361,9 @@ class OdometryRefiner {
   bool HaveWheelsBeenSteady() const;
   // Odometry since the last key scan, as a pose of the scan.
   Pose2 ByWheels(const Scan& scan) const;
-  // Where the robot moves steadily and one thing alone leads a match far from
-  // where odometry since the last key scan does, takes the match without it.
+  // Where the robot moves steadily and a match leads far from where odometry
+  // since the last key scan does, by one thing alone or against much of what
+  // the robot sees, takes the match without what leads there.
   void MatchAsWheelsSay(const Scan& scan, const MatchPrior& prior,
                         MatchResult* match);
   // Returns of the last scan without those of the one thing that says how far
@@ -370,6 +371,12 @@ class OdometryRefiner {
   // more than one.
   std::vector<ScanPoint> WithoutOneThing(
       const Eigen::Vector2d& direction) const;
+  // Of returns that say how far the robot went in a direction: those of the
+  // last scan without the ones that speak for the pose `matched` against that
+  // of wheels, where enough speak the other way round; none otherwise.
+  std::vector<ScanPoint> WithoutWhatGoes(const Eigen::Vector2d& direction,
+                                         const Pose2& by_wheels,
+                                         const Pose2& matched) const;
   // Takes the match of the returns that are no intruders where it agrees with
   // the reference at least as well as the present one, `here`.
   void MatchWithoutIntruders(const std::vector<bool>& intruders,

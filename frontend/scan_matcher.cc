@@ -757,6 +757,26 @@ PeakGrid ScanMatcher::GridOfPeaks() const {
           origin_, options_.grid_resolution,  viewpoints_};
 }
 
+std::vector<double> ScanMatcher::Errors(const std::vector<ScanPoint>& scan,
+                                        const Pose2& pose) const {
+  std::vector<double> errors(scan.size(),
+                             std::numeric_limits<double>::infinity());
+  const PoseTransform transform(pose);
+  int neighbour = -1;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if (scan[i].normal.squaredNorm() == 0.0) continue;
+    const Eigen::Vector2d position = transform.Point(scan[i].position);
+    const int index =
+        NearestReference(position, transform.Direction(scan[i].normal),
+                         options_.final_radius, neighbour);
+    if (index < 0) continue;
+    neighbour = index;
+    const Surface& partner = reference_[index];
+    errors[i] = std::abs(partner.normal.dot(position - partner.position));
+  }
+  return errors;
+}
+
 ScanAgreement ScanMatcher::Compare(const std::vector<ScanPoint>& scan,
                                    const Pose2& pose,
                                    const Eigen::Vector2d& laser,

@@ -212,6 +212,12 @@ class ScanMatcher {
                         const Eigen::Vector2d& laser,
                         std::vector<bool>* intruders = nullptr) const;
 
+  /// How far each return lies from the surface that it is a part of at this
+  /// pose, m: from the nearest one of the reference within the final radius;
+  /// infinite where there is none, and without a normal.
+  std::vector<double> Errors(const std::vector<ScanPoint>& scan,
+                             const Pose2& pose) const;
+
   /// Best pose on a lattice around `center`: translations up to
   /// `translation_window` (m) each way, rotations up to `rotation_window`
   /// (rad) each way. `score`, if not null, gets the mean likelihood of a

@@ -1856,6 +1856,44 @@ TEST(OdometryRefinerTest, PeopleWhoWalkAlong) {
   EXPECT_TRUE(refiner.loose().empty());
 }
 
+// A vehicle drives ahead of the robot in an aisle of shelves. It has more
+// returns than all corners of shelves in sight, each of which says how far the
+// robot went.
+TEST(OdometryRefinerTest, AVehicleInAnAisleDoesNotTakeTheRobotAlong) {
+  std::vector<WallEnds> shelves = {{{-3.0, -2.4}, {-3.0, 2.4}}};
+  for (int k = 0; k < 7; ++k) {
+    for (const double y : {-1.8, 1.8}) {
+      for (const WallEnds& side :
+           testing::Moved(Room(2.5, 1.1), {2.7 * k - 1.5, y, 0.0})) {
+        shelves.push_back(side);
+      }
+    }
+  }
+  Laser laser;
+  laser.sigma = 0.01;
+  laser.maximum_range = 12.0;
+  Noise noise(3);
+  OdometryRefiner refiner(RefinerOptions());
+  double largest = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    const Pose2 truth(0.06 * i, 0.0, 0.0);
+    std::vector<WallEnds> all = shelves;
+    if (i >= 20) {
+      for (const WallEnds& side :
+           testing::Moved(Room(2.6, 1.1), {2.5 + 0.1 * i, 0.1, 0.0})) {
+        all.push_back(side);
+      }
+    }
+    Scan scan = MakeScan(all, truth, laser, &noise);
+    scan.timestamp = 100.0 + 0.1 * i;
+    // Odometry is 2 % long.
+    scan.odometry = Pose2(0.0612 * i, 0.0, 0.0);
+    largest =
+        std::max(largest, PositionError(refiner.Process(scan).pose, truth));
+  }
+  EXPECT_LT(largest, 0.2);
+}
+
 // Only what lies within 45 degrees of ahead, up to 8 m.
 Scan Narrowed(const Scan& scan) {
   Scan narrow = scan;

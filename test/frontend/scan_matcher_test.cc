@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -106,6 +107,25 @@ TEST(ScanMatcherTest, CovarianceCoversTheErrorsOfNoisyScans) {
 // Every step of the refinement must pair returns with the nearest reference
 // points, whatever is remembered from the step before: each match, begun anew
 // with one more step allowed, is compared with a search through all points.
+TEST(ScanMatcherTest, ErrorsAreDistancesFromTheSurface) {
+  ScanMatcher matcher(MatcherOptions());
+  const std::vector<WallEnds> wall = {{{-3.0, 1.0}, {3.0, 1.0}}};
+  matcher.SetReference(Seen(wall, Pose2::Zero()));
+  std::vector<ScanPoint> scan =
+      PointsOf(MakeScan(wall, Pose2::Zero(), FullCircle()));
+  ASSERT_GT(scan.size(), 10u);
+  for (const double error : matcher.Errors(scan, Pose2(0.0, 0.06, 0.0))) {
+    EXPECT_NEAR(error, 0.06, 0.001);
+  }
+  for (const double error : matcher.Errors(scan, Pose2(0.0, 0.3, 0.0))) {
+    EXPECT_EQ(error, std::numeric_limits<double>::infinity());
+  }
+  scan.front().normal.setZero();
+  EXPECT_EQ(matcher.Errors(scan, Pose2::Zero()).front(),
+            std::numeric_limits<double>::infinity());
+  EXPECT_NEAR(matcher.Errors(scan, Pose2::Zero())[5], 0.0, 0.001);
+}
+
 TEST(ScanMatcherTest, EveryStepPairsWithTheNearest) {
   Laser laser = FullCircle();
   laser.sigma = 0.02;

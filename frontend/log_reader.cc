@@ -1,9 +1,12 @@
 #include <plumbline/core/error.h>
+#include <plumbline/factors/angle.h>
+#include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/carmen_reader.h>
 #include <plumbline/frontend/laser_profile.h>
 #include <plumbline/frontend/log_reader.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -19,6 +22,28 @@ constexpr std::size_t kRecognizedBytes = std::size_t{1} << 16;
 constexpr std::size_t kShownLines = 5;
 // Readings that are the same, m.
 constexpr double kSameReading = 0.0005;
+// A robot that has moved by more, m and rad, sees something else. Fewer returns
+// than this tell nothing; where more scans of a log than this share repeat the
+// one before, its laser may be one without noise.
+constexpr double kMovedWay = 0.02;
+constexpr double kMovedTurn = DegToRad(1.0);
+constexpr std::int64_t kFewestReturns = 10;
+constexpr double kMostRepeated = 0.6;
+
+// Whether a scan is one that was noted before, at another place.
+bool IsRepeated(const Scan& scan, const Scan& before) {
+  if (scan.ranges != before.ranges || scan.bearings != before.bearings ||
+      scan.start_angle != before.start_angle ||
+      scan.angle_step != before.angle_step) {
+    return false;
+  }
+  const Pose2 motion = Between(before.odometry, scan.odometry);
+  return (motion.head<2>().norm() > kMovedWay ||
+          std::abs(motion[2]) > kMovedTurn) &&
+         std::count_if(scan.ranges.begin(), scan.ranges.end(), [](float range) {
+           return range > 0.0f;
+         }) >= kFewestReturns;
+}
 
 }  // namespace
 
@@ -78,6 +103,39 @@ void TakeOutRepeatedRange(const LaserOptions& options, Log* log) {
   log->skipped.push_back(std::move(skip));
 }
 
+void LeaveOutRepeatedScans(Log* log) {
+  std::vector<bool> is_repeated(log->scans.size(), false);
+  std::size_t last = 0;
+  SkipReport skip;
+  for (std::size_t i = 1; i < log->scans.size(); ++i) {
+    is_repeated[i] = IsRepeated(log->scans[i], log->scans[last]);
+    if (!is_repeated[i]) {
+      last = i;
+      continue;
+    }
+    ++skip.count;
+    if (skip.first_lines.size() < kShownLines) {
+      skip.first_lines.push_back(log->scans[i].line);
+    }
+  }
+  if (skip.count == 0 ||
+      static_cast<double>(skip.count) >
+          kMostRepeated * static_cast<double>(log->scans.size())) {
+    return;
+  }
+  skip.reason =
+      "scan with every reading of the one before it although odometry has "
+      "moved: the laser had not looked again";
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < log->scans.size(); ++i) {
+    if (is_repeated[i]) continue;
+    if (kept != i) log->scans[kept] = std::move(log->scans[i]);
+    ++kept;
+  }
+  log->scans.resize(kept);
+  log->skipped.push_back(std::move(skip));
+}
+
 Log ReadLog(const std::string& path, const Registry& registry,
             const LaserOptions& options) {
   if (path != "-") {
@@ -85,6 +143,7 @@ Log ReadLog(const std::string& path, const Registry& registry,
     if (reader != nullptr) {
       Log log = reader->read_path(path, options);
       TakeOutRepeatedRange(options, &log);
+      LeaveOutRepeatedScans(&log);
       return log;
     }
     RefuseFolder(path);
@@ -109,6 +168,7 @@ Log ReadLog(const std::string& path, const Registry& registry,
   }
   Log log = reader->read(&input, options);
   TakeOutRepeatedRange(options, &log);
+  LeaveOutRepeatedScans(&log);
   return log;
 }
 

@@ -83,6 +83,14 @@ void RefuseFolder(const std::string& path);
 /// of formats need not care.
 void TakeOutRepeatedRange(const LaserOptions& options, Log* log);
 
+/// Leaves out scans that have every reading of the one before them although
+/// odometry has moved: the laser had stopped, or looks less often than its
+/// scans are noted. They would hold the robot where it was. Reports them in
+/// Log::skipped. Of a log in which they are more than three fifths, as one of a
+/// simulated laser without noise may be, all stay. Readers of formats need not
+/// care.
+void LeaveOutRepeatedScans(Log* log);
+
 /// Reads the log `path` ("-": standard input), whatever its format and
 /// compression, with the reader that recognizes it. Throws Error when the file
 /// cannot be read, no reader of the registry (RegisterBuiltinLogReaders)

@@ -27,6 +27,7 @@ Log ReadInput(const LogInput& input, RunClock* clock) {
     const ReadingProgress progress(input.stream, clock);
     Log log = input.reader->read(input.stream, options);
     TakeOutRepeatedRange(options, &log);
+    LeaveOutRepeatedScans(&log);
     return log;
   }
   options.stop = [] { return InterruptRequested(); };
@@ -35,6 +36,7 @@ Log ReadInput(const LogInput& input, RunClock* clock) {
   };
   Log log = input.reader->read_path(input.name, options);
   TakeOutRepeatedRange(options, &log);
+  LeaveOutRepeatedScans(&log);
   return log;
 }
 

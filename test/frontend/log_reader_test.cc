@@ -117,5 +117,57 @@ TEST(LogReaderTest, TheLargestReadingThatRepeatsIsNoReturn) {
   EXPECT_EQ(told.scans[7].ranges[5], 4.0f);
 }
 
+// A log of 40 scans 0.1 m apart, of which as many in a row have the readings of
+// the first of them as `repeats` says.
+Log LogOfRepeats(int repeats) {
+  Log log;
+  for (int k = 0; k < 40; ++k) {
+    Scan scan;
+    scan.maximum_range = 8.0;
+    scan.line = k + 1;
+    scan.odometry = Pose2(0.1 * k, 0.0, 0.0);
+    for (int i = 0; i < 50; ++i) {
+      scan.ranges.push_back(
+          1.0f + 0.01f * static_cast<float>((i * (k / repeats + 3)) % 50));
+    }
+    log.scans.push_back(scan);
+  }
+  return log;
+}
+
+TEST(LogReaderTest, AScanThatRepeatsTheOneBeforeIsNone) {
+  Log log = LogOfRepeats(2);
+  LeaveOutRepeatedScans(&log);
+  ASSERT_EQ(log.scans.size(), 20u);
+  EXPECT_EQ(log.scans[1].line, 3);
+  EXPECT_EQ(log.scans[19].line, 39);
+  ASSERT_EQ(log.skipped.size(), 1u);
+  EXPECT_EQ(log.skipped[0].count, 20);
+  EXPECT_THAT(log.skipped[0].first_lines,
+              ::testing::ElementsAre(2, 4, 6, 8, 10));
+}
+
+TEST(LogReaderTest, ScansThatMayRepeatTheOneBeforeStay) {
+  // A robot that stands, seen by a laser without noise.
+  Log standing = LogOfRepeats(2);
+  for (Scan& scan : standing.scans) scan.odometry.setZero();
+  LeaveOutRepeatedScans(&standing);
+  EXPECT_EQ(standing.scans.size(), 40u);
+  // A bare corridor, seen by such a laser.
+  Log corridor = LogOfRepeats(40);
+  LeaveOutRepeatedScans(&corridor);
+  EXPECT_EQ(corridor.scans.size(), 40u);
+  // Nothing in sight.
+  Log blind = LogOfRepeats(2);
+  for (Scan& scan : blind.scans) {
+    scan.ranges.assign(scan.ranges.size(), 0.0f);
+  }
+  LeaveOutRepeatedScans(&blind);
+  EXPECT_EQ(blind.scans.size(), 40u);
+  Log none;
+  LeaveOutRepeatedScans(&none);
+  EXPECT_TRUE(none.scans.empty() && none.skipped.empty());
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -80,6 +80,10 @@ constexpr double kOfOneThing = 0.8;
 constexpr double kSpeaks = 0.5;
 constexpr int kLeastForWheels = 4;
 constexpr double kShareForWheels = 0.5;
+// So many scans after the robot was last seen to move as its wheels turn these
+// count while they turn as before, where at least so much speaks for them.
+constexpr int kMostEven = 20;
+constexpr int kLeastWhenUnsteady = 2;
 // The usual time between scans follows with this share.
 constexpr double kUsualShare = 0.05;
 // Share by which the noise of the laser has to change before it is followed.
@@ -382,16 +386,28 @@ void OdometryRefiner::MatchWithoutClutter(const Scan& scan,
 }
 
 void OdometryRefiner::NoteWheels(bool leapt) {
-  const bool steady = track_.refused == 0 && still_ == 0 && !is_dead_ &&
-                      !track_.after_gap && !track_.jumped && !leapt &&
-                      steady_.IsMoving() && steady_.Explains(last_motion_);
+  const bool undisturbed = track_.refused == 0 && still_ == 0 && !is_dead_ &&
+                           !track_.after_gap && !track_.jumped && !leapt;
+  const bool steady =
+      undisturbed && steady_.IsMoving() && steady_.Explains(last_motion_);
   steady_wheels_ = steady ? steady_wheels_ + 1 : 0;
+  // Wheels that go on as they did before what matches say became unsteady.
+  const bool go_on = undisturbed && wheel_steps_.IsMoving() &&
+                     wheel_steps_.Explains(last_motion_);
+  even_wheels_ = go_on ? even_wheels_ + 1 : 0;
+  since_steady_ = steady ? 0 : go_on ? since_steady_ + 1 : kMostEven + 1;
+  if (!undisturbed) wheel_steps_.Break();
+  wheel_steps_.Add(last_motion_);
   ++scans_since_key_;
 }
 
 bool OdometryRefiner::HaveWheelsBeenSteady() const {
   // The step to the key scan, too: what odometry was late by then comes after.
   return steady_wheels_ > scans_since_key_;
+}
+
+bool OdometryRefiner::HaveWheelsGoneOn() const {
+  return even_wheels_ > scans_since_key_ && since_steady_ <= kMostEven;
 }
 
 Pose2 OdometryRefiner::ByWheels(const Scan& scan) const {
@@ -415,7 +431,8 @@ void OdometryRefiner::MatchAsWheelsSay(const Scan& scan,
       kWheelSigma + kWheelSigmaPerMetre *
                         (by_wheels - track_.keys.back().pose).head<2>().norm();
   if (apart(match->pose) <= kFarFromWheels * sigma) return;
-  const Pose2 usual = steady_.Step().mean;
+  const bool steady = HaveWheelsBeenSteady();
+  const Pose2 usual = (HaveWheelsGoneOn() ? wheel_steps_ : steady_).Step().mean;
   const auto change = [&](const Pose2& motion) {
     return (motion - usual).head<2>().norm();
   };
@@ -427,9 +444,11 @@ void OdometryRefiner::MatchAsWheelsSay(const Scan& scan,
       PoseTransform(Inverse(guess))
           .Direction((match->pose - by_wheels).head<2>())
           .normalized();
-  std::vector<ScanPoint> standing = WithoutOneThing(direction);
+  std::vector<ScanPoint> standing;
+  if (steady) standing = WithoutOneThing(direction);
   if (standing.empty()) {
-    standing = WithoutWhatGoes(direction, guess, match->pose);
+    standing = WithoutWhatGoes(direction, guess, match->pose,
+                               steady ? 0 : kLeastWhenUnsteady);
   }
   if (standing.empty()) return;
   MatchPrior wheels;
@@ -509,7 +528,7 @@ std::vector<ScanPoint> OdometryRefiner::WithoutOneThing(
 // and all that stands against them.
 std::vector<ScanPoint> OdometryRefiner::WithoutWhatGoes(
     const Eigen::Vector2d& direction, const Pose2& by_wheels,
-    const Pose2& matched) const {
+    const Pose2& matched, int least) const {
   const std::vector<double> there = track_.matcher.Errors(points_, by_wheels);
   const std::vector<double> here = track_.matcher.Errors(points_, matched);
   const double apart = (matched - by_wheels).head<2>().norm();
@@ -520,13 +539,13 @@ std::vector<ScanPoint> OdometryRefiner::WithoutWhatGoes(
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const ScanPoint& point = points_[i];
     const double says = std::abs(point.normal.dot(direction));
-    const double least = kSpeaks * says * apart;
-    if (says >= kSays && here[i] + least < there[i]) {
+    const double better = kSpeaks * says * apart;
+    if (says >= kSays && here[i] + better < there[i]) {
       for_match.push_back(point);
       depths.push_back(point.position.dot(direction));
       continue;
     }
-    if (says >= kSays && there[i] + least < here[i]) {
+    if (says >= kSays && there[i] + better < here[i]) {
       for_wheels.push_back(point);
     }
     rest.push_back(point);
@@ -534,7 +553,9 @@ std::vector<ScanPoint> OdometryRefiner::WithoutWhatGoes(
   const int wheels = CountApart(for_wheels);
   const bool many = wheels >= kLeastForWheels &&
                     wheels >= kShareForWheels * CountApart(for_match);
-  return many || OneThing(std::move(depths)) ? rest : std::vector<ScanPoint>();
+  return many || (wheels >= least && OneThing(std::move(depths)))
+             ? rest
+             : std::vector<ScanPoint>();
 }
 
 void OdometryRefiner::MatchWithoutIntruders(const std::vector<bool>& intruders,
@@ -902,7 +923,9 @@ OdometryRefiner::Outcome OdometryRefiner::Match(const Scan& scan,
       SquaredInnovation(match, prior) > options_.clutter_innovation) {
     MatchWithoutClutter(scan, prior, motion, &match);
   }
-  if (HaveWheelsBeenSteady()) MatchAsWheelsSay(scan, prior, &match);
+  if (HaveWheelsBeenSteady() || HaveWheelsGoneOn()) {
+    MatchAsWheelsSay(scan, prior, &match);
+  }
   if (!moves_on && !returns_lead && !is_dead_ && !leapt && !track_.jumped &&
       !track_.after_gap && track_.refused == 0) {
     StayUnlessClear(prior, motion, scan.laser_offset.head<2>(), &match);
@@ -1647,7 +1670,8 @@ void OdometryRefiner::ExchangeState(StateArchive& archive) {
               losses_, loose_, guessed_, noise_, noise_scale_, last_step_,
               key_odometry_, squared_innovations_, compared_motions_,
               odometry_calibration_, metre_uses_, steady_, still_, last_motion_,
-              steady_wheels_, scans_since_key_, still_pose_, is_dead_, ahead_);
+              steady_wheels_, wheel_steps_, even_wheels_, since_steady_,
+              scans_since_key_, still_pose_, is_dead_, ahead_);
 }
 
 void OdometryRefiner::WriteState(StateWriter* state) {

@@ -359,6 +359,9 @@ class OdometryRefiner {
   // that has been so since the last key scan.
   void NoteWheels(bool leapt);
   bool HaveWheelsBeenSteady() const;
+  // Whether wheels have turned on as before since the last key scan, and were
+  // steady not long ago.
+  bool HaveWheelsGoneOn() const;
   // Odometry since the last key scan, as a pose of the scan.
   Pose2 ByWheels(const Scan& scan) const;
   // Where the robot moves steadily and a match leads far from where odometry
@@ -373,10 +376,11 @@ class OdometryRefiner {
       const Eigen::Vector2d& direction) const;
   // Of returns that say how far the robot went in a direction: those of the
   // last scan without the ones that speak for the pose `matched` against that
-  // of wheels, where enough speak the other way round; none otherwise.
+  // of wheels, where enough speak the other way round, or the ones are one
+  // thing and `least` do; none otherwise.
   std::vector<ScanPoint> WithoutWhatGoes(const Eigen::Vector2d& direction,
                                          const Pose2& by_wheels,
-                                         const Pose2& matched) const;
+                                         const Pose2& matched, int least) const;
   // Takes the match of the returns that are no intruders where it agrees with
   // the reference at least as well as the present one, `here`.
   void MatchWithoutIntruders(const std::vector<bool>& intruders,
@@ -523,6 +527,11 @@ class OdometryRefiner {
   // Scans in a row in which odometry went on as the robot did before, and scans
   // since the last key scan.
   int steady_wheels_ = 0;
+  // Odometry's own steps; scans in a row in which it went on like them, and
+  // since the last one that was steady.
+  SteadyMotion wheel_steps_;
+  int even_wheels_ = 0;
+  int since_steady_ = 0;
   int scans_since_key_ = 0;
   Pose2 still_pose_ = Pose2::Zero();
   bool is_dead_ = false;

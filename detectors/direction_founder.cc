@@ -36,7 +36,7 @@ std::vector<std::size_t> Founders(const std::vector<DirectionWall>& walls,
                    [&walls](std::size_t a, std::size_t b) {
                      return walls[a].length > walls[b].length;
                    });
-  if (founders.size() > kMaxFounders) founders.resize(kMaxFounders);
+  if (founders.size() > kMostFounders) founders.resize(kMostFounders);
   return founders;
 }
 
@@ -94,8 +94,12 @@ std::optional<std::size_t> FindFounder(
     const DirectionAssignmentOptions& options) {
   double best_length = 0.0;
   std::optional<std::size_t> best;
+  std::size_t tried = 0;
   for (const std::size_t founder :
        Founders(walls, is_rejected, is_refused, options)) {
+    // The longest walls may each stand alone.
+    if (best && tried >= kEnoughFounders) break;
+    ++tried;
     const Agreement agreement =
         CountAgreeing(ties, walls, is_rejected, founder, options);
     if (agreement.walls >= options.min_support &&

@@ -17,14 +17,18 @@ namespace plumbline {
 /// than so many walls in random directions would have by chance
 /// (DirectionAssignmentOptions::significance). Walls that were tried before
 /// (`is_refused`, by wall) found none, but speak for others. The network must
-/// be solved. Cost: rejected walls, times the longest kMaxFounders of them.
+/// be solved. The longest kEnoughFounders walls are tried, and shorter ones
+/// until one founds a direction when none of these does. Cost: rejected walls,
+/// times those that are tried.
 std::optional<std::size_t> FindFounder(
     const DirectionTies& ties, const std::vector<DirectionWall>& walls,
     const std::vector<bool>& is_rejected, const std::vector<bool>& is_refused,
     const DirectionAssignmentOptions& options);
 
-/// Walls that FindFounder tries at most.
-constexpr std::size_t kMaxFounders = 12;
+/// Walls among which FindFounder chooses, and those that it tries at most where
+/// each of them stands alone: what bounds its cost in a map of many thousands.
+constexpr std::size_t kEnoughFounders = 12;
+constexpr std::size_t kMostFounders = 1000;
 
 }  // namespace plumbline
 

@@ -73,6 +73,22 @@ TEST(FindFounderTest, ShortWallsFoundNothing) {
                   .has_value());
 }
 
+// Long walls, each in a direction of its own, stand before no others.
+TEST(FindFounderTest, ShorterWallsWhereNoneOfTheLongestAgree) {
+  std::vector<double> angles;
+  std::vector<double> lengths;
+  for (int i = 0; i < 20; ++i) {
+    angles.push_back(40.0 + 2.0 * i);
+    lengths.push_back(6.0);
+  }
+  for (int i = 0; i < 6; ++i) {
+    angles.push_back(i % 2 == 0 ? 10.0 : 100.0);
+    lengths.push_back(3.0);
+  }
+  EXPECT_EQ(FounderWalls(angles, lengths).Found(std::vector<bool>(26, false)),
+            std::optional<std::size_t>(20));
+}
+
 // Every wall in a direction of its own; by chance three of 400 agree.
 TEST(FindFounderTest, ChanceFoundsNothing) {
   std::vector<double> angles;

@@ -15,7 +15,9 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Pairs of walls that pass through one cell of a grid.
+// Pairs of walls that pass through one cell of a grid or through two beside
+// each other: walls on each other may lie on both sides of where two cells
+// meet.
 class NeighbourGrid {
  public:
   NeighbourGrid(const WallGraph& walls, double min_length)
@@ -33,11 +35,18 @@ class NeighbourGrid {
 
   // Walls with larger indices near a wall, ascending.
   std::set<int> LaterNear(int i) const {
-    std::set<int> near;
-    for (const Cell& cell : cells_[i]) {
-      for (const int j : grid_.at(cell)) {
-        if (j > i) near.insert(j);
+    std::set<Cell> around;
+    for (const auto& [x, y] : cells_[i]) {
+      for (const long dx : {-1, 0, 1}) {
+        for (const long dy : {-1, 0, 1}) around.insert({x + dx, y + dy});
       }
+    }
+    std::set<int> near;
+    for (const Cell& cell : around) {
+      const auto found = grid_.find(cell);
+      if (found == grid_.end()) continue;
+      const auto& walls = found->second;
+      near.insert(std::upper_bound(walls.begin(), walls.end(), i), walls.end());
     }
     return near;
   }

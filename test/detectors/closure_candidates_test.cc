@@ -13,6 +13,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAreArray;
 
 class ClosureCandidatesTest : public WallGraphTest {
  protected:
@@ -137,6 +138,27 @@ TEST_F(ClosureCandidatesTest, OverlapsCountWhenThePlaceIsKnown) {
   scope.stop = [] { return true; };
   FindOverlaps(walls, SameWallOptions(), scope, &marginals, &none);
   EXPECT_THAT(none.Choose(0.1, scope), IsEmpty());
+}
+
+// Wherever walls lie on each other, also where two cells of a grid meet.
+TEST_F(ClosureCandidatesTest, OverlapsAreFoundEverywhere) {
+  AddWall(0.0, 0.0, 5.0, 0.0);
+  std::vector<WallPair> expected;
+  for (int k = 0; k < 80; ++k) {
+    const double y = 0.1 * k + 20.0;
+    const int first = AddWall(0.0, y - 0.005, 5.0, y - 0.005);
+    const int second = AddWall(2.0, y + 0.005, 7.0, y + 0.005);
+    AddLink(0, first, 0.01);
+    AddLink(first, second, 0.01);
+    expected.push_back({first, second});
+  }
+  const WallGraph walls(graph_);
+  Marginals marginals(graph_);
+  ClosureCandidates candidates(&walls);
+  FindOverlaps(walls, SameWallOptions(), DetectionScope(), &marginals,
+               &candidates);
+  EXPECT_THAT(Pairs(candidates.Choose(0.1, DetectionScope())),
+              UnorderedElementsAreArray(expected));
 }
 
 }  // namespace

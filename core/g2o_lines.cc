@@ -232,7 +232,8 @@ void AppendG2oEdge(const Constraint& constraint, const G2oEdgeFormat* format,
 bool IsPlainG2o(const Constraint& constraint) {
   return constraint.kind == ConstraintClass::kMeasurement &&
          constraint.state == ConstraintState::kLive &&
-         constraint.delta == 1.0 && constraint.source == kG2oSource;
+         constraint.delta == 1.0 && constraint.break_below == 1.0 &&
+         constraint.source == kG2oSource;
 }
 
 void AppendG2oAttributes(const Constraint& constraint, std::string* text) {
@@ -243,6 +244,9 @@ void AppendG2oAttributes(const Constraint& constraint, std::string* text) {
   AppendNumber(constraint.delta, text);
   *text += ' ';
   AppendSource(constraint.source, text);
+  if (constraint.break_below == 1.0) return;
+  *text += ' ';
+  AppendNumber(constraint.break_below, text);
 }
 
 G2oFile::Fingerprint G2oFingerprintOf(const Feature& feature) {
@@ -275,6 +279,7 @@ G2oFile::Fingerprint G2oFingerprintOf(
   hash.Add(constraint.state);
   hash.Add(constraint.delta);
   hash.Add(constraint.source);
+  hash.Add(constraint.break_below);
   fingerprint.attributes = hash.Take();
   return fingerprint;
 }

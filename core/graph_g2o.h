@@ -93,14 +93,15 @@ struct G2oFile {
 ///
 ///   PLUMBLINE_FEATURE id level virtual anchor_x anchor_y extent_begin
 ///       extent_end observations source
-///   PLUMBLINE_CONSTRAINT class state delta source
+///   PLUMBLINE_CONSTRAINT class state delta source [break_below]
 ///
 /// each on one line; an anchor in space has an anchor_z after anchor_y. The
 /// first line belongs to the vertex with this id, the second to the edge above
 /// it; "virtual" is 0 or 1, "class" measurement or structure,
-/// "state" live or broken; a source is "-" when empty, with %XX for white
-/// space, '%', control characters and a lone "-". Without such a line a feature
-/// is raw and a constraint a live measurement, both from the source "g2o".
+/// "state" live or broken, "break_below" 1 where it is missing; a source is "-"
+/// when empty, with %XX for white space, '%', control characters and a lone
+/// "-". Without such a line a feature is raw and a constraint a live
+/// measurement, both from the source "g2o".
 ///
 /// A file without any vertex has those that its edges name, as many files with
 /// relative poses do: each of the (first) type that suits its edges, at the

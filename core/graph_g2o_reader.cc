@@ -441,7 +441,9 @@ class LineReader {
 
   // `above_` was an edge.
   void ReadConstraintLine() {
-    fields_.ExpectFields(4, [] { return "class, state, delta, source"; });
+    const bool has_threshold = fields_.size() == 6;
+    fields_.ExpectFields(has_threshold ? 5 : 4,
+                         [] { return "class, state, delta, source"; });
     Line().kind = G2oLine::Kind::kConstraintAttributes;
     records_->edges.back().has_attributes = true;
     Constraint& constraint = records_->edges.back().constraint;
@@ -457,11 +459,18 @@ class LineReader {
       fields_.Fail("state \"" + std::string(fields_[2]) + "\"",
                    "live or broken");
     }
-    constraint.delta = fields_.Number(fields_[3]);
-    if (constraint.delta < 0.0 || constraint.delta > 1.0) {
-      fields_.Fail("delta " + std::string(fields_[3]), "a number in [0, 1]");
-    }
+    constraint.delta = PValue("delta", 3);
     constraint.source = fields_.Source(fields_[4]);
+    if (has_threshold) constraint.break_below = PValue("break_below", 5);
+  }
+
+  double PValue(const std::string& what, std::size_t field) const {
+    const double value = fields_.Number(fields_[field]);
+    if (value < 0.0 || value > 1.0) {
+      fields_.Fail(what + " " + std::string(fields_[field]),
+                   "a number in [0, 1]");
+    }
+    return value;
   }
 
   // Whether the first field after an unknown tag can be the id of a vertex.

@@ -153,6 +153,10 @@ void AppendConstraint(const Constraint& constraint, std::string* text) {
       constraint.state == ConstraintState::kBroken ? "\"broken\"" : "\"live\"";
   *text += ", \"source\": ";
   AppendString(constraint.source, text);
+  if (constraint.break_below != 1.0) {
+    *text += ", \"break_below\": ";
+    AppendJsonNumber(constraint.break_below, text);
+  }
   *text += '}';
 }
 
@@ -175,6 +179,10 @@ class Node {
       Fail("has no \"" + std::string(key) + "\"", "one");
     }
     return Node(name_, (place_.empty() ? "" : place_ + ".") + key, *found);
+  }
+
+  bool Has(const char* key) const {
+    return value_.is_object() && value_.contains(key);
   }
 
   std::size_t ArraySize() const {
@@ -324,6 +332,12 @@ Constraint ReadConstraint(
                          : ConstraintState::kLive;
   constraint.delta = node.Get("delta").Number();
   constraint.source = node.Get("source").String();
+  if (node.Has("break_below")) {
+    const Node break_below = node.Get("break_below");
+    constraint.break_below = break_below.Number();
+    if (constraint.break_below < 0.0 || constraint.break_below > 1.0)
+      break_below.Fail("is no p-value", "a number in [0, 1]");
+  }
   return constraint;
 }
 

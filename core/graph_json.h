@@ -19,7 +19,8 @@ using FeatureCovariances = std::map<FeatureId, Eigen::MatrixXd>;
 /// ([begin, end]), observations, source and support (ids of the live structure
 /// constraints from below), and for every constraint id, type, features,
 /// expected, information (rows), class ("measurement" or "structure"), delta,
-/// state ("live" or "broken") and source. Features among the `covariances` (may
+/// state ("live" or "broken"), source and, where it is not 1, break_below.
+/// Features among the `covariances` (may
 /// be null) also have covariance (rows). One line per element. Deterministic;
 /// numbers read back as the same doubles (one that is not finite becomes null,
 /// which is not read back).

@@ -229,6 +229,7 @@ TEST_F(GraphG2oTest, EverythingComesBack) {
   tie.features = {b, c};
   tie.state = ConstraintState::kBroken;
   tie.delta = 1e-12;
+  tie.break_below = 0.0027;
   transaction.AddConstraint(tie);
   graph.Apply(transaction);
 
@@ -267,13 +268,14 @@ TEST_F(GraphG2oTest, EverythingComesBack) {
     EXPECT_EQ(constraint.kind, expected.kind);
     EXPECT_EQ(constraint.state, expected.state);
     EXPECT_EQ(constraint.delta, expected.delta);
+    EXPECT_EQ(constraint.break_below, expected.break_below);
     EXPECT_EQ(constraint.source, expected.source);
   }
   EXPECT_NE(text.find("PLUMBLINE_FEATURE 0 0 0 0 0 -1.25 0.2857142857142857 12 "
                       "front%20end%20%251%0A\n"),
             std::string::npos);
   EXPECT_NE(text.find("PLUMBLINE_CONSTRAINT structure broken 1e-12 "
-                      "orientation_mixture\n"),
+                      "orientation_mixture 0.0027\n"),
             std::string::npos);
 }
 
@@ -769,6 +771,9 @@ TEST_F(GraphG2oTest, BrokenConstraintLinesAreNamed) {
       {"structure live 1.5 a", "delta 1.5: expected a number in [0, 1]"},
       {"structure live nan a", "\"nan\": expected a finite number"},
       {"structure live 1 %G0", "source \"%G0\""},
+      {"structure live 1 a 1.5",
+       "break_below 1.5: expected a number in [0, 1]"},
+      {"structure live 1 a 0.1 0", "has 6 fields: expected 4"},
   };
   for (const auto& [fields, message] : cases) {
     const std::string refusal =

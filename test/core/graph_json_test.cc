@@ -87,6 +87,7 @@ class GraphJsonTest : public ::testing::Test {
     tie.features = {b, c};
     tie.state = ConstraintState::kBroken;
     tie.delta = 0.1;
+    tie.break_below = 0.0625;
     transaction.AddConstraint(tie);
     graph->Apply(std::move(transaction));
   }
@@ -125,7 +126,7 @@ TEST_F(GraphJsonTest, Format) {
       "{\"id\": 2, \"type\": \"segment_orientation\", \"features\": [1, 2], "
       "\"expected\": [0], \"information\": [[100]], "
       "\"class\": \"structure\", \"delta\": 0.1, \"state\": \"broken\", "
-      "\"source\": \"orientation_mixture\"}\n"
+      "\"source\": \"orientation_mixture\", \"break_below\": 0.0625}\n"
       "]\n}\n");
 }
 
@@ -264,6 +265,8 @@ TEST_F(GraphJsonTest, BrokenPlacesAreNamed) {
       {"\"delta\": 0.75", "\"delta\": 1.75",
        "constraints[1] does not fit: delta of segment_orientation"},
       {"\"delta\": 0.75", "\"delta\": 1e999", "map.json"},
+      {"\"break_below\": 0.0625", "\"break_below\": 2",
+       "constraints[2].break_below is no p-value"},
   };
   for (const Case& c : cases) {
     std::string text = sound;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 namespace plumbline {
 namespace {
@@ -163,30 +164,36 @@ void EvaluateDoors(const BuildingPlan& plan, const MapTruth& truth,
   const auto middle = [](const auto& door) -> Vector2d {
     return 0.5 * (door.begin + door.end);
   };
-  for (const TrueDoor& door : truth.doors) {
+  // Pairs of a true door and one of the plan, the nearest first.
+  std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < truth.doors.size(); ++i) {
+    for (std::size_t j = 0; j < plan.doors.size(); ++j) {
+      const double distance =
+          (middle(plan.doors[j]) - middle(truth.doors[i])).norm();
+      if (distance <= kSameDoor) pairs.emplace_back(distance, i, j);
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<const PlanDoor*> drawn_of(truth.doors.size(), nullptr);
+  std::vector<bool> is_true(plan.doors.size(), false);
+  for (const auto& [distance, i, j] : pairs) {
+    if (drawn_of[i] != nullptr || is_true[j]) continue;
+    drawn_of[i] = &plan.doors[j];
+    is_true[j] = true;
+  }
+  for (std::size_t i = 0; i < truth.doors.size(); ++i) {
+    const TrueDoor& door = truth.doors[i];
     if (!IsDriven(door, truth.poses)) continue;
     ++result->doors_asked;
-    double best = kSameDoor;
-    double width = -1.0;
-    for (const PlanDoor& drawn : plan.doors) {
-      const double distance = (middle(drawn) - middle(door)).norm();
-      if (distance > best) continue;
-      best = distance;
-      width = drawn.width();
-    }
-    if (width < 0.0) continue;
+    if (drawn_of[i] == nullptr) continue;
     ++result->doors_found;
     result->door_width_error +=
-        std::abs(width - (door.end - door.begin).norm());
+        std::abs(drawn_of[i]->width() - (door.end - door.begin).norm());
   }
   if (result->doors_found > 0) result->door_width_error /= result->doors_found;
   result->doors_drawn = static_cast<int>(plan.doors.size());
-  for (const PlanDoor& drawn : plan.doors) {
-    result->doors_false += std::none_of(
-        truth.doors.begin(), truth.doors.end(), [&](const TrueDoor& door) {
-          return (middle(drawn) - middle(door)).norm() <= kSameDoor;
-        });
-  }
+  result->doors_false =
+      static_cast<int>(std::count(is_true.begin(), is_true.end(), false));
 }
 
 void EvaluateWalls(const BuildingPlan& plan, const MapTruth& truth,

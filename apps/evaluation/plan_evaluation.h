@@ -53,10 +53,11 @@ struct PlanEvaluation {
   /// Rooms; those that the robot was in are asked for.
   RoomEvaluation rooms;
   /// Doors that the robot drove through, and those of them that the plan has
-  /// within half a metre.
+  /// within half a metre. Doors are paired, the nearest first, each with one.
   int doors_asked = 0;
   int doors_found = 0;
-  /// Doors of the plan, and those where there is none, open or shut.
+  /// Doors of the plan, and those where there is none, open or shut, or where
+  /// the plan has one already.
   int doors_drawn = 0;
   int doors_false = 0;
   /// Mean error of the width of the doors found, m.

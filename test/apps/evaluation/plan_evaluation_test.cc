@@ -121,6 +121,34 @@ TEST(PlanEvaluationTest, DoorsAndWalls) {
   EXPECT_EQ(EvaluatePlan(plan, truth, Pose2::Zero()).double_walls, 1);
 }
 
+TEST(PlanEvaluationTest, ADoorCountsOnce) {
+  MapTruth truth = ADoor();
+  PlanDoor door;
+  door.begin = {2.0, 0.0};
+  door.end = {2.9, 0.0};
+  PlanDoor beside;
+  beside.begin = {2.3, 0.0};
+  beside.end = {3.2, 0.0};
+  BuildingPlan plan;
+  plan.doors = {beside, door};
+  PlanEvaluation result = EvaluatePlan(plan, truth, Pose2::Zero());
+  EXPECT_EQ(result.doors_found, 1);
+  EXPECT_EQ(result.doors_drawn, 2);
+  EXPECT_EQ(result.doors_false, 1);
+  EXPECT_NEAR(result.door_width_error, 0.0, 1e-9);
+
+  // One of the plan between two true ones.
+  truth.doors.push_back(truth.doors[0]);
+  truth.doors[0].begin = {2.0, 0.0};
+  truth.doors[0].end = {2.55, 0.0};
+  truth.doors[1].begin = {2.45, 0.0};
+  truth.doors[1].end = {3.0, 0.0};
+  plan.doors = {door};
+  result = EvaluatePlan(plan, truth, Pose2::Zero());
+  EXPECT_EQ(result.doors_asked, 2);
+  EXPECT_EQ(result.doors_found, 1);
+}
+
 BuildingPlan ParsePlan(const std::string& text) {
   InputStream input("plan.geojson", text);
   return ReadBuildingPlan(&input);

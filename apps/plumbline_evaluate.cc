@@ -373,9 +373,9 @@ void PrintMap(const MapTruthEvaluation& evaluation, std::size_t found) {
   PrintAngles("false orientations", evaluation.false_orientations_deg);
   std::printf("duplicate orientations: %d\n",
               evaluation.duplicate_orientations);
-  std::printf("bend error: %s deg", KnownText(evaluation.bend_error_deg,
-                                              !evaluation.directions.empty(), 3)
-                                        .c_str());
+  std::printf("bend error: %s deg",
+              KnownText(evaluation.bend_error_deg, evaluation.is_bend_known, 3)
+                  .c_str());
   const char* separator = " (";
   for (const DirectionResult& direction : evaluation.directions) {
     std::printf("%s%.2f %+.3f", separator, direction.angle_deg,
@@ -578,7 +578,7 @@ Json EvaluateAgainstTruth(const std::vector<TimedPose>& trajectory) {
       {"duplicate_orientations", evaluation.duplicate_orientations},
       {"directions", DirectionsToJson(evaluation.directions)},
       {"bend_error_deg",
-       Known(evaluation.bend_error_deg, !evaluation.directions.empty())},
+       Known(evaluation.bend_error_deg, evaluation.is_bend_known)},
       {"closures", closures},
       {"walls", WallsToJson(evaluation.walls)}};
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -261,21 +262,36 @@ void JudgeWalls(const MapTruth& truth, const MapTruthOptions& options,
 
 // How far the walls of each direction are turned, and how far that bends the
 // building.
-void JudgeDirections(const MapTruth& truth, const std::vector<TrueWall>& walls,
+void JudgeDirections(const MapTruth& truth, const MapTruthOptions& options,
+                     const std::vector<TrueWall>& walls,
                      MapTruthEvaluation* evaluation) {
   double all_length = 0.0;
+  std::vector<double> lengths;
+  std::vector<double> asked;
   for (std::size_t d = 0; d < truth.orientations_deg.size(); ++d) {
     DirectionResult result;
     result.angle_deg = truth.orientations_deg[d];
+    asked.push_back(0.0);
     for (std::size_t i = 0; i < walls.size(); ++i) {
       if (truth.walls[i].orientation != static_cast<int>(d)) continue;
       result.length += walls[i].long_matched;
       result.error_deg += walls[i].turn_sum;
+      if (IsAskedFor(walls[i], options))
+        asked.back() += TotalLength(walls[i].seen);
     }
+    lengths.push_back(result.length);
     if (!(result.length > 0.0)) continue;
     result.error_deg /= result.length;
     all_length += result.length;
     evaluation->directions.push_back(result);
+  }
+  const double all_asked = std::accumulate(asked.begin(), asked.end(), 0.0);
+  evaluation->is_bend_known = all_length > 0.0;
+  for (std::size_t d = 0; d < lengths.size(); ++d) {
+    if (asked[d] > 0.0 && asked[d] >= kBendShare * all_asked &&
+        lengths[d] < kBendShare * all_length) {
+      evaluation->is_bend_known = false;
+    }
   }
   for (const DirectionResult& a : evaluation->directions) {
     for (const DirectionResult& b : evaluation->directions) {
@@ -336,7 +352,7 @@ MapTruthEvaluation EvaluateMap(const StraightMap& map, const MapTruth& truth,
   std::vector<TrueWall> walls = MakeWalls(truth);
   MatchMap(map, options, &walls, &evaluation);
   JudgeWalls(truth, options, walls, &evaluation);
-  JudgeDirections(truth, walls, &evaluation);
+  JudgeDirections(truth, options, walls, &evaluation);
   JudgeOrientations(map, truth, options, walls, &evaluation);
   return evaluation;
 }

@@ -91,8 +91,10 @@ struct MapTruthEvaluation {
   std::vector<DirectionResult> directions;
   /// How far the map bends the building, degrees: the largest difference
   /// between the errors of two directions that have at least a tenth of the
-  /// length each.
+  /// length each. Not known where the map has less of a direction of which at
+  /// least a tenth was asked for: it may have turned away.
   double bend_error_deg = 0.0;
+  bool is_bend_known = false;
 };
 
 /// Compares a map, moved by `alignment`, with the truth. Segments that live

@@ -32,8 +32,13 @@ constexpr double kBendDeg = 0.3;
 constexpr double kSmallestRatio = 0.6;
 constexpr double kLargestRatio = 1.5;
 
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// A figure that is of something: an error of nothing is not 0.
+double Known(double value, bool is_known) { return is_known ? value : kNan; }
+
 double Median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  if (values.empty()) return kNan;
   std::sort(values.begin(), values.end());
   const std::size_t half = values.size() / 2;
   return values.size() % 2 == 1 ? values[half]
@@ -80,7 +85,11 @@ void AddPlanClaims(const std::string& shape, ExperimentResult* result) {
     claim.text = shape + ": " + what;
     claim.required =
         (is_least ? "at least " : "at most ") + Format("%g", bound);
-    claim.measured = MeanEstimate(Column(*result, shape, name));
+    std::vector<double> values = Column(*result, shape, name);
+    values.erase(std::remove_if(values.begin(), values.end(),
+                                [](double value) { return std::isnan(value); }),
+                 values.end());
+    claim.measured = MeanEstimate(values);
     claim.holds = is_least ? claim.measured.value >= bound
                            : claim.measured.value <= bound;
     result->claims.push_back(std::move(claim));
@@ -116,8 +125,10 @@ std::vector<std::pair<std::string, double>> FiguresOf(
           {"walls_missed", static_cast<double>(run.map.missed_walls.size())},
           {"walls_false", static_cast<double>(run.map.false_walls.size())},
           {"drawn_twice", run.map.doubled_length},
-          {"offset_error", run.map.offset_error.mean},
-          {"direction_error_deg", run.map.direction_error_deg.mean},
+          {"offset_error",
+           Known(run.map.offset_error.mean, run.map.offset_error.count > 0)},
+          {"direction_error_deg", Known(run.map.direction_error_deg.mean,
+                                        run.map.direction_error_deg.count > 0)},
           {"position_error", run.mean_position_error},
           {"rooms", run.plan.rooms.asked},
           {"rooms_found", run.plan.rooms.found},
@@ -128,7 +139,8 @@ std::vector<std::pair<std::string, double>> FiguresOf(
           {"doors_found", run.plan.doors_found},
           {"doors_drawn", run.plan.doors_drawn},
           {"doors_false", run.plan.doors_false},
-          {"door_width_error", run.plan.door_width_error},
+          {"door_width_error",
+           Known(run.plan.door_width_error, run.plan.doors_found > 0)},
           {"wall_completeness", run.plan.wall_completeness},
           {"wall_correctness", run.plan.wall_correctness},
           {"wall_ends", run.plan.ends},
@@ -234,7 +246,8 @@ void RunB2(const ExperimentOptions& options, const Registry& registry,
               registry, SolverOptions(options, mode), options.stop);
           if (run.is_stopped) return;
           self->values = {{"position_error", run.mean_position_error},
-                          {"bend_error_deg", run.map.bend_error_deg}};
+                          {"bend_error_deg", Known(run.map.bend_error_deg,
+                                                   run.map.is_bend_known)}};
         };
         AddTrials(options,
                   std::string(has_niches ? "niches " : "plain ") +

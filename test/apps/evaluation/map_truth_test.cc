@@ -332,6 +332,23 @@ TEST(MapTruthTest, ABendIsTheDifferenceOfDirectionsErrors) {
   EXPECT_NEAR(evaluation.directions[1].error_deg, -0.9, 1e-9);
   EXPECT_NEAR(evaluation.directions[1].length, 10.0, 0.1);
   EXPECT_NEAR(evaluation.bend_error_deg, 1.3, 1e-9);
+  EXPECT_TRUE(evaluation.is_bend_known);
+}
+
+// What turned so far that it matches no wall any more is no straight building.
+TEST(MapTruthTest, ABendOfWhatIsNotInTheMapIsNotKnown) {
+  const MapTruth truth = MakeL();
+  StraightMap map;
+  EXPECT_FALSE(EvaluateMap(map, truth, Pose2::Zero()).is_bend_known);
+  map.segments = {MakeSegment(1, 0, 0, 0, 0, 10),
+                  MakeSegment(2, 10, 0, 80, 0, 4)};
+  MapTruthEvaluation evaluation = EvaluateMap(map, truth, Pose2::Zero());
+  ASSERT_EQ(evaluation.directions.size(), 1u);
+  EXPECT_FALSE(evaluation.is_bend_known);
+  map.segments[1] = MakeSegment(2, 10, 0, 88, 0, 4);
+  evaluation = EvaluateMap(map, truth, Pose2::Zero());
+  EXPECT_TRUE(evaluation.is_bend_known);
+  EXPECT_NEAR(evaluation.bend_error_deg, 2.0, 1e-9);
 }
 
 TEST(MapTruthTest, PosesAgainstTheTruth) {

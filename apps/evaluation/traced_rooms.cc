@@ -10,6 +10,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <tuple>
 #include <unsupported/Eigen/FFT>
 
 namespace plumbline {
@@ -288,19 +289,55 @@ Place Finer(Place place) {
   return place;
 }
 
-// The traced room at every cell of a raster over the grid.
+// A raster over the grid and all of the picture: the robot may have seen a part
+// of a room only. Its cells are as if it began at the grid's corner.
+struct Frame {
+  Vector2d origin = Vector2d::Zero();
+  int width = 0;
+  int height = 0;
+  // Of the grid's corner.
+  int column = 0;
+  int row = 0;
+};
+
+Frame FrameOf(const TracedRooms& rooms, const TracedPlacement& placement,
+              const SpaceGrid& space) {
+  const double by = space.resolution / kCell;
+  const int width = static_cast<int>(space.width * by) + 1;
+  const int height = static_cast<int>(space.height * by) + 1;
+  const double pixel = rooms.metres_per_pixel * placement.scale;
+  const double half = 0.5 * pixel * std::hypot(rooms.width, rooms.height);
+  const Vector2d middle = (placement.center - space.origin) / kCell;
+  const auto before = [&](double center) {
+    return std::max(0, static_cast<int>(std::ceil(half / kCell - center)));
+  };
+  const auto beyond = [&](double center, int size) {
+    return std::max(0,
+                    static_cast<int>(std::ceil(half / kCell + center)) - size);
+  };
+  Frame frame;
+  frame.column = before(middle[0]);
+  frame.row = before(middle[1]);
+  frame.width = frame.column + width + beyond(middle[0], width);
+  frame.height = frame.row + height + beyond(middle[1], height);
+  frame.origin = space.origin - kCell * Vector2d(frame.column, frame.row);
+  return frame;
+}
+
+// The traced room at every cell.
 std::vector<int> PlacedLabels(const TracedRooms& rooms,
                               const TracedPlacement& placement,
-                              const SpaceGrid& space, int width, int height) {
+                              const Frame& frame) {
+  const auto [origin, width, height] =
+      std::tie(frame.origin, frame.width, frame.height);
   std::vector<int> labels(static_cast<std::size_t>(width) * height, 0);
   const double pixel = rooms.metres_per_pixel * placement.scale;
   const double cosine = std::cos(placement.turn) / pixel;
   const double sine = std::sin(placement.turn) / pixel;
   for (int row = 0; row < height; ++row) {
     for (int column = 0; column < width; ++column) {
-      const Vector2d at = space.origin +
-                          kCell * Vector2d(column + 0.5, row + 0.5) -
-                          placement.center;
+      const Vector2d at =
+          origin + kCell * Vector2d(column + 0.5, row + 0.5) - placement.center;
       const double x =
           std::floor(cosine * at[0] + sine * at[1] + 0.5 * rooms.width);
       const double y =
@@ -316,8 +353,9 @@ std::vector<int> PlacedLabels(const TracedRooms& rooms,
 }
 
 // The plan's room at every cell, from 1.
-std::vector<int> PlanLabels(const BuildingPlan& plan, const SpaceGrid& space,
-                            int width, int height) {
+std::vector<int> PlanLabels(const BuildingPlan& plan, const Frame& frame) {
+  const auto [origin, width, height] =
+      std::tie(frame.origin, frame.width, frame.height);
   std::vector<int> labels(static_cast<std::size_t>(width) * height, 0);
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     const Polygon& outline = plan.rooms[i].outline;
@@ -331,13 +369,13 @@ std::vector<int> PlanLabels(const BuildingPlan& plan, const SpaceGrid& space,
       return static_cast<int>(
           std::clamp(std::floor(from_origin / kCell), 0.0, limit - 1.0));
     };
-    const Vector2d from = low - space.origin;
-    const Vector2d to = high - space.origin;
+    const Vector2d from = low - origin;
+    const Vector2d to = high - origin;
     for (int row = cell(from[1], height); row <= cell(to[1], height); ++row) {
       for (int column = cell(from[0], width); column <= cell(to[0], width);
            ++column) {
         const Vector2d middle =
-            space.origin + kCell * Vector2d(column + 0.5, row + 0.5);
+            origin + kCell * Vector2d(column + 0.5, row + 0.5);
         if (outline.Contains(middle)) {
           labels[static_cast<std::size_t>(row) * width + column] =
               static_cast<int>(i) + 1;
@@ -473,19 +511,17 @@ TracedEvaluation EvaluateTracedRooms(const BuildingPlan& plan,
   result.traced = rooms.count;
   result.drawn = static_cast<int>(plan.rooms.size());
   const double by = space.resolution / kCell;
-  const int width = static_cast<int>(space.width * by) + 1;
-  const int height = static_cast<int>(space.height * by) + 1;
-  const std::vector<int> truth =
-      PlacedLabels(rooms, result.placement, space, width, height);
-  const std::vector<int> drawn = PlanLabels(plan, space, width, height);
+  const Frame frame = FrameOf(rooms, result.placement, space);
+  const std::vector<int> truth = PlacedLabels(rooms, result.placement, frame);
+  const std::vector<int> drawn = PlanLabels(plan, frame);
   // Cells by true and by drawn room; 0: none.
   const auto columns = static_cast<std::size_t>(result.drawn) + 1;
   const auto rows = static_cast<std::size_t>(rooms.count) + 1;
   std::vector<std::int64_t> common(rows * columns, 0);
   std::vector<std::int64_t> size(rows, 0);
   // In cells of the grid.
-  std::vector<std::int64_t> all(rows, 0);
-  std::vector<std::int64_t> free(rows, 0);
+  std::vector<double> all(rows, 0.0);
+  std::vector<double> free(rows, 0.0);
   std::vector<std::int64_t> drawn_size(columns, 0);
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const auto t = static_cast<std::size_t>(truth[i]);
@@ -496,18 +532,29 @@ TracedEvaluation EvaluateTracedRooms(const BuildingPlan& plan,
   }
   for (int row = 0; row < space.height; ++row) {
     for (int column = 0; column < space.width; ++column) {
-      const auto t = static_cast<std::size_t>(
-          truth[static_cast<std::size_t>((row + 0.5) * by) * width +
-                static_cast<std::size_t>((column + 0.5) * by)]);
-      ++all[t];
+      const std::size_t at =
+          static_cast<std::size_t>((row + 0.5) * by + frame.row) * frame.width +
+          static_cast<std::size_t>((column + 0.5) * by + frame.column);
+      const auto t = static_cast<std::size_t>(truth[at]);
+      all[t] += 1.0;
       free[t] += space.At(column, row) == Space::kFree;
+    }
+  }
+  // Nothing was seen beyond the grid.
+  for (int row = 0; row < frame.height; ++row) {
+    for (int column = 0; column < frame.width; ++column) {
+      const double x = (column - frame.column + 0.5) / by;
+      const double y = (row - frame.row + 0.5) / by;
+      if (x >= 0.0 && y >= 0.0 && x < space.width && y < space.height) continue;
+      all[static_cast<std::size_t>(
+          truth[static_cast<std::size_t>(row) * frame.width + column])] +=
+          1.0 / (by * by);
     }
   }
   std::vector<double> ious, recalls, precisions;
   std::vector<bool> is_seen(rows, false);
   for (std::size_t t = 1; t < rows; ++t) {
-    is_seen[t] = size[t] > 0 && static_cast<double>(free[t]) >=
-                                    kSeen * static_cast<double>(all[t]);
+    is_seen[t] = size[t] > 0 && free[t] >= kSeen * all[t];
     result.iou.push_back(-1.0);
     if (!is_seen[t]) continue;
     std::size_t best = 0;

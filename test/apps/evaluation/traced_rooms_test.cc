@@ -199,6 +199,35 @@ TEST(TracedRoomsTest, PlansAreMeasured) {
   EXPECT_EQ(result.iou[1], -1.0);
 }
 
+// The grid ends where the robot saw nothing more, in the middle of a room.
+TEST(TracedRoomsTest, RoomsReachBeyondTheGrid) {
+  Seen seen;
+  seen.turn = 0.0;
+  seen.scale = 1.0;
+  // The plan has what was seen of the large room: five of six metres.
+  seen.plan.rooms = {seen.Room(1.5, 1.0, 6.5, 5.0),
+                     seen.Room(6.7, 1.0, 8.7, 3.5)};
+  seen.space.origin = seen.At(1.5, 0.5);
+  seen.space.width = 160;
+  seen.space.height = 100;
+  seen.space.cells.clear();
+  for (int row = 0; row < seen.space.height; ++row) {
+    for (int column = 0; column < seen.space.width; ++column) {
+      const bool is_inside = std::any_of(
+          seen.plan.rooms.begin(), seen.plan.rooms.end(),
+          [&](const PlanRoom& room) {
+            return room.outline.Contains(seen.space.Middle(column, row));
+          });
+      seen.space.cells.push_back(is_inside ? Space::kFree : Space::kUnknown);
+    }
+  }
+  const TracedEvaluation result =
+      EvaluateTracedRooms(seen.plan, ParseRooms(TwoRooms()), seen.space);
+  EXPECT_EQ(result.seen, 2);
+  ASSERT_EQ(result.iou.size(), 2u);
+  EXPECT_NEAR(result.iou[0], 5.0 / 6.0, 0.05);
+}
+
 class GridFileTest : public ::testing::Test {
  protected:
   void SetUp() override {

@@ -18,12 +18,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -48,6 +50,20 @@ std::vector<Pose2> Poses(const SolveOutcome& outcome) {
   poses.reserve(outcome.trajectory.size());
   for (const TimedPose& timed : outcome.trajectory) poses.push_back(timed.pose);
   return poses;
+}
+
+// The robot's way. It breaks off where another log begins.
+std::vector<Pose2> Way(const SolveOutcome& outcome) {
+  std::set<std::size_t> begins;
+  for (const LogPart& log : outcome.logs) begins.insert(log.begin);
+  std::vector<Pose2> way;
+  way.reserve(outcome.trajectory.size() + begins.size());
+  for (std::size_t i = 0; i < outcome.trajectory.size(); ++i) {
+    if (i > 0 && begins.count(i) > 0)
+      way.push_back(Pose2::Constant(std::nan("")));
+    way.push_back(outcome.trajectory[i].pose);
+  }
+  return way;
 }
 
 OccupancyOptions GridOptions(const SolveOutcome& outcome) {
@@ -129,7 +145,7 @@ class SharedParts {
         options.resolution <= kCoarsestPlanResolution) {
       std::string reason;
       const OccupancyGrid* const grid = Grid(outcome, &reason);
-      if (grid != nullptr) AddRooms(*grid, Poses(outcome), &plan_);
+      if (grid != nullptr) AddRooms(*grid, Way(outcome), &plan_);
       no_rooms_ = reason;
       return;
     }
@@ -138,7 +154,7 @@ class SharedParts {
     OccupancyGrid grid =
         GatherOccupancyGrid(*outcome.scans, Poses(outcome), options);
     grid.ForgetUnreachable();
-    AddRooms(grid, Poses(outcome), &plan_);
+    AddRooms(grid, Way(outcome), &plan_);
   }
 
   std::once_flag grid_begun_;

@@ -817,7 +817,10 @@ WayInRooms MarkEntered(const std::vector<Pose2>& path,
   Vector2d before = Vector2d::Constant(std::nan(""));
   for (const Pose2& pose : path) {
     const Vector2d here = pose.head<2>();
-    if (!here.allFinite()) continue;
+    if (!here.allFinite()) {
+      before = here;
+      continue;
+    }
     bool is_inside = false;
     for (std::size_t i = 0; i < rooms->size() && !is_inside; ++i) {
       const std::size_t which = (last + i) % rooms->size();
@@ -874,6 +877,7 @@ void TakePath(const std::vector<Pose2>& path, BuildingPlan* plan) {
     const Vector2d here = path[i].head<2>();
     if (i == 0 || !here.allFinite()) continue;
     const Vector2d before = path[i - 1].head<2>();
+    if (!before.allFinite()) continue;
     for (PlanDoor& door : plan->doors) {
       if (!door.is_driven) {
         door.is_driven = Cross(before, here, door.begin, door.end);

@@ -116,7 +116,8 @@ struct BuildingPlan {
 ///
 /// `walls`: known faces; `directions`: of the building, rad, the most important
 /// first, empty when there are none; `path`: poses of the robot in the order of
-/// time. All in the map frame. A space without walls around it is not a room:
+/// time, and one that is not finite where the way breaks off, as between two
+/// logs. All in the map frame. A space without walls around it is not a room:
 /// the plan of an open field is empty. Works on ThreadsHere() threads, on whose
 /// number the plan does not depend.
 ///

@@ -73,7 +73,10 @@ std::vector<std::vector<bool>> DrivenAcross(const std::vector<DrawnLine>& drawn,
       const Vector2d to = path[i].head<2>();
       const double before = line.line.Across(from);
       const double after = line.line.Across(to);
-      if ((before > 0.0) == (after > 0.0)) continue;
+      // Where the way breaks off one of them is not finite.
+      if (!std::isfinite(before - after) || (before > 0.0) == (after > 0.0)) {
+        continue;
+      }
       const double share = before / (before - after);
       const double along = line.line.Along(from + share * (to - from));
       if (along < line.from || along > line.to) continue;

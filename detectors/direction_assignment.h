@@ -36,7 +36,8 @@ struct DirectionAssignmentOptions {
   double margin = 2.3;
   /// Nor are directions two when they differ by less than this.
   double min_separation = DegToRad(0.4);
-  /// Walls whose angle to a direction is known less well than this wait.
+  /// Walls whose angle to a direction is known less well than this are not tied
+  /// to it.
   double max_uncertainty = DegToRad(12.0);
   /// Fewest walls, and sum of their lengths (m), that make a new direction.
   int min_support = 3;
@@ -100,9 +101,10 @@ struct DirectionAssignment {
 /// the smallest variance enter the network first; then everything is estimated
 /// again with them. Directions that are parallel or at a right angle to each
 /// other within the gate are tied in the same way. When nothing more fits, a
-/// new direction is founded on walls that contradict all there are and agree
-/// with each other; it stands when, with all that was tied, it differs from
-/// every other one by split_gate. In the end a direction is split where two
+/// new direction is founded on walls that contradict all there are, or of whose
+/// angle to these too little is known (another part of the map), and agree with
+/// each other; it stands when, with all that was tied, it differs from every
+/// other one by split_gate. In the end a direction is split where two
 /// explain its walls better: walls that each lie within their own gate can
 /// contradict it together (score test of a further parameter, the turn of one
 /// part of the walls against the other); parts that then differ from no other

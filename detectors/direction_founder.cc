@@ -40,6 +40,15 @@ std::vector<std::size_t> Founders(const std::vector<DirectionWall>& walls,
   return founders;
 }
 
+// The largest chi-square at which an innovation of this variance counts.
+double LargestChiSquare(double variance,
+                        const DirectionAssignmentOptions& options) {
+  // What is so uncertain that it lies as well anywhere shows nothing.
+  const double clear =
+      2.0 * (std::log(kPi) - options.margin) - std::log(2.0 * kPi * variance);
+  return std::clamp(clear, 0.0, 0.5 * options.gate);
+}
+
 // The rejected walls that agree with one of them.
 struct Agreement {
   int walls = 0;
@@ -66,7 +75,9 @@ Agreement CountAgreeing(const DirectionTies& ties,
           walls[i].node, node, column, 0.0,
           std::hypot(ties.Tolerance(i), ties.Tolerance(founder)));
       agreement.expected_walls += std::min(
-          1.0, 2.0 * std::sqrt(0.5 * options.gate * innovation.variance) /
+          1.0, 2.0 *
+                   std::sqrt(LargestChiSquare(innovation.variance, options) *
+                             innovation.variance) /
                    (0.5 * kPi));
     }
     for (const double offset : {0.0, 0.5 * kPi}) {

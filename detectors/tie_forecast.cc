@@ -151,7 +151,10 @@ TieForecast PredictTies(const DirectionTies& ties,
   for (std::size_t i = 0; i < walls.size(); ++i) {
     if (ties.direction_of()[i] >= 0) continue;
     const BestTie best = FindBestTie(ties, used, walls, i, options);
-    if (!best.is_known) continue;
+    if (!best.is_known) {
+      forecast.is_rejected[i] = true;
+      continue;
+    }
     (*innovations)[i] = best.candidate.innovation;
     if (best.candidate.innovation.chi_square > options.gate) {
       forecast.is_rejected[i] = true;

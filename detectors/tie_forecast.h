@@ -27,8 +27,8 @@ struct TieCandidate {
 struct TieForecast {
   /// Of walls without a direction in their order, then of pairs of directions.
   std::vector<TieCandidate> candidates;
-  /// By wall: it contradicts every direction there is. Where there is none, all
-  /// do.
+  /// By wall: it contradicts every direction there is of which enough is known.
+  /// Where there is none, all do.
   std::vector<bool> is_rejected;
 };
 

@@ -117,6 +117,41 @@ TEST(DirectionAssignmentTest, WhatTheMeasurementsLeaveOpenMayBeTied) {
   for (const int k : assignment.direction_of) EXPECT_EQ(k, 0);
 }
 
+// Two rows that nothing connects, or only a turn that is known to 20 degrees:
+// each has its directions, and they say nothing of each other's.
+TEST(DirectionAssignmentTest, PartsThatAreOpenToEachOtherHaveTheirOwn) {
+  constexpr int kCount = 40;
+  for (const bool is_joined : {false, true}) {
+    DirectionNetwork network;
+    std::vector<DirectionWall> walls;
+    for (int i = 0; i < kCount; ++i) {
+      const bool is_across = i % 4 == 3;
+      network.AddNode(is_across ? 0.5 * kPi : 0.0);
+      DirectionWall wall;
+      wall.node = static_cast<std::size_t>(i);
+      wall.length = 3.0;
+      walls.push_back(wall);
+      if (i == 0) continue;
+      const bool is_joint = i == kCount / 2;
+      if (is_joint && !is_joined) continue;
+      const double sigma = DegToRad(is_joint ? 20.0 : 0.1);
+      network.AddLink(
+          i - 1, i,
+          (is_across ? 0.5 * kPi : 0.0) - (i % 4 == 0 ? 0.5 * kPi : 0.0),
+          sigma * sigma, false);
+    }
+    const DirectionAssignment assignment =
+        AssignDirections(std::move(network), walls, {}, {});
+    EXPECT_EQ(Mixed(assignment, kCount), 0) << is_joined;
+    int used = 0;
+    for (const SharedDirection& direction : assignment.directions) {
+      used += !direction.walls.empty();
+    }
+    EXPECT_EQ(used, 4) << is_joined;
+    for (const int k : assignment.direction_of) EXPECT_GE(k, 0) << is_joined;
+  }
+}
+
 // No wall of the second half is beyond its own gate; together they are.
 TEST(DirectionAssignmentTest, ADirectionIsSplitWhenTwoExplainItsWallsBetter) {
   constexpr int kCount = 40;

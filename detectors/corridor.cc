@@ -231,7 +231,7 @@ class CorridorSearch {
            UnionLength(sides[kLeftSide]) >= options_.min_coverage * length;
   }
 
-  CorridorModel MakeModel(const Feature* existing,
+  CorridorModel MakeModel(const Feature* existing, const CorridorAxis& axis,
                           const std::vector<SideFace>& on_sides) {
     std::vector<const WallFace*> faces;
     std::vector<Eigen::Vector2d> tolerances;
@@ -244,14 +244,16 @@ class CorridorSearch {
       options.hold_gauge = true;
       marginals_.emplace(graph_, options);
     }
+    const Vector2d along = axis.direction();
+    const Vector2d across(-along.y(), along.x());
     if (existing != nullptr) {
-      return CorridorModel(on_sides,
-                           FaceCovariance({existing}, faces, &*marginals_),
-                           std::move(tolerances));
+      return CorridorModel(
+          on_sides, FaceCovariance({existing}, faces, across, &*marginals_),
+          std::move(tolerances));
     }
-    return CorridorModel::OfNewCorridor(on_sides,
-                                        FaceCovariance({}, faces, &*marginals_),
-                                        std::move(tolerances));
+    return CorridorModel::OfNewCorridor(
+        on_sides, FaceCovariance({}, faces, across, &*marginals_),
+        std::move(tolerances));
   }
 
   // The corridor that two faces found.
@@ -279,7 +281,7 @@ class CorridorSearch {
       ++not_long_;
       return std::nullopt;
     }
-    CorridorModel model = MakeModel(nullptr, gathered);
+    CorridorModel model = MakeModel(nullptr, axis, gathered);
     Found found;
     found.faces = model.TieFitting(first_faces, options_.gate);
     if (!IsCorridor(axis, found.faces)) {
@@ -313,7 +315,7 @@ class CorridorSearch {
     const std::vector<SideFace> gathered =
         Gather(corridor.axis, PartOf(*corridor.feature), *reach, hull);
     if (gathered.empty()) return std::nullopt;
-    CorridorModel model = MakeModel(corridor.feature, gathered);
+    CorridorModel model = MakeModel(corridor.feature, corridor.axis, gathered);
     Found found;
     found.existing = corridor.feature;
     found.faces = model.TieFitting({}, options_.gate);

@@ -19,6 +19,12 @@ bool IsSighting(const Constraint& constraint) {
          !constraint.type->Is(RelationRole::kPose);
 }
 
+// Whether a feature is somewhere, unlike a direction or a size.
+bool HasPlace(const Feature& feature) {
+  return feature.type->HasPosition() || feature.type->anchor_size > 0 ||
+         feature.type->Is(FeatureRole::kWall);
+}
+
 // Whether a pose of the graph has seen a wall.
 bool WasSeen(const Graph& graph, FeatureId wall) {
   const std::vector<ConstraintId>& constraints = graph.ConstraintsOf(wall);
@@ -59,9 +65,11 @@ std::vector<WallFace> CollectWallFaces(const Graph& graph,
   DisjointSets parts(static_cast<std::size_t>(graph.feature_id_end()));
   for (const Constraint* constraint : graph.Constraints()) {
     if (constraint->state != ConstraintState::kLive) continue;
+    FeatureId first = kNoId;
     for (const FeatureId id : constraint->features) {
-      parts.Join(static_cast<std::size_t>(constraint->features[0]),
-                 static_cast<std::size_t>(id));
+      if (!HasPlace(graph.GetFeature(id))) continue;
+      if (first == kNoId) first = id;
+      parts.Join(static_cast<std::size_t>(first), static_cast<std::size_t>(id));
     }
   }
   for (WallFace& face : faces) {
@@ -72,6 +80,7 @@ std::vector<WallFace> CollectWallFaces(const Graph& graph,
 
 Eigen::MatrixXd FaceCovariance(const std::vector<const Feature*>& others,
                                const std::vector<const WallFace*>& faces,
+                               const Eigen::Vector2d& across,
                                Marginals* marginals) {
   std::vector<FeatureId> ids;
   Eigen::Index columns = 0;
@@ -91,8 +100,10 @@ Eigen::MatrixXd FaceCovariance(const std::vector<const Feature*>& others,
   Eigen::Index column = kept;
   for (const WallFace* face : faces) {
     const Wall& wall = face->wall;
-    jacobian.block<1, 2>(row, column) = wall.normal().transpose();
-    jacobian(row, column + 2) = 0.5 * (wall.begin + wall.end);
+    const double cosine = across.dot(wall.normal());
+    const double side = cosine < 0.0 ? -1.0 : 1.0;
+    jacobian.block<1, 2>(row, column) = side * across.transpose();
+    jacobian(row, column + 2) = 0.5 * (wall.begin + wall.end) * side * cosine;
     jacobian(row + 1, column + 2) = 1.0;
     row += kFaceSize;
     column += face->feature->type->size;

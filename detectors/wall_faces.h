@@ -22,7 +22,8 @@ struct WallFace {
   /// Of the visible part, m.
   double length = 0.0;
   /// Connected part of the graph that it belongs to: relative covariances mean
-  /// something within a part only.
+  /// something within a part only. Directions and sizes that are shared connect
+  /// nothing.
   std::size_t part = 0;
 };
 
@@ -37,11 +38,13 @@ std::vector<WallFace> CollectWallFaces(const Graph& graph,
 
 /// Joint covariance of the parameters of other features, as they are and in
 /// their order, and of two numbers for each face: how far its middle lies to
-/// the left of where it is (m), and its direction (rad). Where the face's
-/// middle lies along its line does not enter. All are of one part of the graph.
-/// Throws Error as Marginals::JointCovariance does.
+/// the left of where it is (m), and its direction (rad). Left is along `across`
+/// or against it: one unit vector, that all faces are nearly across to, so that
+/// where they lie as a whole does not enter what lies between them. All are of
+/// one part of the graph. Throws Error as Marginals::JointCovariance does.
 Eigen::MatrixXd FaceCovariance(const std::vector<const Feature*>& others,
                                const std::vector<const WallFace*>& faces,
+                               const Eigen::Vector2d& across,
                                Marginals* marginals);
 
 }  // namespace plumbline

@@ -181,7 +181,7 @@ void SetCovariance(const std::vector<WallFace>& faces, Marginals* marginals,
   // Of the middles of the faces; where the wall is looked at is so far from
   // them along each.
   const Eigen::MatrixXd of_faces =
-      FaceCovariance({}, {&first, &second}, marginals);
+      FaceCovariance({}, {&first, &second}, second.wall.normal(), marginals);
   const double along_first = 0.5 * (body->common.first + body->common.second) -
                              0.5 * (first.wall.begin + first.wall.end);
   const double along_second =

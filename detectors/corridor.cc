@@ -40,6 +40,8 @@ constexpr int kMaxRivals = 8;
 // A corridor that is there, with the faces that are tied to it.
 struct Existing {
   const Feature* feature = nullptr;
+  // Of the graph.
+  std::size_t part = 0;
   CorridorAxis axis;
   std::vector<Interval> intervals;
 };
@@ -47,6 +49,8 @@ struct Existing {
 // What is found: a new corridor, or faces that join one that is there.
 struct Found {
   const Feature* existing = nullptr;
+  // Of the graph.
+  std::size_t part = 0;
   CorridorAxis axis;
   Interval interval;
   std::vector<SideFace> faces;
@@ -70,11 +74,12 @@ class CorridorSearch {
     }
   }
 
-  std::vector<Found> Run(const std::vector<Existing>& existing,
+  std::vector<Found> Run(std::vector<Existing> existing,
                          const DetectionScope& scope) {
     std::vector<Found> found;
-    for (const Existing& corridor : existing) {
+    for (Existing& corridor : existing) {
       if (scope.ShouldStop()) return {};
+      corridor.part = PartOf(*corridor.feature);
       std::optional<Found> more = Extend(corridor);
       if (more) found.push_back(std::move(*more));
     }
@@ -84,14 +89,17 @@ class CorridorSearch {
       if (!IsFree(seeds[i])) continue;
       const CorridorAxis axis =
           AxisBetween(faces_[seeds[i].first], faces_[seeds[i].second]);
-      if (LiesInOneOf(existing, axis) || LiesInOneOf(found, axis)) continue;
+      const std::size_t part = faces_[seeds[i].first].part;
+      if (LiesInOneOf(existing, axis, part) || LiesInOneOf(found, axis, part)) {
+        continue;
+      }
       std::optional<Found> best = Complete(axis, seeds[i]);
       if (!best) continue;
       const Found first = *best;
       int rivals = 1;
       for (std::size_t j = i + 1; j < seeds.size() && rivals < kMaxRivals;
            ++j) {
-        if (!IsFree(seeds[j])) continue;
+        if (!IsFree(seeds[j]) || faces_[seeds[j].first].part != part) continue;
         const CorridorAxis rival_axis =
             AxisBetween(faces_[seeds[j].first], faces_[seeds[j].second]);
         if (!rival_axis.IsWithin(first.axis, first.interval)) continue;
@@ -179,17 +187,18 @@ class CorridorSearch {
   }
 
   static bool LiesInOneOf(const std::vector<Existing>& existing,
-                          const CorridorAxis& axis) {
+                          const CorridorAxis& axis, std::size_t part) {
     return std::any_of(
         existing.begin(), existing.end(), [&](const Existing& corridor) {
-          return !corridor.intervals.empty() &&
+          return corridor.part == part && !corridor.intervals.empty() &&
                  axis.IsWithin(corridor.axis, Hull(corridor.intervals));
         });
   }
   static bool LiesInOneOf(const std::vector<Found>& found,
-                          const CorridorAxis& axis) {
+                          const CorridorAxis& axis, std::size_t part) {
     return std::any_of(found.begin(), found.end(), [&](const Found& corridor) {
-      return axis.IsWithin(corridor.axis, corridor.interval);
+      return corridor.part == part &&
+             axis.IsWithin(corridor.axis, corridor.interval);
     });
   }
 
@@ -263,13 +272,13 @@ class CorridorSearch {
     const Interval second = axis.IntervalOf(faces_[seed.second].wall);
     const Interval common = {std::max(first.first, second.first),
                              std::min(first.second, second.second)};
-    const std::optional<Interval> reach = FreeReach(axis, common, faces_);
+    const std::size_t part = faces_[seed.first].part;
+    const std::optional<Interval> reach = FreeReach(axis, common, faces_, part);
     if (!reach) {
       ++crossed_;
       return std::nullopt;
     }
-    const std::vector<SideFace> gathered =
-        Gather(axis, faces_[seed.first].part, *reach, common);
+    const std::vector<SideFace> gathered = Gather(axis, part, *reach, common);
     // A face that ends beyond a wall across is none of them.
     std::vector<std::size_t> first_faces;
     for (std::size_t k = 0; k < gathered.size(); ++k) {
@@ -283,6 +292,7 @@ class CorridorSearch {
     }
     CorridorModel model = MakeModel(nullptr, axis, gathered);
     Found found;
+    found.part = part;
     found.faces = model.TieFitting(first_faces, options_.gate);
     if (!IsCorridor(axis, found.faces)) {
       ++not_long_;
@@ -309,15 +319,16 @@ class CorridorSearch {
     if (corridor.intervals.empty()) return std::nullopt;
     const Interval hull = Hull(corridor.intervals);
     const std::optional<Interval> reach =
-        FreeReach(corridor.axis, hull, faces_);
+        FreeReach(corridor.axis, hull, faces_, corridor.part);
     // What is there is not taken apart for a wall across.
     if (!reach) return std::nullopt;
     const std::vector<SideFace> gathered =
-        Gather(corridor.axis, PartOf(*corridor.feature), *reach, hull);
+        Gather(corridor.axis, corridor.part, *reach, hull);
     if (gathered.empty()) return std::nullopt;
     CorridorModel model = MakeModel(corridor.feature, corridor.axis, gathered);
     Found found;
     found.existing = corridor.feature;
+    found.part = corridor.part;
     found.faces = model.TieFitting({}, options_.gate);
     refused_ += static_cast<std::int64_t>(gathered.size() - found.faces.size());
     if (found.faces.empty()) return std::nullopt;

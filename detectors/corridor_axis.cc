@@ -79,11 +79,13 @@ SideFace OnSide(const CorridorAxis& axis, const WallFace& face,
 
 std::optional<Interval> FreeReach(const CorridorAxis& axis,
                                   const Interval& part,
-                                  const std::vector<WallFace>& faces) {
+                                  const std::vector<WallFace>& faces,
+                                  std::size_t graph_part) {
   Interval reach = {-std::numeric_limits<double>::infinity(),
                     std::numeric_limits<double>::infinity()};
   const double middle = 0.5 * (part.first + part.second);
   for (const WallFace& face : faces) {
+    if (face.part != graph_part) continue;
     const Vector2d begin = axis.Local(face.wall.At(face.wall.begin));
     const Vector2d end = axis.Local(face.wall.At(face.wall.end));
     const double far = kCrossing * axis.half_width;

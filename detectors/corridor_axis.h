@@ -65,11 +65,13 @@ struct SideFace {
 SideFace OnSide(const CorridorAxis& axis, const WallFace& face,
                 std::size_t index);
 
-/// How far a corridor can go from a `part` of its axis: to the nearest walls
-/// that cross it. None when one crosses it within the part.
+/// How far a corridor can go from a `part` of its axis: to the nearest walls of
+/// its part of the graph that cross it. None when one crosses it within the
+/// part.
 std::optional<Interval> FreeReach(const CorridorAxis& axis,
                                   const Interval& part,
-                                  const std::vector<WallFace>& faces);
+                                  const std::vector<WallFace>& faces,
+                                  std::size_t graph_part);
 
 /// Those of the faces that are joined on to a `part` of the axis, one after the
 /// other, across openings of at most `max_opening` (m), in their order.

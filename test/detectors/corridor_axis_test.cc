@@ -75,7 +75,7 @@ TEST(CorridorAxisTest, ReachEndsAtWallsAcross) {
   CorridorAxis axis;
   axis.half_width = 1.0;
   const std::vector<WallFace> none;
-  const std::optional<Interval> open = FreeReach(axis, {0.0, 4.0}, none);
+  const std::optional<Interval> open = FreeReach(axis, {0.0, 4.0}, none, 0);
   ASSERT_TRUE(open);
   EXPECT_TRUE(std::isinf(open->first) && std::isinf(open->second));
   const std::vector<WallFace> faces = {
@@ -84,10 +84,10 @@ TEST(CorridorAxisTest, ReachEndsAtWallsAcross) {
       SideWall(-3.0, 1.0, -3.0, -1.0),
       // A door leaf that leaves half of the corridor open, and a side.
       SideWall(5.0, -1.0, 5.0, 0.4), SideWall(0.0, -1.0, 4.0, -1.0)};
-  const std::optional<Interval> reach = FreeReach(axis, {0.0, 4.0}, faces);
+  const std::optional<Interval> reach = FreeReach(axis, {0.0, 4.0}, faces, 0);
   ASSERT_TRUE(reach);
   EXPECT_THAT(*reach, Pair(-3.0, 6.0));
-  EXPECT_FALSE(FreeReach(axis, {0.0, 7.0}, faces));
+  EXPECT_FALSE(FreeReach(axis, {0.0, 7.0}, faces, 0));
 }
 
 TEST(CorridorAxisTest, FacesAreJoinedAcrossOpenings) {

@@ -273,6 +273,29 @@ TEST(CorridorTest, PartsThatNothingConnectsAreNotCompared) {
   }
 }
 
+// Where they lie to each other is not known: one may seem to lie across.
+TEST(CorridorTest, PartsThatNothingConnectsHinderNoneOfTheOthers) {
+  FaceWorld world;
+  for (const double turn : {0.0, 0.1, 1.5}) {
+    world.BeginPart();
+    const PoseTransform place(Pose2(1.0, 0.5, turn));
+    std::vector<FeatureId> poses;
+    for (double x = -5.0; x <= 5.0; x += 1.0) {
+      const Eigen::Vector2d at = place.Point({x, 0.0});
+      poses.push_back(world.AddPose(at.x(), at.y(), turn));
+    }
+    for (const double y : {-1.0, 1.0}) {
+      const Eigen::Vector2d from = place.Point({6.0 * y, y});
+      const Eigen::Vector2d to = place.Point({-6.0 * y, y});
+      const FeatureId wall = world.AddFace(from.x(), from.y(), to.x(), to.y());
+      for (const FeatureId pose : poses) {
+        world.See(pose, wall, 0.01, DegToRad(0.3));
+      }
+    }
+  }
+  EXPECT_EQ(world.Detect("corridor").added_features().size(), 3u);
+}
+
 TEST(CorridorTest, GoesWithASide) {
   Hallway hallway;
   hallway.See();

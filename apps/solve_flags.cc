@@ -9,6 +9,7 @@
 #include <plumbline/detectors/structure_prior.h>
 #include <plumbline/pipeline/plan_dxf.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -209,6 +210,9 @@ DEFINE_bool(range_offset, true,
             "Find by how much the laser's ranges are all too long or too "
             "short, from how scans that follow each other match, and take it "
             "out");
+DEFINE_bool(mirrors, true,
+            "Find mirrors, in which what stands before them is seen once more "
+            "behind an opening, and leave it out of the map");
 DEFINE_double(link_radius, 10.0,
               "Feature links are kept so far around the robot, m");
 PLUMBLINE_FLAG_RANGE(link_radius, 0.5, 1000.0);
@@ -377,6 +381,9 @@ void TakeFrontEndFlags(LogSolverOptions* options) {
   options->odometry.match_scans = FLAGS_odometry_refinement;
   options->odometry.prepare_ahead = NumThreadsFromFlags() > 1;
   options->range_offset = FLAGS_range_offset;
+  options->find_mirrors = FLAGS_mirrors;
+  options->mirrors.returns.usable_range =
+      std::min(options->mirrors.returns.usable_range, FLAGS_usable_range);
   options->odometry.points.usable_range = FLAGS_usable_range;
   options->builder.link_radius = FLAGS_link_radius;
   options->builder.association_depth = FLAGS_association_depth;
@@ -431,8 +438,9 @@ std::vector<FlagGroup> SolveFlagGroups() {
        {"delta_threshold", "delta_mode", "full_weight_test", "em_every",
         "em_max_iterations", "minimizer"}},
       {"Front-end",
-       {"features", "range_offset", "odometry_refinement", "link_radius",
-        "association_depth", "global_association", "refine", "usable_range"}},
+       {"features", "range_offset", "mirrors", "odometry_refinement",
+        "link_radius", "association_depth", "global_association", "refine",
+        "usable_range"}},
       {"Bags", {"scan_topic", "odometry_topic"}},
       {"Laser", {"laser_start_angle", "laser_step", "laser_max_range"}},
       {"Running",
@@ -477,6 +485,7 @@ std::vector<std::string> LogFlags() {
           "em_every",
           "features",
           "range_offset",
+          "mirrors",
           "odometry_refinement",
           "link_radius",
           "start_pose",

@@ -142,6 +142,12 @@ std::string WorthALook(const SolveOutcome& outcome, const Walls& walls) {
     Append(text, &list);
   }
   AppendLoose(outcome, "the map", &list);
+  if (!summary.mirrors.empty()) {
+    Append(
+        Counted(static_cast<std::int64_t>(summary.mirrors.size()), "mirror") +
+            " (reflections are left out)",
+        &list);
+  }
   if (walls.refuted > 0) {
     char text[64];
     std::snprintf(text, sizeof text, " off every direction (up to %.1f m)",

@@ -37,6 +37,9 @@ struct LogPart {
 struct SolveOutcome : SolvedRun {
   OccupancyOptions occupancy;
   double delta_threshold = 0.0;
+  /// The scans that `scans` points to when what was seen in mirrors was cut out
+  /// of them for the outputs.
+  std::shared_ptr<const std::vector<Scan>> cut_scans;
   /// The graph that `graph` points to when it was moved for the outputs.
   std::shared_ptr<const Graph> moved_graph;
   /// Of a run on several logs: those in this map, each of which gets a

@@ -198,6 +198,14 @@ Json TrackingToJson(const Summary::Tracking& tracking) {
   return {{"pieces", tracking.pieces}, {"loose", std::move(loose)}};
 }
 
+Json MirrorToJson(const Summary::Mirror& mirror) {
+  return {{"begin", {mirror.begin.x(), mirror.begin.y()}},
+          {"end", {mirror.end.x(), mirror.end.y()}},
+          {"width_m", (mirror.end - mirror.begin).norm()},
+          {"returns", mirror.returns},
+          {"share", mirror.share}};
+}
+
 }  // namespace
 
 std::optional<double> OrthogonalityDeg(
@@ -326,6 +334,9 @@ void WriteSummary(const Summary& summary, std::ostream& output) {
       json["plan"] = {{"rooms", summary.plan->rooms},
                       {"doors", summary.plan->doors},
                       {"way_outside_m", summary.plan->way_outside}};
+    }
+    for (const Summary::Mirror& mirror : summary.mirrors) {
+      json["mirrors"].push_back(MirrorToJson(mirror));
     }
     if (summary.alignment) {
       const Pose2& by = *summary.alignment;

@@ -7,6 +7,7 @@
 #include <plumbline/factors/pose2.h>
 #include <plumbline/frontend/scan.h>
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -178,6 +179,18 @@ struct Summary {
   };
   Tracking tracking;
 
+  /// Of a log only: a mirror, or another thing that reflects the laser, from
+  /// one end to the other, m, seen from its left; of the returns seen in it
+  /// that were looked at, the share that lies on images of what stands before
+  /// it.
+  struct Mirror {
+    Eigen::Vector2d begin = Eigen::Vector2d::Zero();
+    Eigen::Vector2d end = Eigen::Vector2d::Zero();
+    std::int64_t returns = 0;
+    double share = 0.0;
+  };
+  std::vector<Mirror> mirrors;
+
   /// Of a log only: how all outputs were moved, m and rad. What lay at p in the
   /// frame of the solver lies at TransformPoint(*alignment, p); none when
   /// nothing was moved.
@@ -263,9 +276,9 @@ std::string CountsAsJson(const Summary& summary);
 /// without odometry), format, scans, odometry (names; of logs that tell), notes
 /// [text]}, tracking {pieces, loose [{begin, end, why}]}, where a plan was made
 /// plan {rooms, doors, way_outside_m (of the robot, in no room; stretches of
-/// over 2 m)}, where the outputs
-/// were moved alignment {kind, x, y, theta_deg} (m and degrees), and where
-/// there were several logs
+/// over 2 m)}, where mirrors were found mirrors [{begin, end (each [x, y]),
+/// width_m, returns, share}], where the outputs were moved alignment {kind, x,
+/// y, theta_deg} (m and degrees), and where there were several logs
 /// [{input, trajectory (or null), scans, map, parts, agreeing, contradicting,
 /// changed_places, uncertain (why it may be another building; or null),
 /// why_apart (or null), candidate ([x, y, degrees] that --start_pose takes; or

@@ -524,6 +524,7 @@ void LogSolver::ScaleToNoise(double scale) {
   options_.adjustment.ScaleToNoise(scale);
   options_.check.ScaleToNoise(scale);
   options_.way_check.ScaleToNoise(scale);
+  options_.mirrors.ScaleToNoise(scale);
 }
 
 std::vector<LooseTrack> LogSolver::CorrectMissedSteps(Context* context) {

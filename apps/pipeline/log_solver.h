@@ -12,6 +12,7 @@
 #include <plumbline/frontend/late_metre.h>
 #include <plumbline/frontend/map_builder.h>
 #include <plumbline/frontend/map_check.h>
+#include <plumbline/frontend/mirrors.h>
 #include <plumbline/frontend/odometry_refinement.h>
 #include <plumbline/frontend/point_map_builder.h>
 #include <plumbline/frontend/pose_recovery.h>
@@ -92,6 +93,10 @@ struct LogSolverOptions {
   bool check_map = true;
   MapCheckOptions check;
   WayCheckOptions way_check;
+  /// Find mirrors once poses are adjusted, and leave out of the walls what was
+  /// seen in them; full refinement of segments only.
+  bool find_mirrors = true;
+  MirrorOptions mirrors;
   LateMetreOptions late_metre;
   /// What is known of the building beforehand; needs structure and full
   /// refinement of segments.
@@ -153,6 +158,9 @@ struct LogSolverResult {
   /// replay the log in another way (without_structure.h).
   std::vector<RefinedScan> refined;
   std::vector<KeyScanRecord> records;
+  /// Mirrors, map frame: what was seen in them is not in the map
+  /// (CutAtMirrors).
+  std::vector<Mirror> mirrors;
   /// How each broken constraint of the map was broken.
   BreakRecords breaks;
   /// Noise of the laser's ranges (standard deviation, m), and the factor by

@@ -19,23 +19,30 @@ void Exchange(Archive& archive, LoopClosure& closure) {
 }
 
 template <typename Archive>
+void Exchange(Archive& archive, Mirror& mirror) {
+  auto& [wall, returns, share] = mirror;
+  ExchangeAll(archive, wall.position, wall.angle, wall.direction, wall.begin,
+              wall.end, returns, share);
+}
+
+template <typename Archive>
 void Exchange(Archive& archive, LogSolverResult& result) {
   auto& [trajectory, em, initial_cost, final_cost, frontend_seconds,
          detect_seconds, solve_seconds, relocalization_seconds,
          completion_seconds, adjustment_seconds, glimpsed_walls, scan_relations,
          wall_votes, scan_seconds, key_scans, wide_searches, refused_matches,
          lost_tracks, loose, feature_matches, features_created,
-         second_map_refused, loose_walls, interrupted, refined, records, breaks,
-         range_sigma, noise_scale, odometry_scale, odometry_course, notes,
-         closures] = result;
-  ExchangeAll(archive, trajectory, em, initial_cost, final_cost,
-              frontend_seconds, detect_seconds, solve_seconds,
-              relocalization_seconds, completion_seconds, adjustment_seconds,
-              glimpsed_walls, scan_relations, wall_votes, scan_seconds,
-              key_scans, wide_searches, refused_matches, lost_tracks, loose,
-              feature_matches, features_created, second_map_refused,
-              loose_walls, interrupted, refined, records, breaks, range_sigma,
-              noise_scale, odometry_scale, odometry_course, notes, closures);
+         second_map_refused, loose_walls, interrupted, refined, records,
+         mirrors, breaks, range_sigma, noise_scale, odometry_scale,
+         odometry_course, notes, closures] = result;
+  ExchangeAll(
+      archive, trajectory, em, initial_cost, final_cost, frontend_seconds,
+      detect_seconds, solve_seconds, relocalization_seconds, completion_seconds,
+      adjustment_seconds, glimpsed_walls, scan_relations, wall_votes,
+      scan_seconds, key_scans, wide_searches, refused_matches, lost_tracks,
+      loose, feature_matches, features_created, second_map_refused, loose_walls,
+      interrupted, refined, records, mirrors, breaks, range_sigma, noise_scale,
+      odometry_scale, odometry_course, notes, closures);
 }
 
 }  // namespace plumbline

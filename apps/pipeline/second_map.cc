@@ -1,7 +1,9 @@
 #include <plumbline/core/parallel_for.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/frontend/agreeing_visits.h>
 #include <plumbline/frontend/key_views.h>
+#include <plumbline/frontend/mirrors.h>
 #include <plumbline/frontend/wall_completion.h>
 #include <plumbline/pipeline/bent_map.h>
 #include <plumbline/pipeline/guessed_parts.h>
@@ -12,6 +14,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <future>
+#include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -35,6 +38,15 @@ constexpr int kMostRounds = 3;
 constexpr double kLooseVotes = 0.03;
 constexpr double kSmallKink = DegToRad(0.2);
 constexpr double kSmallVarianceFactor = 0.02;
+
+std::vector<Wall> WallsOf(const Transaction& transaction) {
+  std::vector<Wall> walls;
+  for (const Feature& feature : transaction.added_features()) {
+    const std::optional<Wall> wall = WallOf(feature);
+    if (wall) walls.push_back(*wall);
+  }
+  return walls;
+}
 
 }  // namespace
 
@@ -241,9 +253,22 @@ void SecondMap::MakeWalls() {
 }
 
 void SecondMap::AddWalls(const WallCompletionOptions& completion) {
-  adjustment_->AddWalls(FindGlimpsedWalls(map_.graph(), registry_, run_.scans,
-                                          run_.result.trajectory, completion,
-                                          run_.control.stop));
+  LogSolverResult& result = run_.result;
+  const auto find = [&](const std::vector<Scan>& scans) {
+    return FindGlimpsedWalls(map_.graph(), registry_, scans, result.trajectory,
+                             completion, run_.control.stop);
+  };
+  Transaction walls = find(run_.scans);
+  if (options_.find_mirrors && !run_.IsStopped()) {
+    result.mirrors =
+        FindMirrors(WallsOf(walls), run_.scans, result.trajectory,
+                    options_.mirrors, [this] { return run_.IsStopped(); });
+  }
+  if (!result.mirrors.empty()) {
+    walls = find(CutAtMirrors(run_.scans, result.trajectory, result.mirrors,
+                              options_.mirrors));
+  }
+  adjustment_->AddWalls(std::move(walls));
 }
 
 void SecondMap::AdjustBoth() {
@@ -310,6 +335,7 @@ void SecondMap::ReturnToFirst() {
   result.closures.clear();
   result.scan_relations = result.wall_votes = 0;
   result.loose_walls = false;
+  result.mirrors.clear();
 }
 
 void SecondMap::TakeSession() {

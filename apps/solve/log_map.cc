@@ -5,11 +5,14 @@
 #include <plumbline/apps/solve_flags.h>
 #include <plumbline/core/utf8.h>
 #include <plumbline/frontend/key_scan_archive.h>
+#include <plumbline/frontend/mirrors.h>
 #include <plumbline/outputs/building_frame.h>
 #include <plumbline/pipeline/without_structure.h>
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
+#include <memory>
 
 namespace plumbline {
 namespace {
@@ -78,6 +81,26 @@ void TellOfTrack(const std::string& name, const std::vector<Scan>& scans,
   }
 }
 
+void TellOfMirrors(const std::string& name, const std::vector<Mirror>& mirrors,
+                   const Pose2& moved_by, Summary* summary) {
+  for (const Mirror& mirror : mirrors) {
+    const Wall& wall = mirror.wall;
+    const Eigen::Vector2d begin = TransformPoint(moved_by, wall.At(wall.begin));
+    const Eigen::Vector2d end = TransformPoint(moved_by, wall.At(wall.end));
+    summary->mirrors.push_back({begin, end, mirror.returns, mirror.share});
+    char note[256];
+    std::snprintf(note, sizeof note,
+                  "a mirror, or something as smooth, %.1f m wide from (%.2f, "
+                  "%.2f) to (%.2f, %.2f): what is seen behind it is the image "
+                  "of what stands before it (%.0f %% of %d returns), and is "
+                  "left out (--mirrors=false keeps it)",
+                  wall.length(), begin.x(), begin.y(), end.x(), end.y(),
+                  100.0 * mirror.share, mirror.returns);
+    summary->notes.push_back(note);
+    Remark("%s: %s", name.c_str(), note);
+  }
+}
+
 std::vector<TimedPose> TimedTrajectory(const std::vector<Scan>& scans,
                                        const std::vector<Pose2>& poses) {
   std::vector<TimedPose> trajectory(poses.size());
@@ -102,6 +125,12 @@ void TakeMap(const std::string& name, const std::vector<Scan>& scans,
   const Pose2 moved_by = AlignOutputs(result.trajectory, outcome);
   if (!InterruptRequested()) TakeMarginals(nullptr, outcome);
   outcome->scans = &scans;
+  if (!result.mirrors.empty()) {
+    TellOfMirrors(name, result.mirrors, moved_by, &outcome->summary);
+    outcome->cut_scans = std::make_shared<const std::vector<Scan>>(CutAtMirrors(
+        scans, result.trajectory, result.mirrors, options.mirrors));
+    outcome->scans = outcome->cut_scans.get();
+  }
   outcome->key_scans = [&scans, &result, moved_by] {
     std::vector<Pose2> moved;
     for (const Pose2& pose : result.trajectory) {

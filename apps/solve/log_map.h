@@ -3,6 +3,7 @@
 
 #include <plumbline/core/registry.h>
 #include <plumbline/factors/pose2.h>
+#include <plumbline/frontend/mirrors.h>
 #include <plumbline/frontend/scan.h>
 #include <plumbline/frontend/timed_pose.h>
 #include <plumbline/outputs/solve_outputs.h>
@@ -18,6 +19,11 @@ namespace plumbline {
 /// the summary and says it.
 void TellOfTrack(const std::string& name, const std::vector<Scan>& scans,
                  const LogSolverResult& result, Summary* summary);
+
+/// Puts mirrors (map frame) into the summary, with all that was moved by
+/// `moved_by`, and says where they are.
+void TellOfMirrors(const std::string& name, const std::vector<Mirror>& mirrors,
+                   const Pose2& moved_by, Summary* summary);
 
 /// The pose of every scan that was solved, with its time.
 std::vector<TimedPose> TimedTrajectory(const std::vector<Scan>& scans,

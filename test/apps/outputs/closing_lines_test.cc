@@ -82,6 +82,12 @@ TEST_F(ClosingLinesTest, WhatIsWorthALook) {
             std::string::npos);
 }
 
+TEST_F(ClosingLinesTest, MirrorsAreWorthALook) {
+  outcome_.summary.mirrors.resize(2);
+  EXPECT_EQ(ClosingLines(outcome_, "out")[1],
+            "worth a look: 2 mirrors (reflections are left out)");
+}
+
 TEST_F(ClosingLinesTest, ASolverThatDidNotConverge) {
   Summary& summary = outcome_.summary;
   summary.solver.emplace();

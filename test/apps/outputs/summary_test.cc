@@ -260,6 +260,21 @@ TEST(SummaryTest, APartOfARunSaysSo) {
   EXPECT_EQ(write()["scans_in_log"], 1408);
 }
 
+TEST(SummaryTest, MirrorsAreToldWhereThereAreAny) {
+  Summary summary;
+  summary.scans = 10;
+  const auto write = [&] {
+    std::ostringstream output;
+    WriteSummary(summary, output);
+    return nlohmann::ordered_json::parse(output.str());
+  };
+  EXPECT_FALSE(write().contains("mirrors"));
+  summary.mirrors.push_back({{1.0, 2.0}, {4.0, 6.0}, 150, 0.75});
+  EXPECT_EQ(write()["mirrors"].dump(),
+            R"([{"begin":[1.0,2.0],"end":[4.0,6.0],"width_m":5.0,)"
+            R"("returns":150,"share":0.75}])");
+}
+
 TEST(SummaryTest, AGraphHasNoFrontend) {
   std::ostringstream output;
   WriteSummary(Summary(), output);

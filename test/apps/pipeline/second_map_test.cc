@@ -2,12 +2,14 @@
 #include <plumbline/core/builtins.h>
 #include <plumbline/core/graph_json.h>
 #include <plumbline/core/transaction.h>
+#include <plumbline/core/wall.h>
 #include <plumbline/factors/angle.h>
 #include <plumbline/pipeline/second_map.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -223,6 +225,53 @@ TEST_F(SecondMapTest, IsNotRefusedWhereItsWallsHaveTheReturns) {
   second_.AdjustWalls();
   EXPECT_FALSE(run_.result.second_map_refused);
   EXPECT_LT(WorstPosition(run_), 0.02);
+}
+
+// A mirror 2 m wide hangs in the wall at y = 3: behind it lies the image of the
+// room, in which no wall is drawn; the mirror is one.
+TEST_F(SecondMapTest, WhatIsSeenInAMirrorIsLeftOut) {
+  std::vector<testing::WallEnds> world = {{{-5.0, 3.0}, {-1.0, 3.0}},
+                                          {{1.0, 3.0}, {5.0, 3.0}},
+                                          {{5.0, 3.0}, {5.0, -3.0}},
+                                          {{5.0, -3.0}, {-5.0, -3.0}},
+                                          {{-5.0, -3.0}, {-5.0, 3.0}}};
+  Add(testing::Moved(testing::Room(0.8, 0.8), Pose2(1.0, 0.3, 0.0)), &world);
+  Add(testing::Moved(testing::Room(0.6, 1.2), Pose2(-2.0, -2.4, 0.0)), &world);
+  const std::vector<testing::WallEnds> room = world;
+  for (const testing::WallEnds& wall : room) {
+    world.push_back(
+        {{wall.a.x(), 6.0 - wall.a.y()}, {wall.b.x(), 6.0 - wall.b.y()}});
+  }
+  See(world, Pose2::Zero());
+  LogSolverOptions options = options_;
+  for (const bool find_mirrors : {true, false}) {
+    options.find_mirrors = find_mirrors;
+    run_.result.trajectory = run_.keys;
+    SecondMap second(registry_, options, &run_, &map_);
+    second.AdjustPoses();
+    second.MakeWalls();
+    second.AdjustWalls();
+    double behind = 0.0;
+    bool has_mirror = false;
+    for (const Feature* feature : std::as_const(map_.graph()).Features()) {
+      const std::optional<Wall> wall = WallOf(*feature);
+      if (!wall) continue;
+      if (wall->Middle().y() > 3.2) behind += wall->length();
+      has_mirror |= std::abs(wall->Across({0.0, 3.0})) < 0.03 &&
+                    wall->begin < wall->Along({0.9, 3.0}) &&
+                    wall->end > wall->Along({-0.9, 3.0}) &&
+                    wall->Across({0.0, 0.0}) > 2.9;
+    }
+    EXPECT_EQ(has_mirror, find_mirrors);
+    if (find_mirrors) {
+      EXPECT_LT(behind, 0.5);
+      ASSERT_EQ(run_.result.mirrors.size(), 1u);
+      EXPECT_NEAR(run_.result.mirrors[0].wall.length(), 2.0, 0.1);
+    } else {
+      EXPECT_GT(behind, 5.0);
+    }
+    run_.result.mirrors.clear();
+  }
 }
 
 }  // namespace

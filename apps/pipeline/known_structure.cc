@@ -94,6 +94,22 @@ bool ParsePoint(const std::string& text, Eigen::Vector2d* point) {
 
 }  // namespace
 
+KnownStructure InAnotherFrame(KnownStructure known) {
+  if (!known.statements.empty()) {
+    known.notes.push_back(
+        "statements on walls are not used in this map: their points are in "
+        "the frame of another one");
+  }
+  if (known.plan_pose) {
+    known.notes.push_back(
+        "the pose of the plan that was given is not used in this map: it is "
+        "one in the frame of another");
+  }
+  known.statements.clear();
+  known.plan_pose.reset();
+  return known;
+}
+
 std::vector<WallStatement> ReadWallStatements(const std::string& text,
                                               const std::string& name) {
   std::vector<WallStatement> statements;

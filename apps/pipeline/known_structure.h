@@ -95,6 +95,11 @@ struct KnownStructure {
   double min_contradicting_length = 3.0;
 };
 
+/// What of it holds in a map of another frame: neither the statements, whose
+/// points would be those of other walls there, nor the plan's pose. A note says
+/// what is not used.
+KnownStructure InAnotherFrame(KnownStructure known);
+
 /// Reads statements: a line each, # begins a comment. Points are x,y in the map
 /// frame, m.
 ///

@@ -4,6 +4,7 @@
 #include <plumbline/frontend/joint_adjustment.h>
 #include <plumbline/frontend/range_noise.h>
 #include <plumbline/frontend/relocalization.h>
+#include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/placement_tie.h>
 #include <plumbline/pipeline/several_logs.h>
 
@@ -226,6 +227,16 @@ class Merger {
   }
 
  private:
+  // Those of a map whose frame is that of this log, or the earlier map's. What
+  // somebody says of places in the frame of the first log's map holds there.
+  LogSolverOptions OptionsFrom(std::size_t front) const {
+    LogSolverOptions options = options_.solver;
+    if (front != 0 && options_.earlier == nullptr) {
+      options.known = InAnotherFrame(std::move(options.known));
+    }
+    return options;
+  }
+
   bool IsStopped() {
     if (!result_.interrupted && control_.run.stop && control_.run.stop()) {
       result_.interrupted = true;
@@ -235,7 +246,7 @@ class Merger {
 
   void MakeFirstMap(std::size_t i) {
     FirstMap log;
-    log.solver = std::make_unique<LogSolver>(registry_, options_.solver);
+    log.solver = std::make_unique<LogSolver>(registry_, OptionsFrom(i));
     log.result = log.solver->RunFirst(logs_[i], control_.run);
     result_.interrupted = result_.interrupted || log.result.interrupted;
     log.num_scans = logs_[i].scans.size();
@@ -607,7 +618,8 @@ class Merger {
                 std::back_inserter(map.scans));
       wall_length = std::max(wall_length, maps_[i].wall_length);
     }
-    map.solver = std::make_unique<LogSolver>(registry_, options_.solver);
+    map.solver =
+        std::make_unique<LogSolver>(registry_, OptionsFrom(group.logs.front()));
     map.result = map.solver->GoOn(map.scans, std::move(first), wall_length,
                                   control_.run);
     if (map.result.second_map_refused) {

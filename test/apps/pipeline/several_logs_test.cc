@@ -11,6 +11,7 @@
 #include <plumbline/frontend/key_scan_archive.h>
 #include <plumbline/frontend/key_views.h>
 #include <plumbline/frontend/track_placement.h>
+#include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/several_logs.h>
 
 #include <Eigen/Core>
@@ -208,6 +209,31 @@ TEST_F(SeveralLogsTest, DifferentBuildingsAreKeptApart) {
   LogSolver alone(registry_, {});
   EXPECT_EQ(result.maps[0].result.trajectory,
             alone.Run(Piece(office, 0, 500)).trajectory);
+}
+
+// Points of statements are in the frame of the first log's map: in that of a
+// log that is kept apart other walls lie there.
+TEST_F(SeveralLogsTest, StatementsHoldInTheFirstLogsMapAlone) {
+  const Log office = Office();
+  Log other = Enlarged(Piece(office, 0, 500));
+  SeveralLogsOptions options;
+  WallStatement statement;
+  statement.kind = WallStatement::Kind::kRightAngle;
+  statement.first = Eigen::Vector2d(100.0, 100.0);
+  statement.second = Eigen::Vector2d(200.0, 100.0);
+  statement.place = "walls.txt:1";
+  options.solver.known.statements.push_back(statement);
+  const SeveralLogsResult result = SolveSeveralLogs(
+      registry_, {Piece(office, 0, 500), std::move(other)}, options);
+  ASSERT_EQ(result.maps.size(), 2u);
+  using ::testing::Contains;
+  using ::testing::HasSubstr;
+  EXPECT_THAT(result.maps[0].result.notes,
+              Contains(HasSubstr("walls.txt:1: there is no wall")));
+  EXPECT_THAT(result.maps[1].result.notes,
+              Not(Contains(HasSubstr("walls.txt:1"))));
+  EXPECT_THAT(result.maps[1].result.notes,
+              Contains(HasSubstr("statements on walls are not used")));
 }
 
 // Its corridors agree with the building's, but not the mouth of a wing.

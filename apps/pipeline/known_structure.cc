@@ -7,6 +7,7 @@
 #include <plumbline/factors/chi_square.h>
 #include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/plan_placement.h>
+#include <plumbline/pipeline/plan_scale.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -60,6 +61,10 @@ constexpr double kContradicted = 1e-4;
 // Share of a statement's variance that is left for others to be checked by:
 // less is not known from numbers like these.
 constexpr double kLeastRedundancy = 1e-6;
+// A scale of the plan that is off by more of its standard errors is told where
+// it puts a wall beside its line by more tolerances than that.
+constexpr double kSureErrors = 5.0;
+constexpr double kMostTolerances = 2.0;
 // Lines of the plan that notes list, longest first.
 constexpr std::size_t kShownLines = 8;
 
@@ -601,6 +606,44 @@ KnownStructureBinder::LinesLetGo(const std::set<std::size_t>& kept,
   return let_go;
 }
 
+// Ties bend the map to a plan that is drawn too large, and each is off by
+// little; but the farther from the middle, the more.
+void KnownStructureBinder::NoteScale(std::vector<std::string>* notes) const {
+  const Feature& plan = std::as_const(*graph_).GetFeature(plan_pose_);
+  const Pose2 plan_pose(plan.parameters[0], plan.parameters[1],
+                        plan.parameters[2]);
+  std::map<FeatureId, MapWall> walls;
+  for (const MapWall& wall : Walls()) walls.emplace(wall.id, wall);
+  std::vector<WallBesideLine> beside;
+  for (const auto& [pair, id] : ties_) {
+    const Constraint* tie = std::as_const(*graph_).FindConstraint(id);
+    const auto wall = walls.find(pair.first);
+    if (tie == nullptr || tie->state != ConstraintState::kLive ||
+        wall == walls.end()) {
+      continue;
+    }
+    const Wall& line = lines_[pair.second];
+    const Pose2 in_plan = Between(plan_pose, wall->second.pose());
+    const SideBySide both = Compare(line, wall->second, in_plan);
+    const Eigen::Vector2d point =
+        PoseTransform(in_plan).Point(Eigen::Vector2d(both.along_wall, 0.0));
+    beside.push_back({point, line.normal(), line.Across(point)});
+  }
+  const std::optional<PlanScale> scale = FindPlanScale(beside);
+  if (!scale ||
+      scale->most_offset <= kMostTolerances * known_.plan_sigma_offset ||
+      std::abs(scale->excess) <= kSureErrors * scale->sigma) {
+    return;
+  }
+  notes->push_back(
+      "the walls that are tied to the plan lie beside its lines as if it were "
+      "drawn too " +
+      std::string(scale->excess > 0.0 ? "large" : "small") + ", by " +
+      Fixed(100.0 * std::abs(scale->excess), 2) + " % at least (+-" +
+      Fixed(100.0 * scale->sigma, 2) +
+      "): its scale is off, and bends the map, or the map's is");
+}
+
 void KnownStructureBinder::NoteLinesLetGo(
     const std::map<std::size_t, LetGo>& let_go,
     std::vector<std::string>* notes) const {
@@ -692,6 +735,7 @@ std::vector<std::string> KnownStructureBinder::Notes(bool is_solved) const {
                     Fixed(plan.parameters[0], 3) + "," +
                     Fixed(plan.parameters[1], 3) + ", turned by " +
                     Fixed(RadToDeg(plan.parameters[2]), 3) + " degrees");
+    NoteScale(&notes);
   }
   NoteLinesLetGo(LinesLetGo(kept, tied), &notes);
   // Made for the first hard statement: most files have none.

@@ -172,6 +172,9 @@ class KnownStructureBinder {
   // Whether measurements, or other statements that are hard, contradict one
   // that is, and held all the same.
   bool IsContradicted(const Constraint& statement, Marginals* marginals) const;
+  // Adds a word where walls lie beside their lines as if the plan were drawn
+  // too large, or too small.
+  void NoteScale(std::vector<std::string>* notes) const;
   // Adds what is to be said of them.
   void NoteLinesLetGo(const std::map<std::size_t, LetGo>& let_go,
                       std::vector<std::string>* notes) const;

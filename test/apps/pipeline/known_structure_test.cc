@@ -299,6 +299,42 @@ TEST_F(StatementTest, APlanThatFitsInTwoPlacesNeedsItsPose) {
               Contains(HasSubstr("near the pose that was given")));
 }
 
+// Each wall is off by less than the tolerance of a tie, or a little more: the
+// plan bends the map, and no line of it is said to be wrong.
+TEST_F(StatementTest, APlanThatIsDrawnTooLargeIsTold) {
+  std::vector<Pose2> walls;
+  for (const double x : {-6.0, -2.0, 3.0, 9.0}) {
+    for (const double y : {-5.0, 4.0}) {
+      walls.emplace_back(x, y, 0.5 * kPi);
+      walls.emplace_back(x + 1.5, y + 2.5, 0.0);
+    }
+  }
+  for (const double scale : {0.99, 1.0, 1.01}) {
+    MakeWalls(walls, 0.02);
+    KnownStructure known;
+    for (std::size_t i = 0; i < walls_.size(); ++i) {
+      const PoseTransform wall(Wall(i));
+      PlanLine line;
+      line.begin = scale * wall.Point(Eigen::Vector2d(-2.0, 0.0));
+      line.end = scale * wall.Point(Eigen::Vector2d(2.0, 0.0));
+      known.plan.push_back(line);
+    }
+    KnownStructureBinder binder(known, registry_, pose_, &graph_);
+    EXPECT_EQ(binder.TieToPlan(), static_cast<int>(walls.size()));
+    SolverSession session(&graph_, registry_, {});
+    EmOrchestrator em(&graph_, &session, registry_, Hierarchy(), {});
+    em.Run();
+    const std::vector<std::string> notes = binder.Notes();
+    if (scale == 1.0) {
+      EXPECT_THAT(notes, Not(Contains(HasSubstr("drawn too"))));
+    } else {
+      EXPECT_THAT(notes,
+                  Contains(HasSubstr(scale > 1.0 ? "drawn too large, by"
+                                                 : "drawn too small, by")));
+    }
+  }
+}
+
 // A cupboard in front of a long wall does not contradict the plan, a wall that
 // stands elsewhere does; and the run says where.
 TEST_F(StatementTest, WhatStandsBesideALineIsTold) {

@@ -3,6 +3,7 @@
 #include <plumbline/core/session.h>
 #include <plumbline/frontend/joint_adjustment.h>
 #include <plumbline/frontend/range_noise.h>
+#include <plumbline/frontend/range_ratio.h>
 #include <plumbline/frontend/relocalization.h>
 #include <plumbline/pipeline/known_structure.h>
 #include <plumbline/pipeline/placement_tie.h>
@@ -10,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -354,6 +356,7 @@ class Merger {
     map.result.scan_relations = adjustment.num_relations();
     map.result.trajectory = InterpolateScans(
         map.result.refined, map.result.records, adjustment.KeyPoses());
+    TellOfRanges(&map);
     Add(std::move(map));
   }
 
@@ -630,8 +633,47 @@ class Merger {
       }
       return false;
     }
+    TellOfRanges(&map);
     Add(std::move(map));
     return true;
+  }
+
+  // Tells of lasers that do not agree on the metre: poses bend until both see
+  // one building, which is true to neither.
+  void TellOfRanges(MapOfLogs* map) const {
+    LogSolverResult& result = map->result;
+    if (result.interrupted) return;
+    std::vector<int> keys;
+    std::vector<Pose2> poses;
+    for (const KeyScanRecord& record : result.records) {
+      keys.push_back(record.scan);
+      poses.push_back(result.trajectory[static_cast<std::size_t>(record.scan)]);
+    }
+    const std::vector<KeyView> views = MakeKeyViews(
+        map->scans, keys, poses, PlacementWith(result.noise_scale).points);
+    std::size_t end =
+        options_.earlier != nullptr ? options_.earlier->scans.size() : 0;
+    const auto first_from = [&](std::size_t scan) {
+      return views.begin() + (std::lower_bound(keys.begin(), keys.end(),
+                                               static_cast<int>(scan)) -
+                              keys.begin());
+    };
+    for (const std::size_t i : map->logs) {
+      const auto first = first_from(end);
+      end += maps_[i].num_scans;
+      const std::optional<RangeRatio> ratio =
+          CompareRanges({views.begin(), first}, {first, first_from(end)});
+      if (!ratio || !ratio->is_significant()) continue;
+      char text[200];
+      std::snprintf(text, sizeof text,
+                    "the ranges of log %zu are %.1f %% %s (+-%.1f) than those "
+                    "of the map that it was placed in: one of the lasers is "
+                    "off, and the map is true to neither",
+                    i + 1, 100.0 * std::abs(ratio->excess),
+                    ratio->excess > 0.0 ? "longer" : "shorter",
+                    100.0 * ratio->sigma);
+      result.notes.push_back(text);
+    }
   }
 
   void Add(MapOfLogs map) {

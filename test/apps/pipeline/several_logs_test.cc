@@ -151,6 +151,30 @@ TEST_F(SeveralLogsTest, PiecesOfADriveBecomeOneMapInAnyOrder) {
   }
 }
 
+// Poses bend until lasers that do not agree on the metre see one building.
+TEST_F(SeveralLogsTest, LasersThatDisagreeOnTheMetreAreTold) {
+  const Log office = Office();
+  const std::size_t n = office.scans.size();
+  using ::testing::Contains;
+  using ::testing::HasSubstr;
+  for (const float factor : {1.0f, 1.02f}) {
+    Log other = Piece(office, n / 4, 3 * n / 4);
+    for (Scan& scan : other.scans) {
+      for (float& range : scan.ranges) range *= factor;
+    }
+    const SeveralLogsResult result = SolveSeveralLogs(
+        registry_, {Piece(office, 0, n / 2), std::move(other)}, {});
+    ASSERT_EQ(result.maps.size(), 1u);
+    const std::vector<std::string>& notes = result.maps[0].result.notes;
+    if (factor == 1.0f) {
+      EXPECT_THAT(notes, Not(Contains(HasSubstr("the ranges of log"))));
+    } else {
+      EXPECT_THAT(notes, Contains(HasSubstr("the ranges of log 2 are 2.0 % "
+                                            "longer")));
+    }
+  }
+}
+
 // First maps are bent. Where that alone speaks against a place, their poses are
 // adjusted before it is looked for again.
 TEST_F(SeveralLogsTest, BentFirstMapsAreStraightened) {

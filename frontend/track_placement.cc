@@ -483,7 +483,13 @@ class Search {
         contradictions.longest() <= options_.max_contradicting_stretch &&
         moved >= options_.min_moved_doors &&
         moved < options_.min_moved_doors_at_start;
-    return WhyAnother(best->agreeing, contradictions);
+    const std::string why = WhyAnother(best->agreeing, contradictions);
+    placement->needs_start =
+        !start_ && !why.empty() && !placement->is_candidate &&
+        WhyAnother(best->agreeing, contradictions, true).empty();
+    return why + (placement->needs_start
+                      ? " (--start_pose says that it is this building)"
+                      : "");
   }
 
   // Whether next to nothing contradicts of what both have seen at a place.
@@ -578,24 +584,38 @@ class Search {
                : 0.0;
   }
 
+  // Longest piece of wall, m, that one of both may have and the other not.
+  // Nobody drives through a wall; but who knows that it is the building knows
+  // of a wall that was put up or taken down.
+  double MaxStretch(int agreeing, bool has_start) const {
+    return has_start && agreeing >= options_.min_plain_agreeing
+               ? options_.max_contradicting_stretch_at_start
+               : options_.max_contradicting_stretch;
+  }
+
   // Why the contradictions of a place say that it is another building, though
   // so many windows agree; empty when they do not.
   std::string WhyAnother(int agreeing,
                          const WallContradictions& contradictions) const {
+    return WhyAnother(agreeing, contradictions, start_.has_value());
+  }
+  std::string WhyAnother(int agreeing, const WallContradictions& contradictions,
+                         bool has_start) const {
     const std::string would = "where " + Parts(agreeing) + " of it would fit, ";
     const double longest = contradictions.longest();
-    if (longest > options_.max_contradicting_stretch) {
+    if (longest > MaxStretch(agreeing, has_start)) {
       return would + "one of both has " + ShortText(longest) +
              " m of wall where the other has none";
     }
     const int moved = CountMovedDoors(contradictions);
-    if (moved >= (start_ ? options_.min_moved_doors_at_start
-                         : options_.min_moved_doors)) {
+    if (moved >= (has_start ? options_.min_moved_doors_at_start
+                            : options_.min_moved_doors)) {
       return would + std::to_string(moved) +
              (moved == 1 ? " door stands" : " doors stand") +
              " elsewhere in the same wall, as in another building or in its "
              "mirror image (--start_pose says that it is this building)";
     }
+    if (has_start && agreeing >= options_.min_plain_agreeing) return "";
     const auto of_track = static_cast<int>(contradictions.of_track.size());
     const auto of_map = static_cast<int>(contradictions.of_map.size());
     const int exchanged = of_track + of_map;

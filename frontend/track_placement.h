@@ -59,6 +59,10 @@ struct TrackPlacement {
   /// not tell the building from others like it, or the place from another one.
   /// Whoever knows that it is its place gives that as the start.
   bool is_candidate = false;
+  /// It was not found, and is no candidate, only for a piece of wall that one
+  /// of both does not have: a wall was put up or taken down, or it is another
+  /// building. With `pose` as the start it is found.
+  bool needs_start = false;
   /// What is to be said of the place though it was found, for people: few parts
   /// speak for it, or doors were opened or shut; with a start also what would
   /// have made it a mere candidate. Empty when it is clear.

@@ -125,6 +125,11 @@ struct TrackPlacementOptions {
   double max_sure_rival = 0.2;
   double min_sure_information_share = 0.2;
   double max_sure_contradicting_stretch = 1.4;
+  /// With a start that somebody gave walls may have been put up and taken down
+  /// where min_plain_agreeing windows agree, at any number of places: longest
+  /// piece, m.
+  double max_contradicting_stretch_at_start =
+      std::numeric_limits<double>::infinity();
   /// With a start that somebody gave: windows that have to agree, doors that
   /// stand elsewhere, and how far from it the track may start, m and rad. Where
   /// it would start farther from there by more than start_precision, m, is no

@@ -511,7 +511,8 @@ class Merger {
   void Tell(std::size_t i, const Group& group,
             const TrackPlacement& placement) {
     LogInMap& log = result_.logs[i];
-    const bool is_candidate = placement.is_candidate && TakesStarts(group);
+    const bool is_candidate =
+        (placement.is_candidate || placement.needs_start) && TakesStarts(group);
     const bool is_more = is_candidate == log.candidate.has_value()
                              ? placement.agreeing >= log.placement.agreeing
                              : is_candidate;

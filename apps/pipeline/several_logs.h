@@ -45,8 +45,9 @@ struct LogInMap {
   /// of a map.
   TrackPlacement placement;
   /// Where its first scan may lie though it was kept apart
-  /// (TrackPlacement::is_candidate): what SeveralLogsOptions::starts needs to
-  /// put it there. None but in the first log's map, or the earlier one.
+  /// (TrackPlacement::is_candidate, needs_start): what
+  /// SeveralLogsOptions::starts needs to put it there. None but in the first
+  /// log's map, or the earlier one.
   std::optional<Pose2> candidate;
 };
 

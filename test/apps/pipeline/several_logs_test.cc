@@ -558,6 +558,8 @@ struct Floor {
   // Rooms whose doors are shut; the robot drives into the second and the fifth
   // above and into the third below.
   std::set<std::size_t> shut[2];
+  // Rooms above that have no wall to the one before.
+  std::set<std::size_t> missing;
   // Rooms above whose doors are double doors.
   std::set<std::size_t> wide;
   bool is_back = false;
@@ -587,7 +589,9 @@ Log DriveAlong(const Floor& floor, std::uint64_t seed) {
         wall(from, 1.1 * side, door - half, 1.1 * side);
         from = door + half;
       }
-      if (room > 0) wall(begin, 1.1 * side, begin, 6.1 * side);
+      if (room > 0 && (row == 1 || floor.missing.count(room) == 0)) {
+        wall(begin, 1.1 * side, begin, 6.1 * side);
+      }
       // A desk and a shelf.
       const bool is_mirrored = floor.is_turned && row == 1;
       wall(is_mirrored ? end - 0.7 : begin + 0.7, 5.2 * side,
@@ -667,6 +671,30 @@ TEST_F(SeveralLogsTest, ADoubleDoorThatWasShutMakesNoOtherBuilding) {
   EXPECT_GT(sure.logs[1].placement.contradicting_length,
             options.placement.max_contradicting_stretch);
   EXPECT_FALSE(sure.logs[1].placement.doubt.empty());
+}
+
+// A wall that was taken down makes another building of it, unless somebody says
+// that it is this one; the run says how.
+TEST_F(SeveralLogsTest, AWallThatWasTakenDownNeedsAStart) {
+  Floor tuesday;
+  tuesday.missing = {1, 4};
+  tuesday.is_back = true;
+  const std::vector<Log> logs = {DriveAlong({}, 1), DriveAlong(tuesday, 2)};
+  SeveralLogsOptions options;
+  const SeveralLogsResult apart = SolveSeveralLogs(registry_, logs, options);
+  EXPECT_EQ(apart.maps.size(), 2u);
+  EXPECT_THAT(apart.logs[1].placement.why_not,
+              ::testing::HasSubstr("m of wall where the other has none"));
+  ASSERT_TRUE(apart.logs[1].candidate.has_value());
+  // Odometry begins where the way does.
+  EXPECT_LT((*apart.logs[1].candidate - Pose2(35.0, 0.0, 0.0)).head<2>().norm(),
+            0.3);
+  options.starts = {std::nullopt, apart.logs[1].candidate};
+  const SeveralLogsResult known = SolveSeveralLogs(registry_, logs, options);
+  ASSERT_EQ(known.maps.size(), 1u) << known.logs[1].placement.why_not;
+  EXPECT_THAT(known.logs[1].placement.doubt,
+              ::testing::HasSubstr("another building"));
+  EXPECT_FALSE(known.logs[1].candidate.has_value());
 }
 
 // A building that looks the same from its other end: a log of one half may be

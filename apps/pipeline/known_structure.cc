@@ -400,6 +400,44 @@ void KnownStructureBinder::AddStatements() {
   }
 }
 
+LinearizedConstraint KnownStructureBinder::LinearizeNow(
+    const Constraint& statement) const {
+  const Graph& graph = *graph_;
+  const auto cost = MakeCost(statement, SqrtInformation(statement.information),
+                             FeaturesOf(graph, statement));
+  return Linearize(graph, statement, *cost);
+}
+
+int KnownStructureBinder::AddStatementsAgain() {
+  Transaction transaction;
+  std::vector<std::size_t> again;
+  for (std::size_t i = 0; i < statements_.size(); ++i) {
+    const Constraint* const broken =
+        statements_[i] == kNoId
+            ? nullptr
+            : std::as_const(*graph_).FindConstraint(statements_[i]);
+    if (broken == nullptr || broken->state == ConstraintState::kLive ||
+        added_again_.count(i) > 0 ||
+        LinearizeNow(*broken).residual.squaredNorm() > kAgreeing) {
+      continue;
+    }
+    Constraint constraint =
+        MakeStructure(*broken->type, broken->features, broken->expected,
+                      broken->information, kStatementSource);
+    constraint.break_below = known_.break_below;
+    transaction.AddConstraint(std::move(constraint));
+    again.push_back(i);
+  }
+  if (again.empty()) return 0;
+  const std::vector<ConstraintId> added =
+      graph_->Apply(std::move(transaction)).constraints;
+  for (std::size_t k = 0; k < again.size(); ++k) {
+    statements_[again[k]] = added[k];
+    added_again_.insert(again[k]);
+  }
+  return static_cast<int>(again.size());
+}
+
 bool KnownStructureBinder::AddPlan(const std::function<bool()>& stop) {
   const std::vector<MapWall> walls = Walls();
   const PlanPlacement placement =
@@ -699,10 +737,7 @@ void KnownStructureBinder::NoteLinesLetGo(
 // C)^-1 r is the chi-square of the statement against the map without it.
 bool KnownStructureBinder::IsContradicted(const Constraint& statement,
                                           Marginals* marginals) const {
-  const Graph& graph = *graph_;
-  const auto cost = MakeCost(statement, SqrtInformation(statement.information),
-                             FeaturesOf(graph, statement));
-  const LinearizedConstraint at = Linearize(graph, statement, *cost);
+  const LinearizedConstraint at = LinearizeNow(statement);
   // Of parallel walls nothing is said but the angle.
   const int rank = InformationRank(statement.information);
   if (ChiSquarePValue(at.residual.squaredNorm(), rank) < known_.break_below) {

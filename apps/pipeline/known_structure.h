@@ -2,6 +2,7 @@
 #define PLUMBLINE_PIPELINE_KNOWN_STRUCTURE_H_
 
 #include <plumbline/core/constraint.h>
+#include <plumbline/core/constraint_evaluation.h>
 #include <plumbline/core/feature.h>
 #include <plumbline/core/graph.h>
 #include <plumbline/core/marginals.h>
@@ -129,6 +130,10 @@ class KnownStructureBinder {
   /// Adds the statements.
   void AddStatements();
 
+  /// Adds statements again that were broken while wrong ones pulled at their
+  /// walls and that agree with the map by now, each once. Returns how many.
+  int AddStatementsAgain();
+
   /// Binds walls that lie near lines of the plan, which it places first, to
   /// them. Pairs that were let go are bound again only when they agree by then.
   /// Returns how many.
@@ -169,6 +174,8 @@ class KnownStructureBinder {
   // that hold.
   std::map<std::size_t, LetGo> LinesLetGo(
       const std::set<std::size_t>& kept, const std::set<FeatureId>& tied) const;
+  // Linearized where the map is, whitened by the tolerances.
+  LinearizedConstraint LinearizeNow(const Constraint& statement) const;
   // Whether measurements, or other statements that are hard, contradict one
   // that is, and held all the same.
   bool IsContradicted(const Constraint& statement, Marginals* marginals) const;
@@ -208,6 +215,8 @@ class KnownStructureBinder {
   std::map<std::pair<FeatureId, std::size_t>, ConstraintId> ties_;
   // By statement; kNoId where there is no such wall.
   std::vector<ConstraintId> statements_;
+  // Those that were added again.
+  std::set<std::size_t> added_again_;
   std::vector<std::string> notes_;
 };
 

@@ -864,6 +864,10 @@ void LogSolver::FindStructureAgain(Context* context) {
                              &map_.graph());
   if (options_.structure) known.AddStatements();
   RunEm(context);
+  if (options_.structure && !context->IsStopped() &&
+      known.AddStatementsAgain() > 0) {
+    RunEm(context);
+  }
   if (options_.structure) TieToPlan(&known, context);
   context->IsStopped();
   result.final_cost = map_.session().Cost();

@@ -165,6 +165,28 @@ TEST_F(StatementTest, WhatMeasurementsContradictBreaksUnlessItIsHard) {
   EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 6.0, 0.01);
 }
 
+// While wrong statements pull at a wall a right one breaks with them.
+TEST_F(StatementTest, ARightStatementOutlivesWrongOnes) {
+  MakeWalls({Pose2(0.0, 0.0, 0.0), Pose2(0.0, 5.0, 0.0)}, 0.02);
+  KnownStructure known;
+  known.statements = ReadWallStatements(
+      "distance 0,0 0,5 5.01\ndistance 0,0 0,5 5000\ndistance 0,0 0,5 6\n",
+      "walls.txt");
+  KnownStructureBinder binder(known, registry_, pose_, &graph_);
+  SolverSession session(&graph_, registry_, {});
+  EmOrchestrator em(&graph_, &session, registry_, Hierarchy(), {});
+  binder.AddStatements();
+  em.Run();
+  EXPECT_EQ(binder.AddStatementsAgain(), 1);
+  em.Run();
+  EXPECT_EQ(binder.AddStatementsAgain(), 0);
+  EXPECT_THAT(binder.Notes(),
+              ::testing::UnorderedElementsAre(
+                  HasSubstr("walls.txt:2: measurements contradict it"),
+                  HasSubstr("walls.txt:3: measurements contradict it")));
+  EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 5.005, 5e-3);
+}
+
 // However tight it is, and so however small what is left of the contradiction.
 TEST_F(StatementTest, WhatMeasurementsContradictIsToldWhereItIsHard) {
   const std::vector<Pose2> walls = {Pose2(0.0, 0.0, 0.0), Pose2(0.0, 5.0, 0.0),

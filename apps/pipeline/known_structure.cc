@@ -10,6 +10,7 @@
 #include <plumbline/pipeline/plan_scale.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -46,6 +47,10 @@ constexpr double kParallel = DegToRad(1.0);
 // there, at least, and so little on the other side, at most.
 constexpr double kBesideBody = 0.5;
 constexpr double kBesideNone = 0.2;
+// No two walls are farther apart than so many sizes of the map, however it is
+// bent. A statement like that tears walls so far away that they do not find
+// back.
+constexpr double kMostDistance = 2.0;
 // Chi-square with two degrees of freedom, exceeded by one in ten, up to which a
 // wall that was let go from a line is tied to it again.
 constexpr double kAgreeing = 4.6;
@@ -78,6 +83,17 @@ std::string Fixed(double value, int decimals) {
   std::string text;
   AppendFixed(value, decimals, &text);
   return text;
+}
+
+// Diagonal of a box around walls, m.
+template <typename AnyWall>
+double SizeOf(const std::vector<AnyWall>& walls) {
+  Eigen::AlignedBox2d box;
+  for (const Wall& wall : walls) {
+    box.extend(wall.At(wall.begin));
+    box.extend(wall.At(wall.end));
+  }
+  return box.isEmpty() ? 0.0 : box.diagonal().norm();
 }
 
 std::vector<Wall> PlanWalls(const std::vector<PlanLine>& plan) {
@@ -349,6 +365,7 @@ void KnownStructureBinder::AddStatements() {
   // some distance apart stays two.
   const RelationType& relation =
       registry_.GetRelation("segment_segment_offset");
+  const double size = SizeOf(walls);
   for (const WallStatement& statement : known_.statements) {
     const MapWall* const first = WallAt(walls, statement.first);
     const MapWall* const second = WallAt(walls, statement.second);
@@ -362,6 +379,14 @@ void KnownStructureBinder::AddStatements() {
                             : ": there is no wall within 1 m of " +
                                   Fixed(point.x(), 2) + "," +
                                   Fixed(point.y(), 2)));
+      continue;
+    }
+    if (statement.kind == WallStatement::Kind::kDistance &&
+        statement.distance > kMostDistance * size) {
+      notes_.push_back(statement.place + ": the whole map is only " +
+                       Fixed(size, 1) +
+                       " m large, the distance is of another unit; it is not "
+                       "used");
       continue;
     }
     // Walls have a direction: the one may run against the other.

@@ -165,12 +165,23 @@ TEST_F(StatementTest, WhatMeasurementsContradictBreaksUnlessItIsHard) {
   EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 6.0, 0.01);
 }
 
+// Millimetres for metres; hard ones, too.
+TEST_F(StatementTest, ADistanceThatNoMapHasIsOfAnotherUnit) {
+  for (const char* const text :
+       {"distance 0,0 0,5 5000\n", "distance 0,0 0,5 5000 hard\n"}) {
+    MakeWalls({Pose2(0.0, 0.0, 0.0), Pose2(0.0, 5.0, 0.0)}, 0.02);
+    EXPECT_THAT(Solve(text), ::testing::ElementsAre(
+                                 HasSubstr("walls.txt:1: the whole map is")));
+    EXPECT_NEAR(Wall(1)[1] - Wall(0)[1], 5.0, 1e-6);
+  }
+}
+
 // While wrong statements pull at a wall a right one breaks with them.
 TEST_F(StatementTest, ARightStatementOutlivesWrongOnes) {
   MakeWalls({Pose2(0.0, 0.0, 0.0), Pose2(0.0, 5.0, 0.0)}, 0.02);
   KnownStructure known;
   known.statements = ReadWallStatements(
-      "distance 0,0 0,5 5.01\ndistance 0,0 0,5 5000\ndistance 0,0 0,5 6\n",
+      "distance 0,0 0,5 5.01\ndistance 0,0 0,5 9\ndistance 0,0 0,5 6\n",
       "walls.txt");
   KnownStructureBinder binder(known, registry_, pose_, &graph_);
   SolverSession session(&graph_, registry_, {});

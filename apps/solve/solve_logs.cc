@@ -248,6 +248,11 @@ std::unique_ptr<EarlierMap> EarlierMapFromFlags(const Registry& registry) {
     throw Error("--align", 0, "--localize gives poses in the frame of --map",
                 "one of them");
   }
+  if (FLAGS_localize && !(FLAGS_plan.empty() && FLAGS_constraints.empty())) {
+    throw Error(FLAGS_plan.empty() ? "--constraints" : "--plan", 0,
+                "has no effect with --localize, which leaves the map as it is",
+                "one of them");
+  }
   const std::string text = ReadTextInput(FLAGS_map, kLargestMap);
   auto map = std::make_unique<EarlierMap>();
   map->key_scans = ReadKeyScans(text, FLAGS_map);

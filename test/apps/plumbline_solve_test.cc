@@ -1173,6 +1173,8 @@ TEST_F(SolveTest, AnEarlierMap) {
     EXPECT_THAT(output, HasSubstr(why));
   };
   refuses("--localize", "--map=map.json");
+  refuses(flag + " --localize --constraints=" + Write("walls.txt", ""),
+          "--constraints: has no effect with --localize");
   refuses(flag, "another folder", "first");
   refuses(flag + " --refine=map", "full refinement");
   refuses(flag + " --start_pose=2:0,0,0", "1:3.5,-1,90");

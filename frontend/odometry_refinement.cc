@@ -608,6 +608,9 @@ bool OdometryRefiner::LooksAlikeNear(const MatchPrior& prior,
   const auto quality_at = [&](const Pose2& pose) {
     return matcher.Compare(points_, pose, laser).Quality();
   };
+  const auto is_elsewhere = [&](const Pose2& pose) {
+    return (pose - match.pose).head<2>().norm() >= kLeastAlike;
+  };
   const double alike = kAlikeShare * quality_at(match.pose);
   const Eigen::Matrix2d covariance =
       prior.information.inverse().topLeftCorner<2, 2>();
@@ -622,9 +625,6 @@ bool OdometryRefiner::LooksAlikeNear(const MatchPrior& prior,
       there.head<2>() += kAlikeStep * Eigen::Vector2d(i, k);
       there[2] = match.pose[2];
       const Eigen::Vector2d left = there.head<2>() - prior.pose.head<2>();
-      const auto is_elsewhere = [&](const Pose2& pose) {
-        return (pose - match.pose).head<2>().norm() >= kLeastAlike;
-      };
       if (left.dot(within * left) > Square(kAlikeSigmas) ||
           !is_elsewhere(there) || quality_at(there) < kAlikeToTry * alike) {
         continue;

@@ -809,33 +809,44 @@ struct WayInRooms {
   double outside_length = 0.0;
 };
 
+// Calls `visit` with the room (-1: none) of every pose that is one, in order,
+// and how far it is from the one before, m. Where the way breaks off, 0.
+template <typename Visit>
+void ForEachRoomOnWay(const std::vector<Pose2>& path,
+                      const std::vector<PlanRoom>& rooms, const Visit& visit) {
+  std::size_t last = 0;  // mostly the robot is where it was before
+  const auto room_at = [&](const Vector2d& place) {
+    for (std::size_t i = 0; i < rooms.size(); ++i) {
+      const std::size_t which = (last + i) % rooms.size();
+      if (!rooms[which].outline.Contains(place)) continue;
+      last = which;
+      return static_cast<int>(which);
+    }
+    return -1;
+  };
+  Vector2d before = Vector2d::Constant(std::nan(""));
+  for (const Pose2& pose : path) {
+    const Vector2d here = pose.head<2>();
+    if (here.allFinite()) {
+      visit(room_at(here), before.allFinite() ? (here - before).norm() : 0.0);
+    }
+    before = here;
+  }
+}
+
 // Marks the rooms that the robot was in.
 WayInRooms MarkEntered(const std::vector<Pose2>& path,
                        std::vector<PlanRoom>* rooms) {
   WayInRooms way;
-  std::size_t last = 0;  // where it was before
-  Vector2d before = Vector2d::Constant(std::nan(""));
-  for (const Pose2& pose : path) {
-    const Vector2d here = pose.head<2>();
-    if (!here.allFinite()) {
-      before = here;
-      continue;
-    }
-    bool is_inside = false;
-    for (std::size_t i = 0; i < rooms->size() && !is_inside; ++i) {
-      const std::size_t which = (last + i) % rooms->size();
-      is_inside = (*rooms)[which].outline.Contains(here);
-      if (is_inside) last = which;
-    }
-    if (is_inside) {
-      (*rooms)[last].is_entered = true;
+  ForEachRoomOnWay(path, *rooms, [&](int room, double step) {
+    if (room >= 0) {
+      (*rooms)[static_cast<std::size_t>(room)].is_entered = true;
       ++way.inside;
     } else {
       ++way.outside;
-      if (before.allFinite()) way.outside_length += (here - before).norm();
+      way.outside_length += step;
     }
-    before = here;
-  }
+  });
   return way;
 }
 
@@ -844,30 +855,14 @@ double WayOutside(const std::vector<Pose2>& path,
                   const std::vector<PlanRoom>& rooms) {
   double all = 0.0;
   double stretch = 0.0;
-  Vector2d before = Vector2d::Constant(std::nan(""));
-  std::size_t last = 0;
-  for (const Pose2& pose : path) {
-    const Vector2d here = pose.head<2>();
-    if (!here.allFinite()) {
-      // Another log begins.
-      before = here;
-      continue;
-    }
-    bool is_inside = false;
-    for (std::size_t i = 0; i < rooms.size() && !is_inside; ++i) {
-      const std::size_t which = (last + i) % rooms.size();
-      is_inside = rooms[which].outline.Contains(here);
-      if (is_inside) last = which;
-    }
-    const double step = before.allFinite() ? (here - before).norm() : 0.0;
-    before = here;
-    if (!is_inside) {
+  ForEachRoomOnWay(path, rooms, [&](int room, double step) {
+    if (room < 0) {
       stretch += step;
-      continue;
+      return;
     }
     if (stretch > kDoorway) all += stretch;
     stretch = 0.0;
-  }
+  });
   return stretch > kDoorway ? all + stretch : all;
 }
 

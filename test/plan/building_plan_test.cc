@@ -5,46 +5,12 @@
 #include <cmath>
 #include <vector>
 
+#include "plan/drawing.h"
+
 namespace plumbline {
 namespace {
 
 using Eigen::Vector2d;
-
-// A raster drawn by rectangles, m.
-class Drawing {
- public:
-  Drawing(double width, double height) {
-    space_.width = static_cast<int>(width / space_.resolution);
-    space_.height = static_cast<int>(height / space_.resolution);
-    space_.cells.assign(static_cast<std::size_t>(space_.width) * space_.height,
-                        Space::kUnknown);
-  }
-
-  Drawing& Fill(double x1, double y1, double x2, double y2, Space what) {
-    const auto cell = [&](double v) {
-      return static_cast<int>(std::lround(v / space_.resolution));
-    };
-    for (int row = cell(y1); row < cell(y2); ++row) {
-      for (int column = cell(x1); column < cell(x2); ++column) {
-        space_.cells[static_cast<std::size_t>(row) * space_.width + column] =
-            what;
-      }
-    }
-    return *this;
-  }
-  Drawing& Free(double x1, double y1, double x2, double y2) {
-    return Fill(x1, y1, x2, y2, Space::kFree);
-  }
-  // A room whose faces lie on the rectangle: its rim is occupied.
-  Drawing& Room(double x1, double y1, double x2, double y2) {
-    Fill(x1 - 0.05, y1 - 0.05, x2 + 0.05, y2 + 0.05, Space::kOccupied);
-    return Free(x1, y1, x2, y2);
-  }
-  const SpaceGrid& space() const { return space_; }
-
- private:
-  SpaceGrid space_;
-};
 
 // A corridor below, two rooms above it with a door each, walls of 20 cm.
 Drawing TwoRooms() {
@@ -1160,7 +1126,6 @@ TEST(BuildingPlanTest, RoomsWithSixSides) {
   for (const double angle : {90.0, 210.0, 330.0}) {
     centers.push_back(corner + kSide * at(angle));
   }
-  SpaceGrid space = Drawing(12.0, 12.0).space();
   // How far a point lies within the nearest room, m.
   const auto inside = [&](const Vector2d& p) {
     double most = -1e9;
@@ -1185,15 +1150,13 @@ TEST(BuildingPlanTest, RoomsWithSixSides) {
     }
     return false;
   };
-  for (int row = 0; row < space.height; ++row) {
-    for (int column = 0; column < space.width; ++column) {
-      const double depth = inside(space.Middle(column, row));
-      const bool is_open = is_in_door(space.Middle(column, row));
-      if (depth < -0.04 && !is_open) continue;
-      space.cells[static_cast<std::size_t>(row) * space.width + column] =
-          depth > 0.0 || is_open ? Space::kFree : Space::kOccupied;
-    }
-  }
+  Drawing drawing(12.0, 12.0);
+  drawing
+      .FillWhere(Space::kOccupied,
+                 [&](const Vector2d& p) { return inside(p) >= -0.04; })
+      .FillWhere(Space::kFree, [&](const Vector2d& p) {
+        return inside(p) > 0.0 || is_in_door(p);
+      });
   std::vector<KnownWall> walls;
   for (const Vector2d& center : centers) {
     for (int side = 0; side < 6; ++side) {
@@ -1208,8 +1171,9 @@ TEST(BuildingPlanTest, RoomsWithSixSides) {
       walls.push_back({middle + 0.47 * along, middle + 1.25 * along});
     }
   }
-  const BuildingPlan plan = MakeBuildingPlan(
-      walls, {DegToRad(0.0), DegToRad(60.0), DegToRad(120.0)}, space, {});
+  const BuildingPlan plan =
+      MakeBuildingPlan(walls, {DegToRad(0.0), DegToRad(60.0), DegToRad(120.0)},
+                       drawing.space(), {});
   EXPECT_EQ(plan.rooms.size(), 3u);
   EXPECT_EQ(plan.doors.size(), 3u);
 }

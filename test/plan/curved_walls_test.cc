@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <vector>
+
+#include "plan/drawing.h"
 
 namespace plumbline {
 namespace {
@@ -14,43 +15,18 @@ using Eigen::Vector2d;
 
 const Vector2d kRoundCenter(6.0, 6.0);
 
-// A raster of 16 by 12 m.
-class RoundDrawing {
+// A raster of 16 by 12 m with circles.
+class RoundDrawing : public Drawing {
  public:
-  RoundDrawing() {
-    space_.width = 320;
-    space_.height = 240;
-    space_.cells.assign(static_cast<std::size_t>(space_.width) * space_.height,
-                        Space::kUnknown);
-  }
+  RoundDrawing() : Drawing(16.0, 12.0) {}
 
-  // Fills the cells whose middle `is_inside` holds for.
-  RoundDrawing& Fill(Space what,
-                     const std::function<bool(const Vector2d&)>& is_inside) {
-    for (int row = 0; row < space_.height; ++row) {
-      for (int column = 0; column < space_.width; ++column) {
-        if (!is_inside(space_.Middle(column, row))) continue;
-        space_.cells[static_cast<std::size_t>(row) * space_.width + column] =
-            what;
-      }
-    }
-    return *this;
-  }
   // Returns on a circle around kRoundCenter.
   RoundDrawing& Circle(double radius) {
-    return Fill(Space::kOccupied, [&](const Vector2d& p) {
+    FillWhere(Space::kOccupied, [&](const Vector2d& p) {
       return std::abs((p - kRoundCenter).norm() - radius) <= 0.04;
     });
+    return *this;
   }
-  RoundDrawing& Box(Space what, double x1, double y1, double x2, double y2) {
-    return Fill(what, [&](const Vector2d& p) {
-      return p[0] > x1 && p[0] < x2 && p[1] > y1 && p[1] < y2;
-    });
-  }
-  const SpaceGrid& space() const { return space_; }
-
- private:
-  SpaceGrid space_;
 };
 
 Vector2d OnCircle(double radius, double degrees) {
@@ -86,7 +62,7 @@ double LargestOff(const CurvedWall& wall, double radius) {
 
 TEST(CurvedWallsTest, ARoundRoomIsOneClosedWall) {
   RoundDrawing drawing;
-  drawing.Circle(2.5).Box(Space::kFree, 8.0, 5.55, 9.0, 6.45);
+  drawing.Circle(2.5).Free(8.0, 5.55, 9.0, 6.45);
   // A face is missing here and there, a straight one stands elsewhere.
   std::vector<KnownWall> pieces = ArcChords(2.5, 20.0, 340.0, 16.0);
   pieces.erase(pieces.begin() + 4);
@@ -141,7 +117,7 @@ TEST(CurvedWallsTest, CurvesThatGoOnAreOneWall) {
                      piece.end - kRoundCenter + center});
   }
   pieces.insert(pieces.end(), other.begin(), other.end());
-  drawing.Fill(Space::kOccupied, [&](const Vector2d& p) {
+  drawing.FillWhere(Space::kOccupied, [&](const Vector2d& p) {
     return (std::abs((p - kRoundCenter).norm() - 3.0) <= 0.04 &&
             p[0] > kRoundCenter[0] - 0.3) ||
            (std::abs((p - center).norm() - 3.0) <= 0.04 &&
@@ -157,7 +133,7 @@ TEST(CurvedWallsTest, CurvesThatGoOnAreOneWall) {
 // the map bends a little, faces on a circle along which nothing stands.
 TEST(CurvedWallsTest, StraightWallsAreNone) {
   RoundDrawing drawing;
-  drawing.Box(Space::kOccupied, 0.0, 0.0, 16.0, 12.0);
+  drawing.Fill(0.0, 0.0, 16.0, 12.0, Space::kOccupied);
   const auto count = [&](std::vector<KnownWall> pieces) {
     const std::size_t before = pieces.size();
     const std::size_t walls = TakeCurves(drawing, &pieces).size();
@@ -202,12 +178,13 @@ TEST(CurvedWallsTest, FewAndOddFaces) {
 // A round room of 2.5 m radius beside a corridor, with a door of 0.9 m.
 TEST(CurvedWallsTest, ARoundRoomHasADoor) {
   RoundDrawing drawing;
-  drawing.Box(Space::kOccupied, 8.55, 0.95, 10.65, 11.05)
-      .Box(Space::kFree, 8.6, 1.0, 10.6, 11.0)
-      .Circle(2.5)
-      .Fill(Space::kFree,
-            [](const Vector2d& p) { return (p - kRoundCenter).norm() < 2.46; })
-      .Box(Space::kFree, 8.0, 5.55, 9.0, 6.45);
+  drawing.Fill(8.55, 0.95, 10.65, 11.05, Space::kOccupied)
+      .Free(8.6, 1.0, 10.6, 11.0);
+  drawing.Circle(2.5)
+      .FillWhere(
+          Space::kFree,
+          [](const Vector2d& p) { return (p - kRoundCenter).norm() < 2.46; })
+      .Free(8.0, 5.55, 9.0, 6.45);
   std::vector<KnownWall> walls = ArcChords(2.5, 20.0, 340.0, 16.0);
   walls.push_back({{8.6, 1.0}, {8.6, 5.5}});
   walls.push_back({{8.6, 6.5}, {8.6, 11.0}});

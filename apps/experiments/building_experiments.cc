@@ -81,14 +81,17 @@ void AddPlanClaims(const std::string& shape, ExperimentResult* result) {
   };
   const auto add_mean = [&](const std::string& what, const char* name,
                             double bound, bool is_least) {
+    std::vector<double> values = Column(*result, shape, name);
+    const bool has_trials = !values.empty();
+    values.erase(std::remove_if(values.begin(), values.end(),
+                                [](double value) { return std::isnan(value); }),
+                 values.end());
+    // Of nothing, as the widths of doors where none was driven through.
+    if (has_trials && values.empty()) return;
     Claim claim;
     claim.text = shape + ": " + what;
     claim.required =
         (is_least ? "at least " : "at most ") + Format("%g", bound);
-    std::vector<double> values = Column(*result, shape, name);
-    values.erase(std::remove_if(values.begin(), values.end(),
-                                [](double value) { return std::isnan(value); }),
-                 values.end());
     claim.measured = MeanEstimate(values);
     claim.holds = is_least ? claim.measured.value >= bound
                            : claim.measured.value <= bound;

@@ -80,6 +80,8 @@ constexpr double kOfOneThing = 0.8;
 constexpr double kSpeaks = 0.5;
 constexpr int kLeastForWheels = 4;
 constexpr double kShareForWheels = 0.5;
+// They lead elsewhere along the way by a cosine of at least this.
+constexpr double kAlongWay = 0.7;
 // So many scans after the robot was last seen to move as its wheels turn these
 // count while they turn as before, where at least so much speaks for them.
 constexpr int kMostEven = 20;
@@ -446,7 +448,13 @@ void OdometryRefiner::MatchAsWheelsSay(const Scan& scan,
           .normalized();
   std::vector<ScanPoint> standing;
   if (steady) standing = WithoutOneThing(direction);
-  if (standing.empty()) {
+  // What goes ahead or beside takes a match along; aside of the way it is
+  // wheels that turned by a little more or less.
+  const Eigen::Vector2d way = (by_wheels - track_.keys.back().pose).head<2>();
+  const bool is_along =
+      std::abs(way.dot((match->pose - by_wheels).head<2>())) >=
+      kAlongWay * way.norm() * apart(match->pose);
+  if (standing.empty() && is_along) {
     standing = WithoutWhatGoes(direction, guess, match->pose,
                                steady ? 0 : kLeastWhenUnsteady);
   }

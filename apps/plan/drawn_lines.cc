@@ -62,6 +62,9 @@ constexpr double kDeepestFurniture = 0.8;
 constexpr double kWidestColumn = 0.6;
 constexpr double kLongestScreen = 1.5;
 constexpr std::size_t kLeastScreens = 2;
+// Lines with less wall, m, are partitions: others are drawn on past them, to
+// the walls that close a space.
+constexpr double kFullLine = 2.0;
 // A wall that is crossed this far within another's end is met there, m.
 constexpr double kAtTheEnd = 0.4;
 // Share of a partition that may look open: laser points go astray.
@@ -149,8 +152,11 @@ void DrawOn(double reach, double beyond_other, std::vector<DrawnLine>* drawn) {
             count >= kMeetings) {
           break;
         }
-        if (last < 0.0 || meeting.distance > last + 0.5) ++count;
-        last = meeting.distance;
+        if ((*drawn)[meeting.other].line.weight >= kFullLine &&
+            (last < 0.0 || meeting.distance > last + 0.5)) {
+          ++count;
+          last = meeting.distance;
+        }
         stretch(i, meeting.t);
         stretch(meeting.other, meeting.t_other);
       }
